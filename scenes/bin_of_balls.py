@@ -1,0 +1,30 @@
+"""Spheres and capsules are dropped into a bin.
+
+Hard: every overlap is smooth on at least one side, lenses between spheres, caps on the walls, and the long
+shallow lenses of two capsules that lie side by side; none is a polytope, so the error bound does the talking.
+"""
+
+import random
+
+import pybullet as p
+import pybullet_data
+
+STEPS = 240
+
+
+def build(client: int) -> None:
+    chance = random.Random(7)
+    p.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
+    p.setGravity(0, 0, -9.81, physicsClientId=client)
+    p.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=client)
+    p.loadURDF("tray/traybox.urdf", globalScaling=0.7, physicsClientId=client)
+    capsule = p.createCollisionShape(p.GEOM_CAPSULE, radius=0.02, height=0.08, physicsClientId=client)
+    for k in range(48):
+        layer, row, column = k // 16, k // 4 % 4 - 1.5, k % 4 - 1.5
+        place = [0.075 * row, 0.075 * column, 0.1 + 0.08 * layer]
+        turn = p.getQuaternionFromEuler([chance.uniform(-3, 3) for _ in range(3)])
+        if k % 2:
+            ball = p.loadURDF("sphere_small.urdf", place, turn, physicsClientId=client)
+        else:
+            ball = p.createMultiBody(0.15, capsule, basePosition=place, baseOrientation=turn, physicsClientId=client)
+        p.changeDynamics(ball, -1, contactStiffness=2000, contactDamping=10, physicsClientId=client)  # rubber
