@@ -255,4 +255,5 @@ def _nearest_weights(triangles: Floats) -> Floats:
         share = np.clip(-np.einsum("ki,ki->k", start, edge) / np.einsum("ki,ki->k", edge, edge), 0.0, 1.0)
         candidates[:, i + 1, i], candidates[:, i + 1, j] = 1.0 - share, share
     lengths = np.linalg.norm(candidates @ triangles, axis=2)
-    return candidates[np.arange(len(triangles)), lengths.argmin(axis=1)]
+    nearest: Floats = candidates[np.arange(len(triangles)), lengths.argmin(axis=1)]
+    return nearest

@@ -4,10 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
+from strategies import directions, hull_points, moved, quaternion, reach
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
 from overlapper.arbiter import signed_distance_bounds
-from strategies import directions, hull_points, moved, quaternion, reach
 
 CUBE = Box([0.5, 0.5, 0.5])
 
