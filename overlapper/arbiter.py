@@ -6,9 +6,11 @@ the two support values, and every polytope with vertices in D gives an upper one
 nearest to the origin (van den Bergen, Collision Detection in Interactive 3D Environments, 2003, section 4.3) until the
 bounds meet; it is built anew each time, because an arbiter is seldom asked.
 
+Balls and capsules go in as points and segments; their radii are subtracted in the end.
+
 Doubles only propose: which directions, which vertices, which facets. What is returned was evaluated in rational
-arithmetic on the very doubles that describe the pair, and rounded once, outwards. The support points of spheres,
-capsules and cylinders are irrational; they are rounded to doubles in the shape's own frame, 1e-16 of its size.
+arithmetic on the very doubles that describe the pair, and rounded once, outwards. Only the points on the rim of a
+cylinder are irrational; they are rounded to doubles in its own frame, 1e-16 of its size.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 from fractions import Fraction
-from itertools import product
+from itertools import combinations_with_replacement, product
 from typing import Any
 
 import numpy as np
@@ -31,7 +33,7 @@ Exact = NDArray[np.object_]  # of Fraction
 # Three exact divisions and roots, each rounded correctly, and their product.
 OUTWARDS = 4 * 2.0**-52
 
-# Smooth pairs gain about one digit in ten steps; a pair that needs more (concentric balls) keeps wide bounds.
+# Polyhedra end by themselves. Rims gain about a digit in ten steps; coaxial ones need more, and keep wide bounds.
 STEPS = 100
 
 # The directions to the 26 neighbours of a cell.
@@ -63,10 +65,11 @@ def signed_distance_bounds(
 
 
 class Difference:
-    """A polytope inside the Minkowski difference A - B, with exact vertices."""
+    """A polytope inside the Minkowski difference A - B, round parts left out, with exact vertices."""
 
     def __init__(self, a: Placed, b: Placed) -> None:
         self.bodies = (a, b)
+        self.radius = sum(body.shape.radius for body in (a, b) if isinstance(body.shape, Sphere | Capsule))
         self.frames = (_rotation(a.orientation), _rotation(b.orientation))
         self.offset: Exact = exact(a.position) - exact(b.position)
         self.points: dict[tuple[float, ...], Exact] = {}
@@ -96,36 +99,43 @@ class Difference:
         self.points[key] = point
         return not known
 
-    def hull(self) -> Hull:
-        return Hull(np.array(list(self.points)))
+    def surface(self) -> tuple[Floats, Floats]:
+        """Triangles (k, 3, 3), counter-clockwise from outside, and half-spaces (f, 4) that bound the polytope."""
+        points = np.array(list(self.points))
+        if all(isinstance(body.shape, Sphere | Capsule) for body in self.bodies):
+            across = np.linalg.svd(points - points.mean(axis=0))[2][2]  # of a parallelogram at most
+            return np.array(list(combinations_with_replacement(points, 3))), np.array([[*across, 0.0]])
+        hull = Hull(points)
+        fans = [(ring[0], ring[i], ring[i + 1]) for ring in hull.facets for i in range(1, len(ring) - 1)]
+        return hull.vertices[np.array(fans)], hull.halfspaces
 
     def nearest(self) -> tuple[Floats, float]:
-        """The direction in which to grow next, and the signed distance of the hull of the points, in doubles."""
-        hull = self.hull()
-        facet = hull.halfspaces[hull.halfspaces[:, 3].argmax()]
+        """The direction in which to grow next, and the signed distance of the polytope, in doubles."""
+        triangles, halfspaces = self.surface()
+        facet = halfspaces[halfspaces[:, 3].argmax()]
         if facet[3] < 0.0:
             return facet[:3], float(facet[3])
-        triangles = _fans(hull)
         points = np.einsum("ki,kij->kj", _nearest_weights(triangles), triangles)
         distances = np.linalg.norm(points, axis=1)
         row = distances.argmin()
         return (-points[row] if distances[row] > 0.0 else facet[:3]), float(distances[row])
 
     def certified(self) -> tuple[float, float]:
-        """(lower, upper) bounds of the signed distance, evaluated exactly and rounded outwards."""
-        triangles = _fans(self.hull())
+        """(lower, upper) bounds of the signed distance of the pair, evaluated exactly and rounded outwards."""
+        triangles, _ = self.surface()
         weights = _nearest_weights(triangles)
         points = np.einsum("ki,kij->kj", weights, triangles)
         row = np.linalg.norm(points, axis=1).argmin()
         shares = exact(weights[row]) / sum(exact(weights[row]))
         nearest = sum(share * self.points[tuple(corner)] for share, corner in zip(shares, triangles[row]))
-        upper = math.sqrt(nearest @ nearest) * (1.0 + OUTWARDS)
+        distance = math.sqrt(nearest @ nearest)
         lower, _ = _gap(*self.bodies, exact(self.outward))
-        radius = self._inscribed_radius(triangles, points) if lower <= 0.0 else None
-        return lower, upper if radius is None else -radius
+        inner = self._inscribed_radius(triangles, points) if lower <= -self.radius else None
+        upper = distance if inner is None else -inner
+        return lower, upper - self.radius + OUTWARDS * (abs(upper) + self.radius)
 
     def _inscribed_radius(self, triangles: Floats, nearest: Floats) -> float | None:
-        """The radius of a ball about the origin inside the closed surface, rounded down; None if the origin is not."""
+        """The radius of a ball about the origin inside the surface; None if that is open or the origin outside."""
         edges = Counter((tuple(t[i]), tuple(t[i - 1])) for t in triangles for i in range(3))
         if any(count != edges[edge[::-1]] for edge, count in edges.items()):
             return None
@@ -136,7 +146,7 @@ class Difference:
             angle += _solid_angle(triangle, normal @ corners[0])
             # The triangle is beyond each of these planes; the second serves where it has next to no area.
             radius = min(radius, max(_least(corners, normal), _least(corners, exact(point))))
-        return radius * (1.0 - OUTWARDS) if abs(angle - 4.0 * math.pi) < 1.0 and radius > 0.0 else None
+        return radius if abs(angle - 4.0 * math.pi) < 1.0 and radius > 0.0 else None
 
 
 def _gap(a: Placed, b: Placed, outward: Exact) -> tuple[float, float]:
@@ -165,7 +175,7 @@ def _rotation(quaternion: Floats) -> Exact:
 
 
 def _support(shape: Shape, direction: Floats) -> Floats:
-    """A farthest point of a bounded shape, in its own frame."""
+    """A farthest point of a bounded shape without its round part, in its own frame."""
     tip = np.array([0.0, 0.0, math.copysign(1.0, direction[2])])
     radial = np.array([direction[0], direction[1], 0.0])
     farthest: Floats
@@ -175,19 +185,14 @@ def _support(shape: Shape, direction: Floats) -> Floats:
         case Hull():
             farthest = shape.vertices[np.argmax(shape.vertices @ direction)]
         case Sphere():
-            farthest = shape.radius * _unit(direction)
+            farthest = np.zeros(3)
         case Capsule():
-            farthest = shape.length / 2 * tip + shape.radius * _unit(direction)
+            farthest = shape.length / 2 * tip
         case Cylinder():
-            farthest = shape.length / 2 * tip + shape.radius * _unit(radial)
+            farthest = shape.length / 2 * tip + shape.radius * radial / (np.linalg.norm(radial) or 1.0)
         case _:
             raise TypeError(f"shape must be bounded, not {shape!r}")
     return farthest
-
-
-def _unit(vector: Floats) -> Floats:
-    length = float(np.linalg.norm(vector))
-    return vector / length if length > 0.0 else vector
 
 
 def _extent(shape: Shape, direction: Exact) -> tuple[Fraction, float]:
@@ -209,12 +214,6 @@ def _extent(shape: Shape, direction: Exact) -> tuple[Fraction, float]:
             return Fraction(shape.length) / 2 * abs(z), shape.radius * math.sqrt(x * x + y * y)
         case HalfSpace():
             return Fraction(shape.offset), 0.0
-
-
-def _fans(hull: Hull) -> Floats:
-    """The surface as triangles (k, 3, 3), counter-clockwise from outside."""
-    fans = [(ring[0], ring[i], ring[i + 1]) for ring in hull.facets for i in range(1, len(ring) - 1)]
-    return hull.vertices[np.array(fans)]
 
 
 def _cross(u: Exact, v: Exact) -> Exact:
@@ -252,7 +251,8 @@ def _nearest_weights(triangles: Floats) -> Floats:
     candidates[inside, 0] = np.column_stack([first, second, third])[inside]
     for i, j in ((0, 1), (1, 2), (2, 0)):
         start, edge = triangles[:, i], triangles[:, j] - triangles[:, i]
-        share = np.clip(-np.einsum("ki,ki->k", start, edge) / np.einsum("ki,ki->k", edge, edge), 0.0, 1.0)
+        squared = np.einsum("ki,ki->k", edge, edge)
+        share = np.clip(-np.einsum("ki,ki->k", start, edge) / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
         candidates[:, i + 1, i], candidates[:, i + 1, j] = 1.0 - share, share
     lengths = np.linalg.norm(candidates @ triangles, axis=2)
     nearest: Floats = candidates[np.arange(len(triangles)), lengths.argmin(axis=1)]

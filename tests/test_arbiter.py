@@ -109,12 +109,18 @@ def test_a_plate_whose_faces_no_first_direction_meets_is_settled():
     assert lower <= -1e-9 * (1 - 1e-6) and -1e-9 * (1 + 1e-6) <= upper < 0.0
 
 
-def test_balls_about_one_centre_get_bounds_that_hold_though_wide():
-    lower, upper = signed_distance_bounds(Placed(Sphere(1.0)), Placed(Sphere(0.5)))
-    assert -1.5 - 1e-14 < lower <= -1.5 <= upper < -1.4
+@pytest.mark.parametrize(
+    ("shape", "depth"),
+    [(Sphere(0.5), 1.5), (Capsule(0.5, 1.0), 1.5), (Box([0.1, 0.2, 0.3]), 1.1), (Cylinder(0.5, 2.0), 1.5)],
+    ids=["ball", "capsule", "box", "cylinder"],
+)
+def test_a_ball_about_the_centre_of_another_body_is_settled(shape, depth):
+    """Nearly every direction is as deep as the deepest."""
+    lower, upper = signed_distance_bounds(Placed(Sphere(1.0)), Placed(shape))
+    assert -depth - 1e-14 < lower <= -depth <= upper < -depth + (0.02 if isinstance(shape, Cylinder) else 1e-14)
 
 
 def test_the_search_stops_at_the_resolution_asked_for():
-    a, b = Placed(Sphere(1.0)), Placed(Sphere(0.5), (0.6, 0.8, 0.1))
+    a, b = Placed(Cylinder(0.5, 1.0)), Placed(Cylinder(0.5, 1.0), (0.6, 0.5, 0.1), (1, 2, 3, 4))
     coarse, fine = (np.ptp(signed_distance_bounds(a, b, resolution=r)) for r in (1e-2, 1e-6))
     assert fine <= 1e-6 < coarse <= 1e-2
