@@ -1,0 +1,261 @@
+"""Collision shapes out of the .bullet files that pybullet's `saveBullet` writes.
+
+A .bullet file is a memory dump that describes itself: a header, then blocks, each an array of one C struct under the
+address it had in the writing process, and at the end a block "DNA1" with the layout of every struct. Pointers
+between blocks are those old addresses.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from functools import lru_cache
+from os import PathLike
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Bullet's BroadphaseNativeTypes, as far as pybullet creates them.
+KINDS = {
+    0: "box",
+    4: "hull",
+    8: "sphere",
+    9: "multisphere",
+    10: "capsule",
+    13: "cylinder",
+    21: "concave mesh",
+    22: "scaled concave mesh",
+    24: "height field",
+    28: "plane",
+    31: "compound",
+    32: "soft body",
+    35: "signed distance field",
+}
+
+NUMBERS = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "float": "<f4", "double": "<f8"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Leaf:
+    """One shape of a collider, compounds resolved; lengths in metres, single precision but for the points of a hull.
+
+    `position` (3,) and `orientation` (4,) xyzw place it in the collider's frame, the inertial frame of its link.
+    What `figures` holds depends on `kind`:
+        box          (3,) half extents
+        sphere       (1,) radius
+        capsule      (2,) radius, length between the cap centres along local z
+        cylinder     (2,) radius, length along local z
+        plane        (4,) unit normal n and constant c of the solid n·x <= c
+        hull         (n, 3) points
+        multisphere  (n, 4) centres and radii of the spheres whose convex hull it is
+    and is empty for every other kind ("concave mesh", "height field", "capsule along x", ...).
+    """
+
+    kind: str
+    position: NDArray[np.float64]
+    orientation: NDArray[np.float64]
+    figures: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SavedBody:
+    """A body of the file; the file knows no body ids.
+
+    `position` (3,) is the base's centre of mass in the world, to the bit what pybullet reports; `friction` the lateral
+    friction of the base. `shapes` holds the address of each collider's shape by link index, -1 for the base.
+    `links` is the number of links, 0 for a rigid body (maximal coordinates).
+    """
+
+    links: int
+    position: NDArray[np.float64]
+    friction: float
+    shapes: dict[int, int]
+
+
+class Block(NamedTuple):
+    code: str
+    address: int
+    layout: int
+    length: int
+    offset: int
+
+
+class BulletFile:
+    """The bodies of one .bullet file in the order of the file, and their shapes by address.
+
+    ValueError if it is not a .bullet file with 64-bit pointers, doubles and little-endian numbers.
+    """
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        with open(path, "rb") as file:
+            self._data = file.read()
+        if not self._data.startswith(b"BULLETd-v"):
+            raise ValueError(f"path {str(path)!r} is not a 64-bit little-endian .bullet file in double precision")
+        blocks = _blocks(self._data)
+        dna = blocks.pop()
+        self._layouts = _layouts(self._data[dna.offset :])
+        self._by_address = {block.address: block for block in blocks}
+        self._leaves: dict[int, tuple[Leaf, ...]] = {}
+        self.bodies = self._read_bodies(blocks)
+
+    def leaves(self, address: int) -> tuple[Leaf, ...]:
+        """Leaf shapes of the collider shape at `address`, in the order in which pybullet lists them."""
+        if address not in self._leaves:
+            self._leaves[address] = tuple(self._flatten(address, np.zeros(3), np.eye(3)))
+        return self._leaves[address]
+
+    def _read_bodies(self, blocks: list[Block]) -> tuple[SavedBody, ...]:
+        bodies: list[SavedBody] = []
+        colliders: dict[int, dict[int, Any]] = {}  # of each multibody, by link
+        for block in blocks:
+            if block.code == "MBLC":
+                collider = self._records(block)[0]
+                colliders.setdefault(int(collider["m_multiBody"]), {})[int(collider["m_link"])] = collider[
+                    "m_colObjData"
+                ]
+        for block in blocks:
+            if block.code == "MBDY":
+                body = self._records(block)[0]
+                position = body["m_baseWorldPosition"]["m_floats"][:3]
+                bodies.append(_saved(int(body["m_numLinks"]), position, colliders.get(block.address, {})))
+            elif block.code == "RBDY":
+                collider = self._records(block)[0]["m_collisionObjectData"]
+                bodies.append(_saved(0, collider["m_worldTransform"]["m_origin"]["m_floats"][:3], {-1: collider}))
+        return tuple(bodies)
+
+    def _flatten(self, address: int, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> list[Leaf]:
+        number = int(self._base(address, "btCollisionShapeData")["m_shapeType"])
+        kind = KINDS.get(number, f"shape of Bullet's type {number}")
+        if kind != "compound":
+            kind, figures = self._figures(kind, address)
+            return [Leaf(kind, position, _quaternion(rotation), figures)]
+        children = int(self._at(address)[0]["m_childShapePtr"])
+        leaves: list[Leaf] = []
+        for child in self._at(children) if children else ():
+            origin = child["m_transform"]["m_origin"]["m_floats"][:3].astype(float)
+            basis = child["m_transform"]["m_basis"]["m_el"]["m_floats"][:, :3].astype(float)
+            leaves += self._flatten(int(child["m_childShape"]), position + rotation @ origin, rotation @ basis)
+        return leaves
+
+    def _figures(self, kind: str, address: int) -> tuple[str, NDArray[np.float64]]:
+        shape = self._at(address)[0]
+        if kind == "plane":
+            return kind, np.append(shape["m_planeNormal"]["m_floats"][:3], shape["m_planeConstant"]).astype(float)
+        if kind not in ("box", "sphere", "capsule", "cylinder", "hull", "multisphere"):
+            return kind, np.empty(0)
+        convex = self._base(address, "btConvexInternalShapeData")
+        size = convex["m_implicitShapeDimensions"]["m_floats"][:3].astype(float)
+        if kind in ("box", "cylinder"):
+            # Stored without the margin that Bullet lays around them again.
+            size += convex["m_collisionMargin"]
+        if kind == "box":
+            return kind, size
+        if kind == "sphere":
+            return kind, size[:1]
+        if kind == "hull":
+            scaling = convex["m_localScaling"]["m_floats"][:3].astype(float)
+            return kind, self._at(int(shape["m_unscaledPointsDoublePtr"]))["m_floats"][:, :3] * scaling
+        if kind == "multisphere":
+            spheres = self._at(int(shape["m_localPositionArrayPtr"]))
+            return kind, np.c_[spheres["m_pos"]["m_floats"][:, :3], spheres["m_radius"]].astype(float)
+        axis = int(shape["m_upAxis"])
+        if axis != 2:
+            return f"{kind} along {'xyz'[axis]}", np.empty(0)
+        return kind, np.array([size[0], 2 * size[2]])
+
+    def _base(self, address: int, name: str) -> Any:
+        """The shape at `address` as its C++ base class: every shape struct begins with that of its base."""
+        return np.frombuffer(self._data, self._layouts.dtype(name), 1, self._by_address[address].offset)[0]
+
+    def _at(self, address: int) -> NDArray[np.void]:
+        return self._records(self._by_address[address])
+
+    def _records(self, block: Block) -> NDArray[np.void]:
+        name = self._layouts.names[block.layout]
+        return np.frombuffer(self._data, self._layouts.dtype(name), block.length, block.offset)
+
+
+def _saved(links: int, position: NDArray[np.float64], colliders: dict[int, Any]) -> SavedBody:
+    shapes = {link: int(collider["m_collisionShape"]) for link, collider in colliders.items()}
+    return SavedBody(links, position, float(colliders[-1]["m_friction"]), shapes)
+
+
+def _blocks(data: bytes) -> list[Block]:
+    """Directory of the file; the last block is the DNA, whose length some writers leave open."""
+    blocks: list[Block] = []
+    start = 12
+    while not blocks or blocks[-1].code != "DNA1":
+        if start + 24 > len(data):
+            raise ValueError("path is a .bullet file cut short: the block that describes its structs is missing")
+        code, size, address, layout, length = struct.unpack_from("<4siQii", data, start)
+        blocks.append(Block(code.rstrip(b"\0").decode(), address, layout, length, start + 24))
+        start += 24 + size
+    return blocks
+
+
+class Layouts:
+    """The structs of a file as numpy dtypes, made when first asked for."""
+
+    def __init__(self, structs: dict[str, list[tuple[str, str]]], sizes: dict[str, int]) -> None:
+        self.names = list(structs)
+        self._structs = structs
+        self._sizes = sizes
+        self._made: dict[str, np.dtype[Any]] = {}
+
+    def dtype(self, name: str) -> np.dtype[Any]:
+        if name in NUMBERS:
+            return np.dtype(NUMBERS[name])
+        if name not in self._made:
+            made = np.dtype([self._field(kind, declared) for kind, declared in self._structs[name]])
+            assert made.itemsize == self._sizes[name], f"{name} has holes"
+            self._made[name] = made
+        return self._made[name]
+
+    def _field(self, kind: str, declared: str) -> tuple[str, Any, tuple[int, ...]]:
+        name, *dimensions = declared.replace("]", "").split("[")
+        dtype = "<u8" if name.startswith("*") else self.dtype(kind)
+        return name.lstrip("*"), dtype, tuple(int(dimension) for dimension in dimensions)
+
+
+@lru_cache(maxsize=4)
+def _layouts(dna: bytes) -> Layouts:
+    """Read the DNA block: field names, type names, type sizes, and structs as pairs of a type and a name.
+
+    Bullet compiles it in, so that all files of one build share it.
+    """
+    names, end = _strings(dna, 4)
+    types, end = _strings(dna, end)
+    sizes = np.frombuffer(dna, "<i2", len(types), end + 4)
+    start = _aligned(end + 4 + 2 * len(types)) + 4
+    (count,) = struct.unpack_from("<i", dna, start)
+    words = iter(np.frombuffer(dna, "<i2", (len(dna) - start - 4) // 2, start + 4).tolist())
+    structs: dict[str, list[tuple[str, str]]] = {}
+    for _ in range(count):
+        name, fields = types[next(words)], next(words)
+        structs[name] = [(types[next(words)], names[next(words)]) for _ in range(fields)]
+    return Layouts(structs, dict(zip(types, sizes.tolist(), strict=True)))
+
+
+def _strings(dna: bytes, start: int) -> tuple[list[str], int]:
+    """A tagged section of zero-terminated strings, and where the next section begins."""
+    (count,) = struct.unpack_from("<i", dna, start + 4)
+    *strings, rest = dna[start + 8 :].split(b"\0", count)
+    return [string.decode() for string in strings], _aligned(len(dna) - len(rest))
+
+
+def _aligned(offset: int) -> int:
+    return (offset + 3) // 4 * 4
+
+
+def _quaternion(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Nearest xyzw quaternion of a rotation matrix that is orthogonal to single precision only (Bar-Itzhack 2000)."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    form = [
+        [a - e - i, b + d, c + g, h - f],
+        [b + d, e - a - i, f + h, c - g],
+        [c + g, f + h, i - a - e, d - b],
+        [h - f, c - g, d - b, a + e + i],
+    ]
+    nearest: NDArray[np.float64] = np.linalg.eigh(form)[1][:, -1]
+    return nearest
