@@ -1,0 +1,341 @@
+"""FCL's answer for the same shapes and poses, and who is nearer to the truth when it differs from ours.
+
+FCL (python-fcl) runs in a process of its own: its signed distance ends the process for some pairs that barely touch, by
+a C++ exception that no `except` in Python can catch.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import queue
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import weakref
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from types import TracebackType
+from typing import IO, Any, Literal
+
+import numpy as np
+
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, Shape, Sphere
+from overlapper.arbiter import signed_distance_bounds
+
+try:
+    import fcl
+except ImportError:
+    fcl = None
+
+# A shape as plain values: FCL's name for it and the arguments. Hashable, so that each geometry is built once.
+Model = tuple[str, tuple[Any, ...]]
+# For each of the two bodies its model and its pose: quaternion wxyz, position.
+Request = tuple[tuple[Model, tuple[Any, Any]], ...]
+
+# FCL's default distance_tolerance, in m, which python-fcl cannot change. EPA stops when its bounds of the depth are
+# this near. The distance search stops when a step gains less than this, which promises nothing: beside curved shapes it
+# has been seen to end 2e-4 m too far, and such pairs are disagreements, to be settled exactly.
+FCL_TOLERANCE = 1e-6
+
+# The exact value is sought to this fraction of what the two sides differ by: enough to say who is nearer, and to print.
+RESOLUTION = 1e-3
+
+# In s, for a new Python to import FCL on a machine that is busy.
+START_LIMIT = 60.0
+
+END = object()
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """One side's answer for a pair.
+
+    `signed_distance` is in m: the distance when apart, minus the depth when overlapping, None where FCL gives none.
+    """
+
+    overlapping: bool
+    signed_distance: float | None
+
+    def __str__(self) -> str:
+        word = "overlapping" if self.overlapping else "apart"
+        return word if self.signed_distance is None else f"{word}, {self.signed_distance + 0.0:.9g} m"
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What FCL says of a pair, beside what we say.
+
+    `fcl` is None where FCL gave nothing at all. `exact` = (lower, upper), in m, holds the exact signed distance; it is
+    worked out unless the two sides agree at once. `nearer` is the winner of a disagreement, None if `exact` cannot
+    tell. `explanation` is one sentence.
+    """
+
+    verdict: Literal["agree", "disagree", "crashed", "unsupported"]
+    ours: Figures
+    fcl: Figures | None
+    explanation: str
+    nearer: Literal["ours", "fcl"] | None = None
+    exact: tuple[float, float] | None = None
+
+
+class Fcl:
+    """python-fcl as a referee of overlaps: a context manager that keeps the process in which FCL runs.
+
+    A pair that ends the process, or takes it longer than `time_limit` seconds, gets the verdict "crashed", and the
+    process is started again for the next one. ImportError without python-fcl.
+    """
+
+    def __init__(self, time_limit: float = 10.0) -> None:
+        if fcl is None:
+            raise ImportError("overlapper.reference needs python-fcl: pip install 'overlapper[check]'")
+        self.time_limit = time_limit
+        self._worker: _Worker | None = None
+
+    def __enter__(self) -> Fcl:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends the process. A later comparison starts another."""
+        if self._worker is not None:
+            self._worker.close()
+            self._worker = None
+
+    def compare(self, overlap: Overlap) -> Comparison:
+        """Asks FCL about the two shapes of `overlap`, as they were placed."""
+        return self.compare_many([overlap])[0]
+
+    def compare_many(self, overlaps: Iterable[Overlap]) -> list[Comparison]:
+        """As `compare`, in one exchange with the process; a pair that ends it costs no other pair its answer."""
+        overlaps = list(overlaps)
+        reasons = [_unsupported(overlap) for overlap in overlaps]
+        answers = iter(self._ask([_request(overlap) for overlap, reason in zip(overlaps, reasons) if not reason]))
+        return [
+            Comparison("unsupported", _ours(overlap), None, reason) if reason else _judged(overlap, *next(answers))
+            for overlap, reason in zip(overlaps, reasons)
+        ]
+
+    def _ask(self, requests: list[Request]) -> list[tuple[Figures | None, str | None]]:
+        """For each request FCL's figures, as far as they came, and how the process ended over it, if it did."""
+        answers: list[tuple[Figures | None, str | None]] = []
+        try:
+            while len(answers) < len(requests):
+                if self._worker is None or not self._worker.alive():
+                    self.close()
+                    self._worker = _Worker()
+                self._worker.send(requests[len(answers) :])
+                end = None
+                while end is None and len(answers) < len(requests):
+                    figures, end = self._worker.answer(self.time_limit)
+                    answers.append((figures, end))
+        except BaseException:
+            self.close()  # or answers still on their way would be taken for those of later pairs
+            raise
+        return answers
+
+
+class _Worker:
+    """A process that runs `serve`, and a thread that reads from it: waiting with a limit works so on every system."""
+
+    def __init__(self) -> None:
+        # Not `multiprocessing`, which imports the user's main module once more in the new process.
+        program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.reference import serve; serve()"
+        self.last_words = tempfile.TemporaryFile()  # noqa: SIM115, closed with the process
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.last_words
+        )
+        assert self.process.stdin and self.process.stdout
+        self.requests, self.replies = self.process.stdin, self.process.stdout
+        self.arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        reader = threading.Thread(target=_forward, args=(self.replies, self.arrived), daemon=True)
+        reader.start()
+        # Also when the worker is forgotten and when Python exits, so that nothing is left behind.
+        self.close = weakref.finalize(self, _end, self.process, reader, (self.requests, self.replies, self.last_words))
+        try:
+            self._next(START_LIMIT)
+        except _Ended as ended:
+            self.close()
+            raise RuntimeError(f"overlapper.reference cannot start FCL: its process {ended}") from None
+
+    def alive(self) -> bool:
+        return self.process.poll() is None
+
+    def send(self, requests: list[Request]) -> None:
+        with contextlib.suppress(BrokenPipeError):  # the missing reply will tell
+            pickle.dump(requests, self.requests)
+            self.requests.flush()
+
+    def answer(self, time_limit: float) -> tuple[Figures | None, str | None]:
+        figures = None
+        try:
+            figures = Figures(self._next(time_limit), None)
+            return Figures(figures.overlapping, self._next(time_limit)), None
+        except _Ended as ended:
+            return figures, str(ended)
+
+    def _next(self, time_limit: float) -> Any:
+        try:
+            reply = self.arrived.get(timeout=time_limit)
+        except queue.Empty:
+            self.process.kill()
+            self.process.wait()
+            raise _Ended(f"gave no answer within {time_limit:g} s") from None
+        if reply is END:
+            raise _Ended(self._cause())
+        return reply
+
+    def _cause(self) -> str:
+        """How the process ended: the signal or exit code, and what FCL said."""
+        code = self.process.wait()
+        how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        self.last_words.seek(0)
+        words = self.last_words.read().decode(errors="replace")
+        said = re.findall(r"Original error message: .*?\): (.*)|^(\w*(?:Error|Exception): .*)", words, re.MULTILINE)
+        return f"ended with {how}" + (f" ({''.join(said[0]).rstrip('.')})" if said else "")
+
+
+class _Ended(Exception):
+    """The process says no more; the text tells why, as the end of a sentence."""
+
+
+def _forward(replies: IO[bytes], arrived: queue.SimpleQueue[Any]) -> None:
+    with contextlib.suppress(EOFError, pickle.UnpicklingError):
+        while True:
+            arrived.put(pickle.load(replies))
+    arrived.put(END)
+
+
+def _end(process: subprocess.Popen[bytes], reader: threading.Thread, files: Iterable[IO[bytes]]) -> None:
+    process.kill()
+    process.wait()
+    reader.join()
+    for file in files:
+        with contextlib.suppress(BrokenPipeError):  # of a request that was still in the buffer
+            file.close()
+
+
+def serve() -> None:
+    """The process in which FCL runs: batches of requests on standard input, two replies a pair on standard output."""
+    replies = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever else gets printed must not mix with the replies
+    with contextlib.suppress(ImportError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an abort is an answer here, not a reason to fill the disk
+
+    def say(reply: Any) -> None:
+        pickle.dump(reply, replies)
+        replies.flush()
+
+    say("ready")
+    with contextlib.suppress(EOFError):
+        while True:
+            for request in pickle.load(sys.stdin.buffer):
+                bodies = [fcl.CollisionObject(_geometry(model), fcl.Transform(*pose)) for model, pose in request]
+                contacts = fcl.CollisionResult()
+                say(fcl.collide(*bodies, fcl.CollisionRequest(enable_contact=True), contacts) > 0)
+                say(_signed_distance(request, bodies, contacts))
+
+
+def _signed_distance(request: Request, bodies: list[Any], contacts: Any) -> float | None:
+    if all(name != "Halfspace" for (name, _), _ in request):
+        return float(fcl.distance(*bodies, fcl.DistanceRequest(enable_signed_distance=True)))
+    # FCL's distance from a half-space reads through a null pointer (its issue 383); its contact has the exact depth.
+    return -float(contacts.contacts[0].penetration_depth) if contacts.contacts else None
+
+
+@lru_cache(maxsize=4096)
+def _geometry(model: Model) -> Any:
+    name, values = model
+    if name == "Convex":
+        vertices, faces, count = values
+        return fcl.Convex(np.frombuffer(vertices).reshape(-1, 3), count, np.frombuffer(faces, np.int32))
+    if name == "Halfspace":
+        return fcl.Halfspace(np.array(values[:3]), values[3])
+    return getattr(fcl, name)(*values)
+
+
+def _model(shape: Shape) -> Model:
+    """A shape in FCL's terms: a box by its sides; capsule and cylinder along z about the centre, as ours."""
+    match shape:
+        case Box():
+            return "Box", tuple(2.0 * shape.half_extents)
+        case Sphere():
+            return "Sphere", (shape.radius,)
+        case Capsule():
+            return "Capsule", (shape.radius, shape.length)
+        case Cylinder():
+            return "Cylinder", (shape.radius, shape.length)
+        case HalfSpace():
+            return "Halfspace", (*shape.normal, shape.offset)
+        case Hull():
+            faces = np.concatenate([[len(ring), *ring] for ring in shape.facets]).astype(np.int32)
+            return "Convex", (shape.vertices.tobytes(), faces.tobytes(), len(shape.facets))
+
+
+def _request(overlap: Overlap) -> Request:
+    return tuple((_model(body.shape), (np.roll(body.orientation, 1), body.position)) for body in overlap.shapes)
+
+
+def _unsupported(overlap: Overlap) -> str | None:
+    if len(overlap.shapes) != 2:
+        return f"FCL is asked about two bodies at a time, not {len(overlap.shapes)}."
+    if all(isinstance(body.shape, HalfSpace) for body in overlap.shapes):
+        return "FCL gives no depth or distance of two half-spaces."
+    return None
+
+
+def _ours(overlap: Overlap) -> Figures:
+    if overlap.depth is None or overlap.distance is None:  # of three bodies or more
+        return Figures(bool(overlap), None)
+    return Figures(bool(overlap), -overlap.depth if overlap else overlap.distance)
+
+
+def _judged(overlap: Overlap, theirs: Figures | None, end: str | None) -> Comparison:
+    ours = _ours(overlap)
+    difference = 0.0 if theirs is None else _difference(ours, theirs)
+    claims = f"FCL: {theirs}; ours: {ours}"
+    if theirs is not None and end is None and theirs.overlapping == ours.overlapping and difference <= FCL_TOLERANCE:
+        return Comparison("agree", ours, theirs, f"{claims}.")
+    a, b = overlap.shapes
+    assert overlap.normal is not None
+    exact = signed_distance_bounds(a, b, [-overlap.normal], RESOLUTION * difference)
+    truth = f"exact: {sum(exact) / 2:.9g} m ± {(exact[1] - exact[0]) / 2:.1g}"
+    if theirs is None or end is not None:
+        asked = "whether they overlap" if theirs is None else "how far or how deep"
+        return Comparison("crashed", ours, theirs, f"FCL {end} when asked {asked}; ours: {ours}; {truth}.", None, exact)
+    if difference <= FCL_TOLERANCE and max(map(abs, exact)) <= FCL_TOLERANCE:
+        words = f"{claims}; {truth}, which is touching as far as FCL's tolerance of {FCL_TOLERANCE:g} m goes."
+        return Comparison("agree", ours, theirs, words, None, exact)
+    nearer = _nearer(ours, theirs, exact)
+    words = {"ours": "so ours is nearer", "fcl": "so FCL is nearer", None: "which cannot tell who is nearer"}[nearer]
+    return Comparison("disagree", ours, theirs, f"{claims}; {truth}, {words}.", nearer, exact)
+
+
+def _difference(ours: Figures, theirs: Figures) -> float:
+    """What the two signed distances differ by, in m; 0 if one is missing."""
+    if ours.signed_distance is None or theirs.signed_distance is None:
+        return 0.0
+    return abs(ours.signed_distance - theirs.signed_distance)
+
+
+def _nearer(ours: Figures, theirs: Figures, exact: tuple[float, float]) -> Literal["ours", "fcl"] | None:
+    """Who is nearer to every value within `exact`: by the signed distances where they differ, else by yes or no."""
+    lower, upper = exact
+    threshold, ours_is_below = 0.0, ours.overlapping
+    mine, other = ours.signed_distance, theirs.signed_distance
+    if mine is not None and other is not None and abs(mine - other) > FCL_TOLERANCE:
+        threshold, ours_is_below = (mine + other) / 2, mine < other
+    if lower <= threshold <= upper:
+        return None
+    return "ours" if ours_is_below == (upper < threshold) else "fcl"
