@@ -58,8 +58,9 @@ def signed_distance_bounds(
     for direction in directions:
         difference.extend(np.asarray(direction, float))
     for _ in range(STEPS):
-        direction, distance = difference.nearest()
-        if not difference.extend(direction) or distance - difference.lower <= resolution:
+        outwards, distance = difference.nearest()
+        grown = [difference.extend(outward) for outward in outwards]
+        if not any(grown) or distance - difference.lower <= resolution:
             break
     return difference.certified()
 
@@ -109,16 +110,17 @@ class Difference:
         fans = [(ring[0], ring[i], ring[i + 1]) for ring in hull.facets for i in range(1, len(ring) - 1)]
         return hull.vertices[np.array(fans)], hull.halfspaces
 
-    def nearest(self) -> tuple[Floats, float]:
-        """The direction in which to grow next, and the signed distance of the polytope, in doubles."""
+    def nearest(self) -> tuple[list[Floats], float]:
+        """The directions in which to grow next, and the signed distance of the polytope, in doubles."""
         triangles, halfspaces = self.surface()
         facet = halfspaces[halfspaces[:, 3].argmax()]
         if facet[3] < 0.0:
-            return facet[:3], float(facet[3])
+            return [facet[:3]], float(facet[3])
         points = np.einsum("ki,kij->kj", _nearest_weights(triangles), triangles)
         distances = np.linalg.norm(points, axis=1)
         row = distances.argmin()
-        return (-points[row] if distances[row] > 0.0 else facet[:3]), float(distances[row])
+        # The way back from a nearest point that is next to the origin is all rounding; the facet's normal is not.
+        return [facet[:3], -points[row]] if distances[row] > 0.0 else [facet[:3]], float(distances[row])
 
     def certified(self) -> tuple[float, float]:
         """(lower, upper) bounds of the signed distance of the pair, evaluated exactly and rounded outwards."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from strategies import directions, hull_points, moved, quaternion, reach
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap
 from overlapper.arbiter import signed_distance_bounds
 
 CUBE = Box([0.5, 0.5, 0.5])
@@ -93,6 +93,16 @@ def test_one_ulp_decides_on_which_side_of_touching_cubes_are(corner):
     assert lower <= 0.0 <= upper < 1e-15
     if corner == (0.3, 0.2):
         assert bounds(np.nextafter(1.0, 0.0))[1] < 0.0
+
+
+def test_hulls_shifted_until_they_touch_are_settled_to_rounding():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        a, b = (Placed(Hull(hull_points(rng, 15)), rng.uniform(-1, 1, 3), quaternion(rng)) for _ in range(2))
+        pair = overlap(a, b)
+        shift = pair.normal * (pair.depth if pair else -pair.distance)
+        lower, upper = signed_distance_bounds(moved(a, shift), b)
+        assert -1e-13 < lower <= upper < 1e-13
 
 
 def test_a_gap_of_two_nanometres_ten_thousand_kilometres_away_is_seen():
