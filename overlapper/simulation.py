@@ -396,11 +396,8 @@ def _read_body(client: int, id: int, file: BulletFile, saved: SavedBody | None) 
     name = name or f"body {id}"
     joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
     link_names = {BASE: base or "base"} | {joint[0]: joint[12].decode(errors="replace") for joint in joints}
-    fixed = {BASE}
-    for joint in joints:  # parents come before their children
-        if joint[2] == pybullet.JOINT_FIXED and joint[16] in fixed:
-            fixed.add(joint[0])
-
+    welds = {joint[0]: joint[16] for joint in joints if joint[2] == pybullet.JOINT_FIXED}
+    fixed_links = frozenset(link for link in link_names if _is_tied_to_base(link, welds))
     leaves = _leaves(client, id, file, saved) if saved else {}
     parts: list[_Part] = []
     skipped: list[Skipped] = []
@@ -414,7 +411,14 @@ def _read_body(client: int, id: int, file: BulletFile, saved: SavedBody | None) 
         skipped.append(Skipped(id, BASE, name, "a soft body is not modelled" if soft else "saveBullet leaves it out"))
     shape_count = sum(map(len, leaves.values())) if saved else 1
     colors = _colors(client, id, link_names)
-    return _Body(name, link_names, colors, frozenset(fixed), shape_count, tuple(parts), tuple(skipped))
+    return _Body(name, link_names, colors, fixed_links, shape_count, tuple(parts), tuple(skipped))
+
+
+def _is_tied_to_base(link: int, welds: Mapping[int, int]) -> bool:
+    """Whether only fixed joints, given as child and parent, are between a link and the base."""
+    while link in welds:
+        link = welds[link]
+    return link == BASE
 
 
 def _colors(client: int, id: int, links: Mapping[int, str]) -> dict[int, Color]:

@@ -121,6 +121,19 @@ def test_a_capsule_between_two_points_is_a_multisphere(client, saved, tmp_path):
     assert_allclose(np.array(ends), [[-0.15, 0.2, -0.1], [0.15, -0.2, 0.1]], atol=SINGLE)
 
 
+def test_a_capsule_along_another_axis_is_not_taken_for_one_along_z(client, saved, tmp_path):
+    body(client, p.GEOM_CAPSULE, radius=0.25, height=0.7)
+    saved()
+    data = bytearray((tmp_path / "scene.bullet").read_bytes())
+    # The axis follows the dimensions, the margin and four bytes of padding.
+    axis = data.index(np.array([0.25, 0.25, 0.35, 0], dtype="<f4").tobytes()) + 24
+    assert data[axis] == 2
+    data[axis] = 0
+    (tmp_path / "turned.bullet").write_bytes(data)
+    (leaf,) = base_leaves(BulletFile(tmp_path / "turned.bullet"))
+    assert leaf.kind == "capsule along x" and leaf.figures.size == 0
+
+
 def test_frames_of_nested_compounds_add_up(client, saved, tmp_path):
     geom = '<geom type="cylinder" fromto="0 0 0 .6 0 0" size=".05"/><geom type="box" pos="0 0 1" size=".1 .2 .3"/>'
     (tmp_path / "nested.xml").write_text(f"<mujoco><worldbody><body>{geom}</body></worldbody></mujoco>")

@@ -52,7 +52,6 @@ ROUNDED_CORNER = 1e-3 * (np.sqrt(3) - 1)
 def client():
     client = p.connect(p.DIRECT)
     p.setAdditionalSearchPath(str(DATA), physicsClientId=client)
-    p.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
     yield client
     if p.isConnected(client):
         p.disconnect(client)
@@ -513,6 +512,17 @@ def test_bodies_at_the_same_point_are_told_apart_and_keep_their_friction(client)
     assert shapes[large].half_extents[0] == 0.2 and shapes[cube].half_extents[0] == 0.4
     assert isinstance(shapes[ball], Sphere)
     assert [p.getDynamicsInfo(id, -1, client) for id in ids] == before
+
+
+def test_bodies_at_different_points_are_only_looked_at(client, monkeypatch):
+    p.loadURDF("r2d2.urdf", physicsClientId=client)
+    p.setGravity(0, 0, -10, physicsClientId=client)
+    for x in range(1, 4):
+        box(client, position=[x / 3, 0, 0])
+    for _ in range(5):
+        p.stepSimulation(client)
+    monkeypatch.delattr(p, "changeDynamics")
+    assert len(Bodies(client).shapes) == 19
 
 
 def test_watching_a_simulation_does_not_change_it():
