@@ -722,6 +722,15 @@ def test_the_overlap_of_two_cubes_is_the_box_they_share(client):
     assert_allclose(contact.overlap.normal, [0, 0, 1], atol=1e-12)
 
 
+def test_shapes_that_only_touch_are_contacts_without_volume(client):
+    box(client), box(client, position=[1, 0, 0])
+    bodies = Bodies(client)
+    (contact,) = bodies.overlaps()
+    assert contact.overlap.status == "touching" and contact.overlap.volume == 0
+    assert_allclose(contact.overlap.normal, [-1, 0, 0], atol=1e-12)
+    assert bodies.report().pairs_overlapping == 0
+
+
 def test_normal_and_depth_are_those_of_get_contact_points(client):
     a = body(client, p.GEOM_SPHERE, radius=0.5, position=[0.2, 0.1, 0.6])
     b = box(client, position=[0, 0, -0.3], mass=0)
