@@ -1,0 +1,37 @@
+"""The volume that convex bodies share, with an error bound, centroid, normal, depth, patch and gradient."""
+
+from importlib.metadata import version as _version
+
+from overlapper._core import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Hull,
+    Overlap,
+    Placed,
+    Sphere,
+    distance,
+    iou,
+    overlap,
+    penetration_depth,
+)
+
+Shape = Box | Sphere | Capsule | Cylinder | Hull | HalfSpace
+
+__version__ = _version("overlapper")
+__all__ = [
+    "Box",
+    "Capsule",
+    "Cylinder",
+    "HalfSpace",
+    "Hull",
+    "Overlap",
+    "Placed",
+    "Shape",
+    "Sphere",
+    "distance",
+    "iou",
+    "overlap",
+    "penetration_depth",
+]

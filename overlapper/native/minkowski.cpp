@@ -1,0 +1,281 @@
+#include "minkowski.h"
+
+#include <limits>
+#include <stdexcept>
+
+#include "expanding_hull.h"
+#include "predicates.h"
+
+namespace overlapper {
+namespace {
+
+Vec3 combine(const Simplex& s, Vec3 DifferencePoint::*point) {
+  Vec3 sum;
+  for (int i = 0; i < s.size; ++i) sum += s.weight[i] * (s.corner[i].*point);
+  return sum;
+}
+
+/// Weights of the point of a segment's line nearest to the origin; false unless both are positive.
+bool weigh(Vec3 a, Vec3 b, std::array<double, 4>& weight) {
+  const Vec3 ab = b - a;
+  const double length2 = norm2(ab), to_b = -dot(a, ab), to_a = dot(b, ab);
+  if (!(to_a > 0 && to_b > 0 && length2 > 0)) return false;
+  weight = {to_a / length2, to_b / length2};
+  return true;
+}
+
+/// The same for a triangle's plane: areas seen along its normal.
+bool weigh(Vec3 a, Vec3 b, Vec3 c, std::array<double, 4>& weight) {
+  const Vec3 n = cross(b - a, c - a);
+  const double area2 = norm2(n);
+  const double wa = dot(n, cross(b, c)), wb = dot(n, cross(c, a)), wc = dot(n, cross(a, b));
+  if (!(wa > 0 && wb > 0 && wc > 0 && area2 > 0)) return false;
+  const double sum = wa + wb + wc;
+  weight = {wa / sum, wb / sum, wc / sum};
+  return true;
+}
+
+/// True if the tetrahedron contains the origin, decided by exact signs; then also its weights.
+bool weigh(Vec3 a, Vec3 b, Vec3 c, Vec3 d, std::array<double, 4>& weight) {
+  const int side = orientation(a, b, c, d);
+  if (side == 0) return false;
+  const Vec3 o;
+  if (orientation(o, b, c, d) * side < 0 || orientation(a, o, c, d) * side < 0 || orientation(a, b, o, d) * side < 0 ||
+      orientation(a, b, c, o) * side < 0)
+    return false;
+  const auto volume = [&](Vec3 p, Vec3 q, Vec3 r) { return std::max(0.0, side * dot(p, cross(q, r))); };
+  weight = {volume(b, c, d), volume(a, d, c), volume(a, b, d), volume(a, c, b)};
+  const double sum = weight[0] + weight[1] + weight[2] + weight[3];
+  if (!(sum > 0)) return false;
+  for (double& w : weight) w /= sum;
+  return true;
+}
+
+/// Keeps the corners that support the point nearest to the origin. All sub-simplices are tried and the nearest valid one
+/// wins, which needs no case analysis of Voronoi regions that rounding could contradict. True if the origin is inside.
+bool reduce(Simplex& s) {
+  Simplex best;
+  double least = std::numeric_limits<double>::infinity();
+  for (int subset = 1; subset < 1 << s.size; ++subset) {
+    Simplex part;
+    std::array<Vec3, 4> p;
+    for (int i = 0; i < s.size; ++i) {
+      if (!(subset >> i & 1)) continue;
+      p[part.size] = s.corner[i].difference();
+      part.corner[part.size++] = s.corner[i];
+    }
+    bool valid = false;
+    switch (part.size) {
+      case 1: part.weight = {1}, valid = true; break;
+      case 2: valid = weigh(p[0], p[1], part.weight); break;
+      case 3: valid = weigh(p[0], p[1], p[2], part.weight); break;
+      case 4:
+        if (weigh(p[0], p[1], p[2], p[3], part.weight)) {
+          s = part;
+          return true;
+        }
+    }
+    if (!valid) continue;
+    const double distance2 = norm2(part.nearest());
+    if (distance2 < least) least = distance2, best = part;
+  }
+  s = best;
+  return least == 0;
+}
+
+bool contains(const Simplex& s, Vec3 difference) {
+  for (int i = 0; i < s.size; ++i)
+    if (s.corner[i].difference() == difference) return true;
+  return false;
+}
+
+DifferencePoint core_support(const Placed& a, const Placed& b, Vec3 direction) {
+  return {a.core_support(direction), b.core_support(-direction)};
+}
+
+const HalfSpace* half_space(const Placed& placed) { return std::get_if<HalfSpace>(&placed.shape); }
+
+Distance distance_to_half_space(const Placed& a, const Placed& b) {
+  const Plane plane = b.pose * half_space(b)->plane;
+  const Vec3 lowest = a.support(-plane.normal);
+  const double height = signed_distance(plane, lowest);
+  return {height, height, plane.normal, lowest, lowest - height * plane.normal};
+}
+
+Distance mirrored(const Distance& d) { return {d.distance, d.gap, -d.normal, d.witness_b, d.witness_a}; }
+
+}  // namespace
+
+Vec3 Simplex::nearest() const { return witness_a() - witness_b(); }
+Vec3 Simplex::witness_a() const { return combine(*this, &DifferencePoint::on_a); }
+Vec3 Simplex::witness_b() const { return combine(*this, &DifferencePoint::on_b); }
+
+Separation separate_cores(const Placed& a, const Placed& b) {
+  Separation result;
+  Simplex& simplex = result.simplex;
+  Vec3 towards = a.pose.translation - b.pose.translation;
+  if (norm2(towards) == 0) towards = {1, 0, 0};
+  simplex.corner[0] = core_support(a, b, -towards);
+  simplex.weight = {1};
+  simplex.size = 1;
+  Vec3 nearest = simplex.corner[0].difference();
+  result.gap = -std::numeric_limits<double>::infinity();
+
+  // Polytopes end by themselves, as each round finds a new vertex; a cylinder's rim converges, and no bit improves after
+  // some dozens of rounds.
+  for (int round = 0; round < 256; ++round) {
+    const double length = norm(nearest);
+    if (length == 0) {
+      result.origin_inside = true;
+      break;
+    }
+    const Vec3 direction = nearest / length;
+    const DifferencePoint farthest = core_support(a, b, -direction);
+    const Vec3 w = farthest.difference();
+    const double gap = dot(w, direction);
+    if (gap > result.gap) result.gap = gap, result.normal = direction;
+    // Frank-Wolfe duality gap: the distance lies between `gap` and `length`.
+    if (length - result.gap <= 4 * 0x1p-53 * length || contains(simplex, w)) break;
+    Simplex grown = simplex;
+    grown.corner[grown.size++] = farthest;
+    if (reduce(grown)) {
+      simplex = grown;
+      result.origin_inside = true;
+      break;
+    }
+    const Vec3 nearer = grown.nearest();
+    if (!(norm2(nearer) < norm2(nearest))) break;
+    simplex = grown;
+    nearest = nearer;
+  }
+  if (result.origin_inside) {
+    result.normal = {};
+    return result;
+  }
+  result.distance = norm(nearest);
+  return result;
+}
+
+Distance distance(const Placed& a, const Placed& b) {
+  if (half_space(b)) return distance_to_half_space(a, b);
+  if (half_space(a)) return mirrored(distance_to_half_space(b, a));
+  const double radius_a = core_radius(a.shape), radius_b = core_radius(b.shape);
+  const Separation cores = separate_cores(a, b);
+  Distance result;
+  result.normal = cores.normal;
+  result.distance = cores.distance - radius_a - radius_b;
+  result.gap = cores.gap - radius_a - radius_b;
+  result.witness_a = cores.simplex.witness_a() - radius_a * cores.normal;
+  result.witness_b = cores.simplex.witness_b() + radius_b * cores.normal;
+  return result;
+}
+
+namespace {
+
+/// EPA's polytope: support points of the difference of two cores, and which of its facets are known to be final.
+class DepthSearch {
+ public:
+  DepthSearch(const Placed& a, const Placed& b) : a_(a), b_(b) {}
+
+  Penetration run() {
+    // Both bodies are solid, or their cores are a point or a segment; in the latter case A - B may be flat.
+    for (int axis = 0; axis < 3; ++axis)
+      for (double side : {-1.0, 1.0}) ask({axis == 0 ? side : 0, axis == 1 ? side : 0, axis == 2 ? side : 0});
+    for (double x : {-1.0, 1.0})
+      for (double y : {-1.0, 1.0})
+        for (double z : {-1.0, 1.0}) ask({x, y, z});
+    if (!hull_.build()) return flat();
+    for (int round = 0; round < kMaxRounds; ++round) {
+      const int facet = least_facet();
+      if (facet < 0) break;
+      const Vec3 normal = unit(accurate_normal(corner(facet, 0), corner(facet, 1), corner(facet, 2)));
+      const double before = hull_offset(facet, normal);
+      const double reached = ask(normal);
+      const int p = static_cast<int>(hull_.points.size()) - 1;
+      // A smooth rim is never reached: stop when the facet's offset and the support agree to rounding.
+      if (reached - before <= rounding(extent_) || !hull_.sees(facet, p)) {
+        final_.resize(hull_.facets.size(), false);
+        final_[facet] = true;
+        if (best_.depth <= before + 1e-12 * extent_) break;
+        continue;
+      }
+      hull_.insert(p, facet);
+    }
+    return best_;
+  }
+
+ private:
+  static constexpr int kMaxRounds = 2000;
+
+  Vec3 corner(int facet, int i) const { return hull_.points[hull_.facets[facet].vertex[i]]; }
+
+  double hull_offset(int facet, Vec3 normal) const { return dot(normal, corner(facet, 0)); }
+
+  /// Adds the support point along `direction`; its offset is an upper bound of the depth.
+  double ask(Vec3 direction) {
+    direction = unit(direction);
+    const Vec3 w = core_support(a_, b_, direction).difference();
+    extent_ = std::max(extent_, max_component(abs(w)));
+    hull_.points.push_back(w);
+    const double offset = dot(direction, w);
+    // `direction` pushes A - B away from the origin; a leaves b the opposite way.
+    if (offset < best_.depth) best_ = {offset, -direction};
+    return offset;
+  }
+
+  /// The facet nearest to the origin that is not final yet.
+  int least_facet() const {
+    int best = -1;
+    double least = std::numeric_limits<double>::infinity();
+    for (int f = 0; f < static_cast<int>(hull_.facets.size()); ++f) {
+      const ExpandingHull::Facet& facet = hull_.facets[f];
+      if (facet.removed() || (f < static_cast<int>(final_.size()) && final_[f])) continue;
+      const double length = std::sqrt(norm2(facet.normal));
+      const double offset = length > 0 ? dot(facet.normal, corner(f, 0)) / length : 0;
+      if (offset < least) least = offset, best = f;
+    }
+    return best;
+  }
+
+  /// The difference of two points or segments in one plane: across the plane, its support is its offset, whatever the rest.
+  Penetration flat() {
+    Vec3 u, v;
+    for (Vec3 p : hull_.points) {
+      const Vec3 edge = p - hull_.points[0];
+      if (norm2(edge) > norm2(u)) u = edge;
+    }
+    for (Vec3 p : hull_.points) {
+      const Vec3 edge = p - hull_.points[0];
+      if (norm2(cross(u, edge)) > norm2(cross(u, v))) v = edge;
+    }
+    Vec3 normal = unit(cross(u, v));
+    if (norm2(normal) == 0) normal = norm2(u) > 0 ? any_orthogonal(unit(u)) : Vec3{0, 0, 1};
+    ask(normal);
+    ask(-normal);
+    return best_;
+  }
+
+  const Placed &a_, &b_;
+  ExpandingHull hull_;
+  std::vector<char> final_;
+  double extent_ = 0;
+  Penetration best_{std::numeric_limits<double>::infinity(), {}};
+};
+
+}  // namespace
+
+Penetration penetration(const Placed& a, const Placed& b) {
+  if (half_space(a) && half_space(b)) throw std::invalid_argument("two half-spaces have no least translation that separates them");
+  if (half_space(a) || half_space(b)) {
+    const Distance height = distance(a, b);
+    return {-height.distance, height.normal};
+  }
+  const double radius = core_radius(a.shape) + core_radius(b.shape);
+  const Separation cores = separate_cores(a, b);
+  if (!cores.origin_inside && cores.gap > 0) return {radius - cores.distance, cores.normal};
+  Penetration result = DepthSearch(a, b).run();
+  result.depth += radius;
+  return result;
+}
+
+}  // namespace overlapper

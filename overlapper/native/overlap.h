@@ -1,0 +1,105 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "common_point.h"
+#include "polytope.h"
+#include "shape.h"
+
+namespace overlapper {
+
+enum class Status { kSeparated, kTouching, kOverlapping };
+enum class Method { kAuto, kPaper };
+
+/// The polytope around the common set, in a frame about a point inside it: world x = reference + frame.origin + frame.axes y.
+/// For polyhedra it is the common set; for smooth shapes it contains it, and shrinks to fit inside vertex by vertex.
+struct Region {
+  Vec3 reference;
+  Frame frame;
+  Polytope polytope;               ///< in the coordinates y
+  std::vector<OwnedPlane> planes;  ///< one per facet of the polytope, relative to `reference`
+  std::vector<double> inner;       ///< per vertex y: inner * y lies in the common set; 1 where the vertex itself does
+  double rounding = 0;             ///< m: by how much rounding may have moved a plane
+  double missing = 0;              ///< m³: at most so much of the common set lies outside, where smooth shapes were tessellated
+  int facets_touched = 0;          ///< how many planes entered the dual hull
+
+  Vec3 to_world(Vec3 y) const { return reference + (frame.origin + frame.axes * y); }
+};
+
+/// What is computed from the region, all in world coordinates.
+struct Quantities {
+  double volume = 0, volume_error = 0, area = 0;
+  Vec3 centroid;
+  Mat3 inertia;                       ///< about the centroid, unit density
+  std::vector<Vec3> area_vector;      ///< per facet, outward, of length its area
+  std::vector<Vec3> facet_centroid;
+};
+
+/// The surface without the ridges and facets that rounding left of several planes through one point.
+struct Surface {
+  std::vector<Vec3> vertices;
+  std::vector<int> ring, ring_start;
+  std::vector<Plane> planes;
+  std::vector<int> owner;
+  std::vector<std::vector<Vec3>> patch;
+
+  std::span<const int> facet(int f) const {
+    return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
+  }
+};
+
+/// The common set of two or more placed shapes. Only the status is found on construction; each quantity when first asked for,
+/// then kept. Safe to share between threads.
+class Overlap {
+ public:
+  /// Throws std::invalid_argument if the common set is unbounded. `tolerance` is the fraction by which the polytope may have
+  /// to shrink, about its inner point, to fit into smooth shapes; polyhedra are exact whatever it is.
+  Overlap(std::vector<Placed> bodies, double tolerance, Method method);
+
+  const std::vector<Placed>& bodies() const { return bodies_; }
+  double tolerance() const { return tolerance_; }
+  Method method() const { return method_; }
+  Status status() const { return status_; }
+  bool pair() const { return bodies_.size() == 2; }
+
+  /// Only for overlapping bodies.
+  const Region& region() const;
+  const Quantities& quantities() const;
+  const Surface& surface() const;
+
+  /// Per body: d volume / d translation, then / d rotation vector about the body's position; zeros unless overlapping.
+  std::vector<std::array<double, 6>> gradient() const;
+
+  /// Only for pairs.
+  struct Contact {
+    double distance = 0;  ///< 0 unless separated
+    double depth = 0;     ///< 0 unless overlapping
+    Vec3 normal;          ///< unit, from b to a
+    Vec3 witness_a, witness_b;
+    Plane separating;     ///< a where dot(normal, x) >= offset, b on the other side; meaningless if overlapping
+  };
+  const Contact& contact() const;
+
+ private:
+  std::vector<Placed> bodies_, relative_;
+  double tolerance_;
+  Method method_;
+  Vec3 reference_;
+  Status status_ = Status::kSeparated;
+  std::vector<OwnedPlane> planes_;
+  DeepestBall ball_;
+
+  struct Lazy {
+    std::mutex mutex;
+    std::optional<Region> region;
+    std::optional<Quantities> quantities;
+    std::optional<Surface> surface;
+    std::optional<Contact> contact;
+  };
+  std::shared_ptr<Lazy> lazy_ = std::make_shared<Lazy>();
+};
+
+}  // namespace overlapper

@@ -1,0 +1,145 @@
+#pragma once
+
+#include <concepts>
+#include <memory>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "vec.h"
+
+namespace overlapper {
+
+/// A closed convex solid, known only by asking. Directions need not be unit length.
+template <class T>
+concept ConvexOracle = requires(const T& shape, Vec3 point, Vec3 direction) {
+  { shape.support(direction) } -> std::same_as<Vec3>;           // a farthest point; ties are free
+  { shape.ray_exit(point, direction) } -> std::same_as<Plane>;  // supporting plane through which the ray leaves; point strictly inside
+  { shape.tightest(point) } -> std::same_as<Plane>;             // supporting plane with the least slack at the point, inside or out
+};
+
+struct Sphere {
+  double radius;
+
+  Vec3 support(Vec3 direction) const { return radius * unit(direction); }
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+struct Box {
+  Vec3 half_extents;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+/// Around local z; `length` lies between the centres of the caps.
+struct Capsule {
+  double radius, length;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+/// Around local z.
+struct Cylinder {
+  double radius, length;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+/// { x : dot(plane.normal, x) <= plane.offset }. Unbounded: its support is at infinity in all directions but one.
+struct HalfSpace {
+  Plane plane;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3, Vec3) const { return plane; }
+  Plane tightest(Vec3) const { return plane; }
+};
+
+/// What a convex polytope is made of. Facet f is the polygon ring[ring_start[f] .. ring_start[f + 1]) of vertices,
+/// counter-clockwise from outside, in the plane planes[f]. Coordinates are relative to `origin`: subtracting it lost no bit,
+/// and it keeps the digits of a hull that lies far from where its points are counted from.
+struct HullData {
+  Vec3 origin;
+  std::vector<Vec3> vertices;
+  std::vector<Plane> planes;
+  std::vector<int> ring, ring_start{0};
+  double volume = 0;
+  Vec3 centroid;
+
+  std::span<const int> facet(int f) const {
+    return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
+  }
+};
+
+/// The convex hull of points; shared, never changed once built.
+struct Hull {
+  std::shared_ptr<const HullData> data;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Hull, HalfSpace>;
+
+/// Each throws std::invalid_argument with one sentence that names the argument.
+Sphere make_sphere(double radius);
+Box make_box(Vec3 half_extents);
+Capsule make_capsule(double radius, double length);
+Cylinder make_cylinder(double radius, double length);
+HalfSpace make_half_space(Vec3 normal, double offset);
+/// Interior, duplicate, collinear and coplanar points are welcome; coplanar triangles become one facet.
+Hull make_hull(std::span<const Vec3> points);
+/// The same for finite points, or null if they are flat; `source[i]` becomes the index of vertex i among the points.
+std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source = nullptr);
+
+/// m³; infinite for a half-space.
+double volume(const Shape& shape);
+Vec3 centroid(const Shape& shape);
+bool bounded(const Shape& shape);
+
+/// True for shapes with infinitely many supporting planes along their boundary: sphere, capsule, cylinder.
+bool smooth(const Shape& shape);
+
+/// All facet planes of a polytope; for a smooth shape a few of its tangent planes that already bound it. About the shape's origin.
+void append_planes(const Shape& shape, std::vector<Plane>& planes);
+
+/// A smooth shape is its core (a point or a segment) grown by a radius; every other shape is its own core, of radius 0.
+double core_radius(const Shape& shape);
+
+/// A shape and where it is. `pose` maps the shape's own coordinates (a hull's are about HullData::origin) to the world.
+struct Placed {
+  Shape shape;
+  Vec3 position;
+  Quaternion orientation;
+  Pose pose;
+
+  Vec3 support(Vec3 direction) const;
+  Vec3 core_support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+
+  /// The same body with coordinates counted from `reference`: relative poses keep the digits that world ones lose.
+  Placed seen_from(Vec3 reference) const;
+};
+static_assert(ConvexOracle<Placed> && ConvexOracle<Hull> && ConvexOracle<HalfSpace>);
+
+Placed make_placed(Shape shape, Vec3 position, Quaternion orientation);
+
+struct Bounds {
+  Vec3 lower, upper;
+};
+/// The box around a placed shape, from six supports; infinite for a half-space.
+Bounds bounds(const Placed& placed);
+
+/// Vertices and facets of a polytope that approximates a smooth shape from inside, its volume short by the fraction
+/// `tolerance` or less; a polytope's own. A half-space has none: std::invalid_argument.
+Hull tessellated(const Shape& shape, double tolerance);
+
+}  // namespace overlapper
