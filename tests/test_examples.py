@@ -1,0 +1,111 @@
+"""The examples run as a user runs them, stay short, and print what is true."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Runs an example in an empty folder; returns what it prints."""
+
+    def run(name):
+        command = [sys.executable, EXAMPLES / name]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return run
+
+
+def numbers(pattern, text):
+    """The groups of every match, as floats."""
+    return [tuple(map(float, match if isinstance(match, tuple) else (match,))) for match in re.findall(pattern, text)]
+
+
+def test_every_example_is_short_says_what_it_shows_and_is_tested():
+    tests = Path(__file__).read_text(encoding="utf-8")
+    for example in sorted(EXAMPLES.glob("*.py")):
+        text = example.read_text(encoding="utf-8")
+        assert len(text.splitlines()) < 40, example.name
+        assert text.startswith('"""'), example.name
+        assert f'run("{example.name}")' in tests, f"{example.name} has no test"
+
+
+def test_two_boxes_share_a_box(run):
+    text = run("two_boxes.py")
+    assert numbers(r"volume +([\d.]+) m³", text) == [(0.25 * 0.5 * 0.75,)]
+    assert "centroid  [0.375 0.25  0.125] m" in text
+    assert "depth     0.250000 m, along the normal [-1.  0.  0.]" in text
+    assert "moved     separated, 0.250 mm between them" in text
+
+
+def test_the_loop_ends_with_every_box_on_the_one_below(run):
+    text = run("pybullet_loop.py")
+    assert len(re.findall(r"^\d\.\d s: ", text, re.MULTILINE)) == 11
+    assert text.startswith("0.0 s: 0 pairs")
+    resting = re.findall(r"bodies (\d) and (\d): ([\d.]+) mm deep, ([\d.]+) mm³, normal on \d \[(.*)\]", text)
+    assert [(int(a), int(b)) for a, b, *_ in resting] == [(i, i + 1) for i in range(5)]
+    for *_, depth, volume, normal in resting:
+        assert 0.0 < float(depth) < 1.0
+        assert float(volume) <= 200 * 200 * float(depth) * 1.01
+        assert float(normal.split()[2]) == pytest.approx(-1.0, abs=1e-3)
+    assert "6 bodies, 6 of 6 shapes read" in text
+
+
+def test_both_fingers_of_a_grasp_are_as_deep_as_they_are_closed(run):
+    rows = numbers(r"finger at ([\d.]+) mm: ([\d.]+) mm deep, (\d+) mm³, on (\d+) mm²", run("grasp_depth.py"))
+    assert len(rows) == 2
+    for position, depth, volume, area in rows:
+        # Half the cube, less where the finger is; its pad stands out by 0.13 mm.
+        assert depth == pytest.approx(20.0 - position + 0.13, abs=0.02)
+        assert 0.5 < depth < 5.0
+        assert 0.5 * area * depth < volume <= area * depth * 1.01
+
+
+def test_the_ious_are_the_exact_ones(run):
+    *exact, car = [value for (value,) in numbers(r"([01]\.\d{9})", run("iou_of_boxes.py"))]
+    assert exact == [1.0, pytest.approx(1 / 3, abs=1e-9), pytest.approx(0.5**0.5, abs=1e-9), 0.0]
+    # The car and its guess are of the same height, so counting points of the ground plan measures them.
+    x, y = np.meshgrid((np.arange(2000) + 0.5) / 500, (np.arange(1000) + 0.5) / 500)
+    u, v = (x - 0.2) * np.cos(0.1) + (y - 0.1) * np.sin(0.1), (y - 0.1) * np.cos(0.1) - (x - 0.2) * np.sin(0.1)
+    common = 8.0 * ((u > 0) & (u < 4) & (v > 0) & (v < 2)).mean()
+    assert car == pytest.approx(common / (16.0 - common), abs=1e-4)
+
+
+def test_the_crate_floats_as_archimedes_says(run):
+    text = run("floating_crate.py")
+    ((draught, expected),) = numbers(r"draught ([\d.]+) m, by Archimedes ([\d.]+) m", text)
+    assert expected == pytest.approx(0.6 * 0.4)
+    assert draught == pytest.approx(expected, abs=2e-4)
+    shares = [share for (share,) in numbers(r"([\d.]+)% of the crate", text)]
+    assert shares[0] == 0.0 and shares[-1] == pytest.approx(60.0, abs=0.05)
+
+
+def test_the_film_is_one_html_file_with_overlaps(run, tmp_path):
+    text = run("record_scene.py")
+    ((deepest,),) = numbers(r"deepest overlap ([\d.]+) mm", text)
+    assert 1.0 < deepest < 50.0
+    film = Path(text.split("open ")[1].strip())
+    assert film.parent == tmp_path.resolve()
+    page = film.read_text(encoding="utf-8")
+    assert "<html" in page and len(page) > 500_000
+    assert re.search(r'<script[^>]+src="http', page) is None
+
+
+def test_fcl_is_asked_and_survived(run):
+    text = run("ask_fcl.py")
+    verdicts = re.findall(r"^(\S.*): (agree|disagree|crashed)$", text, re.MULTILINE)
+    assert verdicts == [
+        ("cubes", "agree"),
+        ("ball and cylinder, apart", "agree"),
+        ("specks of 0.1 mm", "disagree"),
+        ("cubes, edge on edge", "crashed"),
+    ]
+    assert "by us -1e-05 m (overlapping), exactly -1e-05 m" in text and "so ours is nearer" in text
