@@ -63,8 +63,8 @@ class Figures:
     signed_distance: float | None
 
     def __str__(self) -> str:
-        word = "overlapping" if self.overlapping else "apart"
-        return word if self.signed_distance is None else f"{word}, {self.signed_distance + 0.0:.9g} m"
+        word = "overlapping" if self.overlapping else "touching" if self.signed_distance == 0.0 else "apart"
+        return f"unknown ({word})" if self.signed_distance is None else f"{self.signed_distance + 0.0:.9g} m ({word})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,22 +304,22 @@ def _ours(overlap: Overlap) -> Figures:
 def _judged(overlap: Overlap, theirs: Figures | None, end: str | None) -> Comparison:
     ours = _ours(overlap)
     difference = 0.0 if theirs is None else _difference(ours, theirs)
-    claims = f"FCL: {theirs}; ours: {ours}"
+    claims = f"Signed distance by FCL {theirs}, by us {ours}"
     if theirs is not None and end is None and theirs.overlapping == ours.overlapping and difference <= FCL_TOLERANCE:
         return Comparison("agree", ours, theirs, f"{claims}.")
     a, b = overlap.shapes
     assert overlap.normal is not None
     exact = signed_distance_bounds(a, b, [-overlap.normal], RESOLUTION * difference)
-    truth = f"exact: {sum(exact) / 2:.9g} m ± {(exact[1] - exact[0]) / 2:.1g}"
+    truth = f"exactly {sum(exact) / 2:.9g} m ± {(exact[1] - exact[0]) / 2:.1g}"
     if theirs is None or end is not None:
-        asked = "whether they overlap" if theirs is None else "how far or how deep"
-        return Comparison("crashed", ours, theirs, f"FCL {end} when asked {asked}; ours: {ours}; {truth}.", None, exact)
+        asked = "whether they overlap" if theirs is None else "for the signed distance"
+        return Comparison("crashed", ours, theirs, f"FCL {end} when asked {asked}: by us {ours}, {truth}.", None, exact)
     if difference <= FCL_TOLERANCE and max(map(abs, exact)) <= FCL_TOLERANCE:
-        words = f"{claims}; {truth}, which is touching as far as FCL's tolerance of {FCL_TOLERANCE:g} m goes."
+        words = f"{claims}, {truth}: touching, as far as FCL's tolerance of {FCL_TOLERANCE:g} m goes."
         return Comparison("agree", ours, theirs, words, None, exact)
     nearer = _nearer(ours, theirs, exact)
     words = {"ours": "so ours is nearer", "fcl": "so FCL is nearer", None: "which cannot tell who is nearer"}[nearer]
-    return Comparison("disagree", ours, theirs, f"{claims}; {truth}, {words}.", nearer, exact)
+    return Comparison("disagree", ours, theirs, f"{claims}, {truth}, {words}.", nearer, exact)
 
 
 def _difference(ours: Figures, theirs: Figures) -> float:
