@@ -103,10 +103,11 @@ class Difference:
     def surface(self) -> tuple[Floats, Floats]:
         """Triangles (k, 3, 3), counter-clockwise from outside, and half-spaces (f, 4) that bound the polytope."""
         points = np.array(list(self.points))
-        if all(isinstance(body.shape, Sphere | Capsule) for body in self.bodies):
-            across = np.linalg.svd(points - points.mean(axis=0))[2][2]  # of a parallelogram at most
+        try:
+            hull = Hull(points)
+        except ValueError:  # flat: a point, segment or parallelogram of balls and capsules, or of very thin plates
+            across = np.linalg.svd(points - points.mean(axis=0))[2][2]
             return np.array(list(combinations_with_replacement(points, 3))), np.array([[*across, 0.0]])
-        hull = Hull(points)
         fans = [(ring[0], ring[i], ring[i + 1]) for ring in hull.facets for i in range(1, len(ring) - 1)]
         return hull.vertices[np.array(fans)], hull.halfspaces
 

@@ -119,6 +119,15 @@ def test_a_plate_whose_faces_no_first_direction_meets_is_settled():
     assert lower <= -1e-9 * (1 - 1e-6) and -1e-9 * (1 + 1e-6) <= upper < 0.0
 
 
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("shift", "distance"), [((0, 0, 0), 0.0), ((0, 0, 0.3), 0.3), ((3, 0, 4), np.hypot(1, 4))])
+def test_plates_thinner_than_rounding_are_as_good_as_flat(shift, distance, turned):
+    q = quaternion(np.random.default_rng(6)) if turned else (0, 0, 0, 1)
+    plate = moved(Placed(Box([1.0, 1.0, 1e-16])), orientation=q)
+    lower, upper = signed_distance_bounds(plate, moved(moved(Placed(plate.shape), shift), orientation=q))
+    assert distance - 1e-14 < lower <= upper < distance + 1e-14
+
+
 @pytest.mark.parametrize(
     ("shape", "depth"),
     [(Sphere(0.5), 1.5), (Capsule(0.5, 1.0), 1.5), (Box([0.1, 0.2, 0.3]), 1.1), (Cylinder(0.5, 2.0), 1.5)],
