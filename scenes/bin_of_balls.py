@@ -9,7 +9,7 @@ import random
 import pybullet as p
 import pybullet_data
 
-STEPS = 240
+STEPS = 120
 
 
 def build(client: int) -> None:
@@ -17,11 +17,11 @@ def build(client: int) -> None:
     p.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
     p.setGravity(0, 0, -9.81, physicsClientId=client)
     p.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=client)
-    p.loadURDF("tray/traybox.urdf", globalScaling=0.7, physicsClientId=client)
+    p.loadURDF("tray/traybox.urdf", globalScaling=0.5, physicsClientId=client)
     capsule = p.createCollisionShape(p.GEOM_CAPSULE, radius=0.02, height=0.08, physicsClientId=client)
-    for k in range(48):
-        layer, row, column = k // 16, k // 4 % 4 - 1.5, k % 4 - 1.5
-        place = [0.075 * row, 0.075 * column, 0.1 + 0.08 * layer]
+    for k in range(20):
+        layer, row, column = k // 9, k // 3 % 3 - 1, k % 3 - 1
+        place = [0.09 * row, 0.09 * column, 0.08 + 0.09 * layer]
         turn = p.getQuaternionFromEuler([chance.uniform(-3, 3) for _ in range(3)])
         if k % 2:
             ball = p.loadURDF("sphere_small.urdf", place, turn, physicsClientId=client)

@@ -9,7 +9,7 @@ import random
 import pybullet as p
 import pybullet_data
 
-STEPS = 300
+STEPS = 200
 KINDS = ("jenga/jenga.urdf", "block.urdf", "domino/domino.urdf", "cube_small.urdf", "lego/lego.urdf")
 
 

@@ -1,0 +1,5 @@
+"""`python -m overlapper` is `overlapper`."""
+
+from overlapper.cli import main
+
+main()

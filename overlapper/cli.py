@@ -1,0 +1,251 @@
+"""The command line: `overlapper run SCENE` and `overlapper scenes`."""
+
+from __future__ import annotations
+
+import ast
+import ctypes
+import json
+import os
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, closing, contextmanager, redirect_stdout
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal, NoReturn
+
+try:
+    import typer
+    from rich.console import Console
+    from rich.progress import Progress
+except ImportError:
+    # The entry point imports this module before it can call anything in it.
+    print("overlapper: the command line needs typer and rich: pip install 'overlapper[cli]'", file=sys.stderr)
+    sys.exit(2)
+
+from overlapper import __version__
+from overlapper.scene import SceneError, load_scene, scene_paths
+from overlapper.table import TABLES, rows
+
+if TYPE_CHECKING:
+    from overlapper.regression import Frame
+    from overlapper.summary import Summary
+
+LIBC = ctypes.CDLL(None)
+
+PICTURES_PER_SECOND = 30  # of simulated time: as smooth as a film, and a tenth of the size that every step would take
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+
+
+class Refused(Exception):
+    """What was asked for cannot be done; the message is one sentence for the person who asked."""
+
+
+def main() -> NoReturn:
+    """The entry point: what the user can mend ends as one sentence on stderr, with exit code 2."""
+    usage_error: Any = typer.BadParameter.__bases__[
+        0
+    ]  # UsageError, of typer or of click, as the version of typer has it
+    try:
+        sys.exit(app(sys.argv[1:] or ["--help"], prog_name="overlapper", standalone_mode=False))
+    except Refused as error:
+        _give_up(str(error))
+    except usage_error as error:
+        _give_up(error.format_message())
+
+
+def _give_up(sentence: str) -> NoReturn:
+    print(f"overlapper: {sentence}", file=sys.stderr)
+    sys.exit(2)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        print(f"overlapper {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def overlapper(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and leave.")
+    ] = False,
+) -> None:
+    """The volume that the bodies of a pybullet simulation have in common, pair by pair.
+
+    Start with [bold]overlapper scenes[/bold], then run one of them:
+
+    [bold]overlapper run franka_grasp --html grasp.html[/bold]
+    """
+
+
+@app.command()
+def scenes() -> None:
+    """List the scenes that can be run by name: those of the checkout, and of the folder `scenes` here."""
+    for name, path in scene_paths().items():
+        print(
+            f"{name:22}{(ast.get_docstring(ast.parse(path.read_text(encoding='utf-8'))) or '').partition(chr(10))[0]}"
+        )
+
+
+@app.command()
+def run(
+    scene: Annotated[str, typer.Argument(help="Name of a scene, or path of a scene file (.py).", show_default=False)],
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Steps to simulate; by default as many as the scene says.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Table of all pairs in all steps, .csv or .parquet.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Recording to look at in a browser, one file.")] = None,
+    check: Annotated[
+        Literal["fcl"] | None, typer.Option(help="Ask FCL about every pair, too, and explain what differs.")
+    ] = None,
+    method: Annotated[
+        Literal["auto", "paper"], typer.Option(help="How overlaps are computed; `paper` is the article, step for step.")
+    ] = "auto",
+    tolerance: Annotated[float, typer.Option(help="Relative accuracy of smooth shapes; polyhedra are exact.")] = 1e-3,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
+) -> None:
+    """Simulate a scene and measure what its bodies have in common in every step.
+
+    A scene is a Python file with STEPS, the number of steps, and build(client), which fills a pybullet client and may
+    return a function step(i) that is called before each step.
+
+    Examples:
+
+    [bold]overlapper run franka_grasp[/bold]  a table of the overlaps
+
+    [bold]overlapper run box_pile --steps 120 --out pile.csv[/bold]  and every pair of every step
+
+    [bold]overlapper run my_scene.py --html my_scene.html[/bold]  and a recording with a time slider
+
+    [bold]overlapper run kuka_jenga --check fcl --json[/bold]  compared with FCL, for a program to read
+    """
+    if not 0 < tolerance < 1:
+        raise Refused(f"--tolerance must lie between 0 and 1, not {tolerance}")
+    if out and out.suffix not in TABLES:
+        raise Refused(f"--out must end in {' or '.join(TABLES)}, not {out.name!r}")
+    summary, finished = _measure(scene, steps, out, html, check is not None, method, tolerance)
+    files = {name: str(path) for name, path in (("out", out), ("html", html)) if path}
+    if as_json:
+        print(json.dumps(summary.as_dict() | {"finished": finished, "method": method, "tolerance": tolerance} | files))
+    else:
+        _show(summary, finished, files)
+    if not finished:
+        raise typer.Exit(130)
+
+
+def _measure(
+    name: str,
+    steps: int | None,
+    out: Path | None,
+    html: Path | None,
+    check: bool,
+    method: Literal["auto", "paper"],
+    tolerance: float,
+) -> tuple[Summary, bool]:
+    """The run, with its files; False if it was interrupted, and then both have what was done until then."""
+    with _quiet() as noise, _refusals(noise), ExitStack() as stack:
+        with open(os.devnull, "wb") as nowhere, _diverted(2, nowhere):  # pybullet says on import when it was built
+            from overlapper.regression import run as frames_of
+        from overlapper.reference import Fcl
+        from overlapper.summary import Summary
+
+        scene = load_scene(name)
+        fcl = stack.enter_context(Fcl()) if check else None
+        for path in filter(None, (out, html)):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        table = stack.enter_context(closing(TABLES[out.suffix](out))) if out else None
+        record = stack.enter_context(_recorder(html)) if html else None
+        frames = stack.enter_context(closing(frames_of(scene, steps, tolerance, method)))
+        summary = Summary(scene.name)
+        try:
+            for frame in _with_progress(frames, scene.name, steps or scene.steps):
+                opinions = fcl.compare_many(contact.overlap for contact in frame.contacts) if fcl else []
+                if table:
+                    table.write(rows(frame.step, frame.time, frame.bodies, frame.contacts, opinions))
+                summary.add(frame, opinions)
+                if record:
+                    record(frame)
+        except KeyboardInterrupt:
+            return summary, False
+    return summary, True
+
+
+def _with_progress(frames: Iterable[Frame], name: str, steps: int) -> Iterator[Frame]:
+    """The frames, counted by a bar on stderr if that is a terminal."""
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        yield from progress.track(frames, total=steps, description=name)
+
+
+@contextmanager
+def _recorder(path: Path) -> Iterator[Callable[[Frame], None]]:
+    """Records some of the frames it is called with, and writes the page in the end, however that comes."""
+    from overlapper.viewer import Recording
+
+    path.touch()  # better refused now than after the run
+    recording = Recording()
+    shown = 0
+
+    def record(frame: Frame) -> None:
+        nonlocal shown
+        if frame.time * PICTURES_PER_SECOND >= shown:
+            recording.add(frame.bodies, frame.contacts, frame.time)
+            shown += 1
+
+    try:
+        yield record
+    finally:
+        if shown:
+            recording.save(path)
+
+
+@contextmanager
+def _refusals(noise: BinaryIO) -> Iterator[None]:
+    """Turns what the user can mend into one sentence, to which the last line that C has printed may add the cause."""
+    try:
+        yield
+    except ImportError as error:
+        raise Refused(str(error)) from error
+    except OSError as error:
+        raise Refused(f"cannot write {error.filename or 'the results'}: {error.strerror}") from error
+    except SceneError as error:
+        LIBC.fflush(None)
+        noise.seek(0)
+        last_words = noise.read().decode(errors="replace").strip().rpartition("\n")[2]
+        raise Refused(f"{error} ({last_words})" if last_words else str(error)) from error
+
+
+@contextmanager
+def _quiet() -> Iterator[BinaryIO]:
+    """Keeps stdout for the answer: what Python prints goes to stderr, what C prints (as pybullet) to the file given."""
+    with tempfile.TemporaryFile() as noise, redirect_stdout(sys.stderr), warnings.catch_warnings(), _diverted(1, noise):
+        warnings.simplefilter("ignore", UserWarning)  # of shapes left out: the summary names them
+        yield noise
+
+
+@contextmanager
+def _diverted(descriptor: int, file: BinaryIO) -> Iterator[None]:
+    """Whatever goes to a file descriptor goes to `file` meanwhile, whoever writes it."""
+    kept = os.dup(descriptor)
+    os.dup2(file.fileno(), descriptor)
+    try:
+        yield
+    finally:
+        LIBC.fflush(None)  # or what C still holds would follow later
+        os.dup2(kept, descriptor)
+        os.close(kept)
+
+
+def _show(summary: Summary, finished: bool, files: dict[str, str]) -> None:
+    from overlapper.summary import overlaps_table, remarks
+
+    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
+    console.print(overlaps_table(summary))
+    for line in remarks(summary):
+        console.print(line, markup=False)
+    if not finished:
+        console.print(f"Interrupted after step {summary.steps}; what came before is kept.")
+    for path in files.values():
+        console.print(f"Written: {path}", markup=False, soft_wrap=True)

@@ -1,0 +1,94 @@
+"""What a scene is, and how it is found: by name or by path.
+
+A scene is a Python file with a docstring that says what is hard about it, `STEPS`, and `build(client)`, which fills the
+pybullet client and may return `step(i)`, called before every stepSimulation.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib.util
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+Step = Callable[[int], object]
+
+
+class SceneError(Exception):
+    """A scene that cannot be found, loaded or run; the message is one sentence for whoever can mend it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A simulation that can be built again and again, and how many steps of it are worth looking at."""
+
+    name: str
+    path: Path
+    difficulty: str
+    steps: int
+    build: Callable[[int], Step | None]
+
+    @property
+    def expected(self) -> Path:
+        """Where its expected file is or would be."""
+        return self.path.parent / "expected" / f"{self.name}.csv"
+
+
+def scene_paths() -> dict[str, Path]:
+    """The scenes that can be run by name: those in the folder `scenes` here, and those of the checkout, by name."""
+    checkout = Path(__file__).parents[1]
+    folders = [checkout / "scenes"] if (checkout / "pyproject.toml").is_file() else []
+    folders.append(Path("scenes"))
+    return {path.stem: path for folder in folders for path in sorted(folder.glob("*.py"))}
+
+
+def load_scene(name_or_path: str | Path) -> Scene:
+    """The scene of that name, or of that file (a path ends in .py). SceneError says what is wrong with it."""
+    path = _find(name_or_path)
+    module = _imported(path)
+    steps, build = getattr(module, "STEPS", None), getattr(module, "build", None)
+    if not isinstance(steps, int) or steps < 1:
+        raise SceneError(f"{path} must have STEPS, a whole number of steps from 1, but STEPS is {steps!r}")
+    if not callable(build):
+        raise SceneError(f"{path} must have a function build(client)")
+    return Scene(path.stem, path, (module.__doc__ or "").strip(), steps, build)
+
+
+def _find(name_or_path: str | Path) -> Path:
+    path = Path(name_or_path)
+    if path.suffix == ".py":
+        if not path.is_file():
+            raise SceneError(f"there is no scene file {path}")
+        return path
+    name, known = str(name_or_path), scene_paths()
+    if name not in known:
+        nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.3)
+        hint = f"; the nearest is {nearest[0]!r}" if nearest else ""
+        names = ", ".join(sorted(known)) or "none here: give the path of a scene file"
+        raise SceneError(f"there is no scene {name!r}{hint} (known scenes: {names})")
+    return known[name]
+
+
+def _imported(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise broken(path, "cannot be loaded", error) from error
+    return module
+
+
+def broken(path: Path, what: str, error: Exception) -> SceneError:
+    """The SceneError for an `error` that the scene file raised, with the line of the file where it came from."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if Path(frame.filename).resolve() == path.resolve()]
+    reason: object = error
+    if isinstance(error, SyntaxError):
+        lines, reason = [error.lineno], error.msg
+    where = f" at line {lines[-1]}" if lines else ""
+    return SceneError(f"the scene {path} {what}{where}: {type(error).__name__}: {reason}")

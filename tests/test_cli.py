@@ -1,0 +1,229 @@
+"""The command line: a table for people, JSON for programs, one sentence and exit code 2 for what the user can mend."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from overlapper.table import read_csv
+
+TWO_CUBES = '''
+"""A cube rests 2 cm deep in another."""
+import pybullet as p
+
+STEPS = 8
+
+
+def build(client):
+    cube = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
+    p.createMultiBody(0, cube, physicsClientId=client)
+    upper = p.createMultiBody(1, cube, basePosition=[0, 0, 0.08], physicsClientId=client)
+    p.setCollisionFilterPair(0, upper, -1, -1, 0, physicsClientId=client)
+    print("a scene may talk")
+
+    def step(i):
+        assert i < STEPS, "no more"
+
+    return step
+'''
+
+FAILS_LATE = TWO_CUBES.replace("i < STEPS", "i < 5")
+
+
+@pytest.fixture(autouse=True)
+def scene_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "two_cubes.py").write_text(TWO_CUBES)
+
+
+def overlapper(*arguments):
+    return subprocess.run([sys.executable, "-m", "overlapper", *arguments], capture_output=True, text=True, timeout=60)
+
+
+def refusal(*arguments):
+    """The sentence on stderr of a command that must fail with exit code 2 and nothing on stdout."""
+    done = overlapper(*arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    return done.stderr.removeprefix("a scene may talk\n")
+
+
+def test_the_version_is_that_of_the_package():
+    assert re.fullmatch(r"overlapper \d+\.\d+\.\d+\n", overlapper("--version").stdout)
+
+
+def test_help_shows_examples_and_is_what_a_bare_command_says():
+    assert "overlapper run franka_grasp" in overlapper().stdout
+    assert "--html my_scene.html" in overlapper("run", "--help").stdout
+
+
+def test_scenes_are_listed_with_what_happens_in_them():
+    assert re.search(r"^box_pile +Two hundred boxes", overlapper("scenes").stdout, re.MULTILINE)
+
+
+def test_a_run_prints_a_table_of_pairs_with_units():
+    done = overlapper("run", "two_cubes.py")
+    assert done.returncode == 0
+    assert "volume cm³" in done.stdout
+    (row,) = [line for line in done.stdout.splitlines() if "body 0/" in line]
+    pair, steps, volume, _, depth, normal, _ = [cell.strip() for cell in row.strip("│").split("│")]
+    assert pair.startswith("body 0/") and "body 1/" in pair
+    assert (steps, volume, depth, normal) == ("8", "200", "20", "+0.00 +0.00 -1.00")
+    assert "2 of 2 shapes read" in done.stdout
+    assert done.stderr == "a scene may talk\n"
+
+
+def test_json_is_all_there_is_on_stdout():
+    done = overlapper("run", "two_cubes.py", "--steps", "3", "--json", "--check", "fcl", "--out", "two.csv")
+    summary = json.loads(done.stdout)
+    (pair,) = summary["pairs"]
+    assert pair["links"] == {"bodyA": 0, "linkA": -1, "bodyB": 1, "linkB": -1}
+    assert pair["steps_overlapping"] == 3
+    assert pair["largest_volume_m3"] == pytest.approx(2e-4)
+    assert pair["largest_depth_m"] == pytest.approx(0.02)
+    assert pair["normal"] == pytest.approx([0, 0, -1])
+    assert summary["report"]["pairs_examined"] == 3
+    assert summary["fcl"] == {"agree": 3}
+    assert summary["out"] == "two.csv"
+
+
+def test_a_run_writes_its_table_and_its_recording():
+    done = overlapper("run", "two_cubes.py", "--out", "made/two.csv", "--html", "made/two.html", "--check", "fcl")
+    assert done.returncode == 0
+    rows = read_csv(Path("made/two.csv"))
+    assert [row["step"] for row in rows] == list(range(1, 9))
+    assert all(row["volume_m3"] == pytest.approx(2e-4) and row["fcl"] == "agree" for row in rows)
+    with open("made/two.html", encoding="utf-8") as page:
+        assert page.read(100).lstrip().lower().startswith("<!doctype html>")
+    assert "FCL on 8 pairs that overlap or touch: 8 agree." in done.stdout
+    assert "made/two.csv" in done.stdout and "made/two.html" in done.stdout
+
+
+@pytest.mark.parametrize("method", ["auto", "paper"])
+def test_both_methods_find_the_same_overlap(method):
+    summary = json.loads(overlapper("run", "two_cubes.py", "--steps", "1", "--method", method, "--json").stdout)
+    assert summary["method"] == method
+    assert summary["pairs"][0]["largest_volume_m3"] == pytest.approx(2e-4)
+
+
+def test_an_unknown_scene_is_refused_with_the_nearest():
+    assert re.fullmatch(
+        r"overlapper: there is no scene 'box_pil'; the nearest is 'box_pile' \(known scenes: .*\)\n",
+        refusal("run", "box_pil"),
+    )
+
+
+def test_a_broken_scene_is_refused_with_what_pybullet_said_of_it(tmp_path):
+    (tmp_path / "broken.py").write_text(
+        "import pybullet as p\nSTEPS = 1\ndef build(c):\n  p.loadURDF('no.urdf', physicsClientId=c)"
+    )
+    assert refusal("run", "broken.py") == (
+        "overlapper: the scene broken.py cannot be built at line 4: error: Cannot load URDF file. "
+        "(URDF file 'no.urdf' not found)\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--steps", "0"], "'--steps'"),
+        (["--steps", "many"], "'--steps'"),
+        (["--method", "guess"], "'auto', 'paper'"),
+        (["--check", "gut"], "'fcl'"),
+        (["--tolerance", "0"], "--tolerance must lie between 0 and 1, not 0.0"),
+        (["--tolerance", "nan"], "--tolerance must lie between 0 and 1, not nan"),
+        (["--out", "two.txt"], "--out must end in .csv or .parquet, not 'two.txt'"),
+        (["--out", "two_cubes.py/two.csv"], "cannot write two_cubes.py"),
+        (["--html", "."], "cannot write ."),
+        (["--colour"], "--colour"),
+    ],
+)
+def test_a_bad_option_is_refused_in_one_sentence(arguments, words):
+    sentence = refusal("run", "two_cubes.py", *arguments)
+    assert sentence.startswith("overlapper: ")
+    assert words in sentence
+    assert sentence.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments", "extra"),
+    [
+        ("typer", [], "cli"),
+        ("rich", [], "cli"),
+        ("pybullet", [], "sim"),
+        ("fcl", ["--check", "fcl"], "check"),
+        ("meshcat", ["--html", "two.html"], "view"),
+        ("pyarrow", ["--out", "two.parquet"], "cli"),
+    ],
+)
+def test_a_missing_extra_is_named(module, arguments, extra):
+    program = f"""
+import importlib.util, sys
+found = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *rest: None if name == {module!r} else found(name, *rest)
+sys.modules[{module!r}] = None
+sys.argv = ["overlapper", "run", "two_cubes.py", *{arguments!r}]
+from overlapper.cli import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("overlapper: ")
+    assert f"pip install 'overlapper[{extra}]'\n" in done.stderr
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_rows_before_a_failure_are_on_disk(tmp_path, ending):
+    (tmp_path / "fails.py").write_text(FAILS_LATE)
+    sentence = refusal("run", "fails.py", "--out", f"fails.{ending}", "--html", "fails.html")
+    assert "fails before step 6 at line 16: AssertionError: no more" in sentence
+    assert steps_in(tmp_path / f"fails.{ending}") == [1, 2, 3, 4, 5]
+    assert (tmp_path / "fails.html").stat().st_size > 0
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
+    (tmp_path / "long.py").write_text(TWO_CUBES.replace("STEPS = 8", "STEPS = 1_000_000"))
+    command = [sys.executable, "-m", "overlapper", "run", "long.py", "--out", f"long.{ending}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "a scene may talk\n"
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=30)
+    assert process.returncode == 130
+    steps = steps_in(tmp_path / f"long.{ending}")
+    assert steps == list(range(1, len(steps) + 1))
+    said = re.search(r"Interrupted after step (\d+)", output)
+    assert said is not None
+    assert len(steps) - int(said[1]) in (0, 1)
+
+
+def steps_in(path):
+    if path.suffix == ".csv":
+        return [row["step"] for row in read_csv(path)]
+    import pyarrow.parquet
+
+    return pyarrow.parquet.read_table(path)["step"].to_pylist()
+
+
+def test_a_bar_is_drawn_on_a_terminal_only(tmp_path):
+    assert "two_cubes" not in overlapper("run", "two_cubes.py", "--json").stderr
+    pty = pytest.importorskip("pty")
+    mine, theirs = pty.openpty()
+    command = [sys.executable, "-m", "overlapper", "run", "two_cubes.py", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=theirs, env=os.environ | {"TERM": "xterm"}):
+        os.close(theirs)
+        seen = b""
+        try:
+            while part := os.read(mine, 4096):
+                seen += part
+        except OSError:  # Linux's way to say that the other end is closed
+            pass
+    os.close(mine)
+    assert b"two_cubes" in seen
