@@ -4,7 +4,7 @@ VENV := .venv
 SCENE := franka_grasp
 NATIVE := $(wildcard overlapper/native/*)
 
-.PHONY: run test lint clean
+.PHONY: run test lint format clean
 
 run: $(VENV)/all
 	@$(VENV)/bin/overlapper run $(SCENE) --out out/$(SCENE).csv --html out/$(SCENE).html
@@ -17,6 +17,10 @@ lint: $(VENV)/dev
 	@$(VENV)/bin/ruff format --check
 	@$(VENV)/bin/mypy overlapper
 	@$(VENV)/bin/clang-format --dry-run -Werror $(filter %.h %.cpp,$(NATIVE))
+
+format: $(VENV)/dev
+	@$(VENV)/bin/ruff format --quiet
+	@$(VENV)/bin/clang-format -i $(filter %.h %.cpp,$(NATIVE))
 
 clean:
 	@rm -rf $(VENV) build out
