@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Generator, Iterable
+from collections.abc import Container, Generator, Iterable
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
@@ -58,11 +58,12 @@ def run(
     steps: int | None = None,
     tolerance: float = 1e-3,
     method: Literal["auto", "paper"] = "auto",
-    every: int = 1,
+    only: Container[int] | None = None,
 ) -> Generator[Frame, None, None]:
-    """Build the scene in a client of its own and step it, `scene.steps` times by default; every `every`-th is a frame.
+    """Build the scene in a client of its own and step it, `scene.steps` times by default.
 
-    `tolerance` and `method` are those of `overlapper.overlap`. SceneError if the scene itself fails.
+    Every step is a frame, the first has number 1; or only those in `only`, if given. `tolerance` and `method` are those
+    of `overlapper.overlap`. SceneError if the scene itself fails.
     """
     client = pybullet.connect(pybullet.DIRECT)
     try:
@@ -72,7 +73,7 @@ def run(
         for i in range(steps or scene.steps):
             _controlled(scene, step, i)
             pybullet.stepSimulation(client)
-            if (i + 1) % every == 0:
+            if only is None or i + 1 in only:
                 bodies.update()
                 yield Frame(i + 1, (i + 1) * seconds, bodies, bodies.overlaps(tolerance, method))
     finally:
@@ -126,18 +127,29 @@ class Budget:
         return difference / allowed if allowed else 0.0 if difference == 0 else math.inf
 
 
+# The budgets of a scene of polyhedra: five times what rounding did to the scenes when all their poses were moved by
+# less than a metre, which changed volumes by up to 2e-10 of themselves and centroids by up to 3e-12 m.
+ROUNDING = {
+    "volume": Budget(1e-9, 0.0),
+    "centroid": Budget(0.0, 1.5e-11),
+    "area": Budget(1e-9, 0.0),
+    "depth": Budget(1e-9, 1e-15),
+    "normal": Budget(0.0, 1e-12),
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What was recorded of a scene: every `every`-th step, at `tolerance`, and the budget of each quantity."""
+    """What was recorded of a scene: some of its `steps`, at `tolerance`, and the budget of each quantity."""
 
-    every: int
+    steps: list[int]
     tolerance: float
     budgets: dict[str, Budget]
     rows: list[Row] = field(default_factory=list)
 
     def heading(self) -> str:
         """The first lines of the file, which are written by hand where the defaults do not do."""
-        lines = [f"every {self.every} steps", f"tolerance {self.tolerance!r}"]
+        lines = [" ".join(map(str, ["steps", *self.steps])), f"tolerance {self.tolerance!r}"]
         lines += [
             f"budget {name}: relative {each.relative!r} absolute {each.absolute!r}"
             for name, each in self.budgets.items()
@@ -149,13 +161,13 @@ def read_expected(path: Path) -> Expected:
     """An expected file. FileNotFoundError if there is none."""
     heading = "".join(line for line in path.read_text(encoding="utf-8").splitlines(True) if line.startswith("#"))
     number = r"([-+.e\d]+)"
-    every = re.search(rf"every {number} steps", heading)
+    steps = re.search(r"steps ([\d ]+)", heading)
     tolerance = re.search(rf"tolerance {number}", heading)
-    if every is None or tolerance is None:
-        raise ValueError(f"{path} must say `# every <number> steps` and `# tolerance <number>` in its first lines")
+    if steps is None or tolerance is None:
+        raise ValueError(f"{path} must say `# steps <numbers>` and `# tolerance <number>` in its first lines")
     budgets = re.findall(rf"budget (\w+): relative {number} absolute {number}", heading)
     return Expected(
-        int(every[1]),
+        [int(step) for step in steps[1].split()],
         float(tolerance[1]),
         {name: Budget(float(relative), float(absolute)) for name, relative, absolute in budgets},
         read_csv(path),
@@ -167,13 +179,11 @@ def record(scene: Scene) -> None:
     try:
         old = read_expected(scene.expected)
     except FileNotFoundError:
-        # Lengths of a scene are at most metres: a micrometre would be seen, a picometre is rounding.
-        budgets = {name: Budget(1e-9, 0.0 if name in ("volume", "area") else 1e-12) for name in QUANTITIES}
-        old = Expected(max(1, scene.steps // 4), 1e-3, budgets)
+        old = Expected([scene.steps * quarter // 4 for quarter in (1, 2, 3, 4)], 1e-3, ROUNDING)
     scene.expected.parent.mkdir(exist_ok=True)
     table = CsvTable(scene.expected, EXPECTED_COLUMNS, old.heading())
     try:
-        for frame in run(scene, every=old.every):
+        for frame in run(scene, only=old.steps):
             bodies = frame.bodies
             still = Still(bodies.keys, bodies.shapes, bodies.positions, bodies.orientations, bodies.names)
             table.write(still.rows(frame.step, old.tolerance))
@@ -249,7 +259,7 @@ class Differences:
 
 
 def compare(expected: Expected, found: list[Row]) -> Differences:
-    """Pairs and statuses must be those recorded, measures within their budgets, certified errors no larger."""
+    """Pairs and statuses must be those recorded, measures within their budgets, certified errors much the same."""
     recorded = {(row["step"], *key(row)): row for row in expected.rows}
     now = {(row["step"], *key(row)): row for row in found}
     failures = [
@@ -276,9 +286,9 @@ def _row_failures(old: Row, new: Row, budgets: dict[str, Budget], spent: dict[st
             for column, part in parts.items()
             if not part <= 1  # as it is for a value that is not a number
         ]
-    # One part in a hundred: a bound is itself rounded, and as good if it is that near.
-    if _number(new, "volume_error_m3") > 1.01 * _number(old, "volume_error_m3"):
-        failures.append(f"{_label(old)}: volume_error_m3 is {new['volume_error_m3']}, above {old['volume_error_m3']}")
+    # Ten times, for the bound of one pair depends on the order of operations: moving a scene multiplied one by 4.7.
+    if _number(new, "volume_error_m3") > 10 * _number(old, "volume_error_m3"):
+        failures.append(f"{_label(old)}: volume_error_m3 is {new['volume_error_m3']}, was {old['volume_error_m3']}")
     return failures
 
 
