@@ -18,9 +18,11 @@ Vec3 combine(const Simplex& s, Vec3 DifferencePoint::*point) {
 /// Weights of the point of a segment's line nearest to the origin; false unless both are positive.
 bool weigh(Vec3 a, Vec3 b, std::array<double, 4>& weight) {
   const Vec3 ab = b - a;
-  const double length2 = norm2(ab), to_b = -dot(a, ab), to_a = dot(b, ab);
-  if (!(to_a > 0 && to_b > 0 && length2 > 0)) return false;
-  weight = {to_a / length2, to_b / length2};
+  const double wb = -dot(a, ab), wa = dot(b, ab);
+  if (!(wa > 0 && wb > 0)) return false;
+  // Divided by their own sum and not by |ab|²: on a short segment the two differ by far more than rounding.
+  const double sum = wa + wb;
+  weight = {wa / sum, wb / sum};
   return true;
 }
 
@@ -162,11 +164,15 @@ Distance distance(const Placed& a, const Placed& b) {
   const double radius_a = core_radius(a.shape), radius_b = core_radius(b.shape);
   const Separation cores = separate_cores(a, b);
   Distance result;
-  result.normal = cores.normal;
   result.distance = cores.distance - radius_a - radius_b;
   result.gap = cores.gap - radius_a - radius_b;
-  result.witness_a = cores.simplex.witness_a() - radius_a * cores.normal;
-  result.witness_b = cores.simplex.witness_b() + radius_b * cores.normal;
+  // Along the line of the witness points, distance * normal is their difference. On a curved rim that direction is known to
+  // half of the digits only; where so little separates it that this matters, the direction that proves the gap is given.
+  const Vec3 along = unit(cores.simplex.nearest());
+  const double gap_along = dot(along, core_support(a, b, -along).difference());
+  result.normal = cores.origin_inside || gap_along <= 0 ? cores.normal : along;
+  result.witness_a = cores.simplex.witness_a() - radius_a * result.normal;
+  result.witness_b = cores.simplex.witness_b() + radius_b * result.normal;
   return result;
 }
 

@@ -186,9 +186,9 @@ std::string repr(const Placed& p) {
 
 Vec3 world_origin(const Hull& hull) { return hull.data->origin; }
 
-/// What all shapes share: measures, printing, pickling by the constructor's arguments, copies that are the same object.
-template <class T, class Arguments>
-void define_common(nb::class_<T>& cls, Arguments arguments) {
+/// What all shapes share: measures, printing, copies that are the same object.
+template <class T>
+void define_common(nb::class_<T>& cls) {
   cls.def_prop_ro("volume", [](const T& s) { return volume(Shape(s)); }, "Volume in m³; infinite for a half-space.");
   array_property(cls, "centroid",
       [](const T& s) {
@@ -199,27 +199,64 @@ void define_common(nb::class_<T>& cls, Arguments arguments) {
   array_property(cls, "bounds", [](const T& s) { return to_numpy(bounds(make_placed(s, {}, {}))); },
       "(2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.");
   cls.def("__repr__", [](const T& s) { return repr(s); });
-  cls.def("__reduce__", [arguments](nb::handle self) {
-    return nb::make_tuple(self.type(), arguments(nb::cast<const T&>(self)));
-  }, nb::sig("def __reduce__(self) -> tuple[type, tuple[object, ...]]"));
   cls.def("__copy__", [](nb::handle self) { return nb::borrow(self); });
   cls.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
 }
 
 Vec3 shifted(Vec3 v, Vec3 by) { return v + by; }
 
+/// Pickles a shape as the arguments of its constructor.
+template <class T, class Arguments>
+void define_pickle(nb::class_<T>& cls, Arguments arguments) {
+  cls.def("__reduce__", [arguments](nb::handle self) {
+    return nb::make_tuple(self.type(), arguments(nb::cast<const T&>(self)));
+  }, nb::sig("def __reduce__(self) -> tuple[type, tuple[object, ...]]"));
+}
+
+/// A hull travels as it was built, so that indices into its facets mean the same in another process.
+nb::tuple hull_state(const Hull& hull) {
+  const HullData& d = *hull.data;
+  return nb::make_tuple(nb::cast(to_numpy(d.origin), nb::rv_policy::move), nb::cast(to_numpy(d.vertices), nb::rv_policy::move),
+                        nb::cast(halfspace_rows(d.planes), nb::rv_policy::move),
+                        nb::cast(to_numpy(std::span<const int>(d.ring)), nb::rv_policy::move),
+                        nb::cast(to_numpy(std::span<const int>(d.ring_start)), nb::rv_policy::move));
+}
+
+Hull hull_from_state(nb::tuple state) {
+  auto data = std::make_shared<HullData>();
+  data->origin = to_vec3(state[0], "origin");
+  data->vertices = to_rows(state[1], "vertices");
+  const Doubles planes = to_doubles(state[2], "planes", "an array of shape (k, 4)");
+  for (size_t i = 0; i < planes.shape(0); ++i) {
+    const double* row = planes.data() + 4 * i;
+    data->planes.push_back({{row[0], row[1], row[2]}, -row[3]});
+  }
+  const auto integers = [](nb::handle value) {
+    const auto array = nb::cast<nb::ndarray<const int, nb::ndim<1>, nb::c_contig, nb::device::cpu>>(value);
+    return std::vector<int>(array.data(), array.data() + array.shape(0));
+  };
+  data->ring = integers(state[3]);
+  data->ring_start = integers(state[4]);
+  const HullMeasures measures = measure(*data);
+  data->volume = measures.volume;
+  data->centroid = measures.centroid;
+  return {std::move(data)};
+}
+
 void define_shapes(nb::module_& m) {
   nb::class_<Sphere> sphere(m, "Sphere", "A ball of the given radius (m) about the origin.");
   sphere.def("__init__", [](Sphere* self, nb::handle radius) { new (self) Sphere(make_sphere(to_double(radius, "radius"))); },
              "radius"_a.none(), nb::sig("def __init__(self, radius: float) -> None"));
   sphere.def_ro("radius", &Sphere::radius, "m");
-  define_common(sphere, [](const Sphere& s) { return nb::make_tuple(s.radius); });
+  define_common(sphere);
+  define_pickle(sphere, [](const Sphere& s) { return nb::make_tuple(s.radius); });
 
   nb::class_<Box> box(m, "Box", "A box about the origin with half extents (m) along x, y, z.");
   box.def("__init__", [](Box* self, nb::handle half_extents) { new (self) Box(make_box(to_vec3(half_extents, "half_extents"))); },
           "half_extents"_a.none(), nb::sig("def __init__(self, half_extents: numpy.typing.ArrayLike) -> None"));
   array_property(box, "half_extents", [](const Box& b) { return to_numpy(b.half_extents); }, "(3,) m");
-  define_common(box, [](const Box& b) { return nb::make_tuple(nb::make_tuple(b.half_extents.x, b.half_extents.y, b.half_extents.z)); });
+  define_common(box);
+  define_pickle(box, [](const Box& b) { return nb::make_tuple(nb::make_tuple(b.half_extents.x, b.half_extents.y, b.half_extents.z)); });
 
   nb::class_<Capsule> capsule(m, "Capsule",
                               "All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.\n\n"
@@ -231,7 +268,8 @@ void define_shapes(nb::module_& m) {
               "radius"_a.none(), "length"_a.none(), nb::sig("def __init__(self, radius: float, length: float) -> None"));
   capsule.def_ro("radius", &Capsule::radius, "m");
   capsule.def_ro("length", &Capsule::length, "m, between the centres of the caps");
-  define_common(capsule, [](const Capsule& c) { return nb::make_tuple(c.radius, c.length); });
+  define_common(capsule);
+  define_pickle(capsule, [](const Capsule& c) { return nb::make_tuple(c.radius, c.length); });
 
   nb::class_<Cylinder> cylinder(m, "Cylinder", "A cylinder of `radius` (m) and `length` (m) along local z, about the origin.");
   cylinder.def("__init__",
@@ -241,7 +279,8 @@ void define_shapes(nb::module_& m) {
                "radius"_a.none(), "length"_a.none(), nb::sig("def __init__(self, radius: float, length: float) -> None"));
   cylinder.def_ro("radius", &Cylinder::radius, "m");
   cylinder.def_ro("length", &Cylinder::length, "m");
-  define_common(cylinder, [](const Cylinder& c) { return nb::make_tuple(c.radius, c.length); });
+  define_common(cylinder);
+  define_pickle(cylinder, [](const Cylinder& c) { return nb::make_tuple(c.radius, c.length); });
 
   nb::class_<HalfSpace> half(m, "HalfSpace",
                              "The closed half-space { x : normal · x <= offset }.\n\n"
@@ -253,7 +292,8 @@ void define_shapes(nb::module_& m) {
            "normal"_a.none(), "offset"_a.none(), nb::sig("def __init__(self, normal: numpy.typing.ArrayLike, offset: float) -> None"));
   array_property(half, "normal", [](const HalfSpace& h) { return to_numpy(h.plane.normal); }, "(3,) unit, out of the solid");
   half.def_prop_ro("offset", [](const HalfSpace& h) { return h.plane.offset; }, "m along the unit normal");
-  define_common(half, [](const HalfSpace& h) {
+  define_common(half);
+  define_pickle(half, [](const HalfSpace& h) {
     const Vec3 n = h.plane.normal;
     return nb::make_tuple(nb::make_tuple(n.x, n.y, n.z), h.plane.offset);
   });
@@ -277,11 +317,10 @@ void define_shapes(nb::module_& m) {
     for (Plane& p : planes) p.offset += dot(p.normal, h.data->origin);
     return halfspace_rows(planes);
   }, "(k, 4) rows [n, b], one per facet: n · x + b <= 0 inside, n unit (scipy's form).");
-  define_common(hull, [](const Hull& h) {
-    std::vector<Vec3> vertices;
-    for (Vec3 v : h.data->vertices) vertices.push_back(shifted(v, h.data->origin));
-    return nb::make_tuple(to_numpy(vertices));
-  });
+  define_common(hull);
+  hull.def("__getstate__", &hull_state, nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+  hull.def("__setstate__", [](Hull& self, nb::tuple state) { new (&self) Hull(hull_from_state(state)); },
+           nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
 void define_placed(nb::module_& m) {
@@ -406,10 +445,10 @@ void define_contact(nb::class_<Overlap>& cls) {
 void define_measures(nb::class_<Overlap>& cls) {
   cls.def_prop_ro("volume", [](const Overlap& o) { return solid(o) ? measured(o).quantities().volume : 0.0; },
                   "m³, the best estimate; 0 unless overlapping.");
-  cls.def_prop_ro("volume_error", [](const Overlap& o) { return solid(o) ? measured(o).quantities().volume_error : 0.0; },
+  cls.def_prop_ro("volume_error", [](const Overlap& o) { return solid(o) ? measured(o).quantities().volume_error : o.touching_volume(); },
                   "m³, certified: the true volume is within volume ± volume_error. For polyhedra it bounds the rounding: every plane\n"
                   "moved by 16 half-ulps of the coordinates' magnitude, times the area. For smooth shapes it is half the distance of an\n"
-                  "outer and an inner polytope, plus that. 0 unless overlapping.");
+                  "outer and an inner polytope, plus that. A pair that touches may hide a volume of rounding size. 0 if separated.");
   cls.def_prop_ro("area", [](const Overlap& o) { return solid(o) ? measured(o).quantities().area : 0.0; },
                   "m², of the surface of the common polytope; 0 unless overlapping.");
   cls.def_prop_ro("centroid", [](const Overlap& o) -> nb::object {
@@ -480,6 +519,13 @@ void define_overlap(nb::module_& m) {
   define_surface(cls);
   define_contact(cls);
   cls.def("__repr__", [](const Overlap& o) { return repr(o); });
+  cls.def("__copy__", [](nb::handle self) { return nb::borrow(self); });
+  cls.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
+  cls.def("__reduce__", [](nb::handle self) {
+    const nb::object again = nb::module_::import_("functools").attr("partial")(
+        nb::module_::import_("overlapper._core").attr("overlap"), "tolerance"_a = self.attr("tolerance"), "method"_a = self.attr("method"));
+    return nb::make_tuple(again, self.attr("shapes"));
+  }, nb::sig("def __reduce__(self) -> tuple[object, tuple[Placed, ...]]"));
 }
 
 std::pair<Placed, Placed> relative_pair(nb::handle a, nb::handle b) {

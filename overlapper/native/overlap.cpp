@@ -383,6 +383,22 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
   }
 }
 
+double Overlap::touching_volume() const {
+  if (status_ != Status::kTouching) return 0;
+  double least = std::numeric_limits<double>::infinity();
+  const double inradius = std::max(0.0, ball_.upper) + ball_.rounding;
+  for (const Placed& body : bodies_) {
+    if (method_ == Method::kPaper) {
+      least = std::min(least, volume(body.shape));
+    } else if (bounded(body.shape)) {
+      const Bounds box = bounds(body);
+      const Vec3 side = box.upper - box.lower;
+      least = std::min(least, 2 * inradius * (side.x * side.y + side.y * side.z + side.z * side.x));
+    }
+  }
+  return least;
+}
+
 const Region& Overlap::region() const {
   assert(status_ == Status::kOverlapping);
   const std::scoped_lock lock(lazy_->mutex);
@@ -440,13 +456,15 @@ const Overlap::Contact& Overlap::contact() const {
   } else {
     const Distance d = overlapper::distance(a, b);
     contact.normal = d.normal;
-    if (norm2(d.normal) == 0) contact.normal = penetration(a, b).normal;
+    // Where the bodies touch, the line between the witness points may be all rounding; the way out is not.
+    if (norm2(d.normal) == 0 || d.gap < 0) contact.normal = penetration(a, b).normal;
     contact.distance = status_ == Status::kSeparated ? std::max(0.0, d.distance) : 0;
     contact.witness_a = d.witness_a + reference_;
     contact.witness_b = d.witness_b + reference_;
-    const double level_a = bounded(a.shape) ? dot(contact.normal, a.support(-contact.normal)) : std::numeric_limits<double>::infinity();
-    const double level_b = bounded(b.shape) ? dot(contact.normal, b.support(contact.normal)) : level_a;
-    const double level = (std::isfinite(level_a) ? level_a : level_b) / 2 + level_b / 2;
+    // Half-way between the supports; a half-space reaches to its witness point.
+    const double level_a = dot(contact.normal, bounded(a.shape) ? a.support(-contact.normal) : d.witness_a);
+    const double level_b = dot(contact.normal, bounded(b.shape) ? b.support(contact.normal) : d.witness_b);
+    const double level = level_a / 2 + level_b / 2;
     contact.separating = {contact.normal, level + dot(contact.normal, reference_)};
   }
   lazy_->contact = contact;

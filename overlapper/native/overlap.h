@@ -65,6 +65,11 @@ class Overlap {
   Status status() const { return status_; }
   bool pair() const { return bodies_.size() == 2; }
 
+  /// What a set that only touches may still hold, m³: its inradius is rounding, and a convex set's volume is at most its
+  /// inradius times its surface, which is no larger than that of a box around any of the bodies. Method kPaper, which may lose
+  /// an overlap altogether, can only say that the smallest body bounds it. 0 if separated.
+  double touching_volume() const;
+
   /// Only for overlapping bodies.
   const Region& region() const;
   const Quantities& quantities() const;

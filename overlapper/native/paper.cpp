@@ -85,18 +85,35 @@ bool shift_inside(const Part& a, const Part& b, double on_boundary, Vec3& point)
   return false;
 }
 
-/// The source plane that most corners of a facet of the second hull lie on: each corner comes from a face of the first hull,
-/// that is from three planes.
-int plane_of_facet(const HullData& hull, int facet, std::span<const std::array<int, 3>> planes_at_vertex) {
-  std::vector<int> seen;
-  for (int v : hull.facet(facet)) seen.insert(seen.end(), planes_at_vertex[v].begin(), planes_at_vertex[v].end());
-  std::sort(seen.begin(), seen.end());
-  int best = seen[0];
-  std::ptrdiff_t most = 0;
-  for (auto run = seen.begin(); run != seen.end();) {
-    const auto end = std::upper_bound(run, seen.end(), *run);
-    if (end - run > most) most = end - run, best = *run;
-    run = end;
+/// The planes through the vertex dual to a face of the first hull: its own three, and where more planes meet in one point,
+/// those of the faces around it that have the same dual.
+std::vector<int> planes_through(const ExpandingHull& dual, int face, std::span<const Vec3> vertex_of_face, double same) {
+  std::vector<int> planes, stack{face}, seen{face};
+  while (!stack.empty()) {
+    const ExpandingHull::Facet& facet = dual.facets[stack.back()];
+    stack.pop_back();
+    planes.insert(planes.end(), facet.vertex.begin(), facet.vertex.end());
+    for (int other : facet.neighbour) {
+      if (norm(vertex_of_face[other] - vertex_of_face[face]) > same) continue;
+      if (std::find(seen.begin(), seen.end(), other) != seen.end()) continue;
+      seen.push_back(other);
+      stack.push_back(other);
+    }
+  }
+  return planes;
+}
+
+/// The source plane that a facet of the second hull lies in: of those through its corners, the one that all corners fit best.
+int plane_of_facet(const HullData& hull, int facet, std::span<const std::vector<int>> planes_at, std::span<const Plane> planes) {
+  int best = -1;
+  double least = std::numeric_limits<double>::infinity();
+  for (int corner : hull.facet(facet)) {
+    for (int p : planes_at[corner]) {
+      double misfit = 0;
+      for (int v : hull.facet(facet))
+        misfit = std::max(misfit, std::abs(signed_distance(planes[p], hull.vertices[v] + hull.origin)));
+      if (misfit < least) least = misfit, best = p;
+    }
   }
   return best;
 }
@@ -104,29 +121,35 @@ int plane_of_facet(const HullData& hull, int facet, std::span<const std::array<i
 /// Steps 3 to 5: the dual points of all planes about `origin`, their hull, the dual of its faces, and the hull of those.
 Intersection intersect_about(const Part& a, const Part& b, Vec3 origin) {
   ExpandingHull dual;
+  std::vector<Plane> planes;
   std::vector<int> owner;
   for (const Part* part : {&a, &b}) {
-    for (const Plane& plane : part->hull->planes) dual.points.push_back(polar_dual(plane, origin));
+    planes.insert(planes.end(), part->hull->planes.begin(), part->hull->planes.end());
     owner.insert(owner.end(), part->owner.begin(), part->owner.end());
   }
+  for (const Plane& plane : planes) dual.points.push_back(polar_dual(plane, origin));
   if (!dual.build()) return {Status::kTouching, {}};
-  std::vector<Vec3> vertices;
-  std::vector<std::array<int, 3>> planes_at;
-  for (const ExpandingHull::Facet& facet : dual.facets) {
-    if (facet.removed()) continue;
-    const auto [i, j, k] = facet.vertex;
-    vertices.push_back(origin + polar_vertex(dual.points[i], dual.points[j], dual.points[k]));
-    planes_at.push_back(facet.vertex);
+
+  std::vector<Vec3> vertices, vertex_of_face(dual.facets.size());
+  std::vector<int> face_of;
+  double extent_of_vertices = 0;
+  for (int f = 0; f < static_cast<int>(dual.facets.size()); ++f) {
+    if (dual.facets[f].removed()) continue;
+    const auto [i, j, k] = dual.facets[f].vertex;
+    const Vec3 relative = polar_vertex(dual.points[i], dual.points[j], dual.points[k]);
+    if (!finite(relative)) return {Status::kTouching, {}};
+    vertex_of_face[f] = origin + relative;
+    vertices.push_back(vertex_of_face[f]);
+    face_of.push_back(f);
+    extent_of_vertices = std::max(extent_of_vertices, norm(relative));
   }
-  if (!std::all_of(vertices.begin(), vertices.end(), finite)) return {Status::kTouching, {}};
   std::vector<int> source;
   const auto hull = hull_of(vertices, &source);
   if (!hull) return {Status::kTouching, {}};
-  std::vector<std::array<int, 3>> planes_at_vertex;
-  for (int s : source) planes_at_vertex.push_back(planes_at[s]);
+  std::vector<std::vector<int>> planes_at;
+  for (int s : source) planes_at.push_back(planes_through(dual, face_of[s], vertex_of_face, 1e-9 * extent_of_vertices));
   Part part = placed_part({hull}, {{}, hull->origin}, -1);
-  for (int f = 0; f < static_cast<int>(part.owner.size()); ++f)
-    part.owner[f] = owner[plane_of_facet(*hull, f, planes_at_vertex)];
+  for (int f = 0; f < static_cast<int>(part.owner.size()); ++f) part.owner[f] = owner[plane_of_facet(*hull, f, planes_at, planes)];
   return {Status::kOverlapping, std::move(part)};
 }
 

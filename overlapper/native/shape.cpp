@@ -91,13 +91,15 @@ Vec3 Capsule::support(Vec3 d) const { return Vec3{0, 0, sign(d.z) * length / 2} 
 
 Plane Capsule::ray_exit(Vec3 origin, Vec3 d) const {
   const double half = length / 2, dd = d.x * d.x + d.y * d.y;
+  double past = d.z;
   if (dd > 0) {
     const double t = leave_disc(origin.x * origin.x + origin.y * origin.y, origin.x * d.x + origin.y * d.y, dd, radius);
     const Vec3 side = origin + t * d;
     if (std::abs(side.z) <= half) return tangent({side.x, side.y, 0}, {}, radius);
+    past = side.z;
   }
-  // Past the side: the ray leaves through the ball around the end that it is heading for.
-  const Vec3 end{0, 0, sign(d.z) * half};
+  // The ray meets the infinite cylinder past one end, so it has left through the ball around that end.
+  const Vec3 end{0, 0, sign(past) * half};
   const Vec3 q = origin - end;
   const double qq = norm2(q), qd = dot(q, d);
   const double discriminant = std::max(0.0, qd * qd - norm2(d) * (qq - radius * radius));
