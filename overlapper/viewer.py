@@ -26,8 +26,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, Placed, Sphere
+from overlapper import HalfSpace, Overlap, Placed
 from overlapper import overlap as common_part
+from overlapper.surface import cone, plate, rotation_from_z, surface, triangles
 
 try:
     import meshcat
@@ -40,6 +41,7 @@ except ImportError as missing:
 
 Array = NDArray[np.float64]
 
+BODIES, OVERLAPS = "/overlapper/bodies", "/overlapper/overlaps"
 OWNER_COLORS = (0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442, 0xCC79A7, 0xD55E00, 0x0072B2)
 BODY_OPACITY = 0.35
 INK = 0xFF4FA3  # for what shines through: a colour that models hardly ever have
@@ -168,6 +170,7 @@ class Recording:
             self._stage = _Stage(bodies.placed)
             self._start = time
             self._framed.extend(_boxes(bodies.placed))
+            self._visualizer[BODIES].set_transform(translation_matrix(self._stage.center))
         # three.js keeps the times of key frames in float32, and a frame must be found at exactly its own time.
         seconds = float(np.float32(time - self._start))
         if self._frames and not seconds > self._frames[-1]["time"]:
@@ -211,8 +214,9 @@ class Recording:
             node = path if drawn is None else f"{path} from frame {len(self._frames)}"
             self._visualizer[node].set_object(self._stage.body(placed, color))
             self._bodies[path] = shape, node
-        # A millionth of the scene is far below a pixel: what rests keeps its key frame in spite of rounding.
-        position = np.round(placed.position / self._stage.size, 6) * self._stage.size
+        # Key frames are float32, so they are about the scene's centre. A millionth of the scene is far below a pixel:
+        # what rests keeps its key frame in spite of rounding.
+        position = np.round((placed.position - self._stage.center) / self._stage.size, 6) * self._stage.size
         self._key(node, ".position", "vector3", position.tolist())
         self._key(node, ".quaternion", "quaternion", np.round(placed.orientation, 6).tolist())
         return node, ".visible"
@@ -293,24 +297,25 @@ class _Stage:
         self._dot = geometry.Points(
             _lines(np.zeros((1, 1, 3))), _DotMaterial(size=5, sizeAttenuation=False, **through_everything)
         )
-        self._arrowhead = geometry.Mesh(_cone(0.08, 0.7, 1.0), geometry.MeshBasicMaterial(**through_everything))
+        head = cone(radius=0.08, bottom=0.7, top=1.0)
+        self._arrowhead = geometry.Mesh(
+            _Mesh(head.vertices, head.faces), geometry.MeshBasicMaterial(**through_everything)
+        )
 
     def body(self, placed: Placed, color: Sequence[float]) -> _Group:
         """A translucent shape with its creases, in its own frame; a half-space is a plate as large as the scene."""
         paint = _rgb(color)
-        shape = placed.shape
-        if isinstance(shape, HalfSpace):
-            surface, lines = self._plate(shape, placed)
-        elif isinstance(shape, Box | Hull):
-            vertices, facets = _corners(shape)
-            surface, lines = _Surface(vertices, _triangles(facets)), _creases(vertices, facets)
+        if isinstance(placed.shape, HalfSpace):
+            center = np.linalg.inv(_matrix(placed)) @ [*self.center, 1]
+            drawn, side, opacity = plate(placed.shape, center[:3], self.size), 2, 0.4 * BODY_OPACITY
         else:
-            surface, lines = _round(shape)
-        plate = isinstance(shape, HalfSpace)
-        opacity = 0.4 * BODY_OPACITY if plate else BODY_OPACITY
-        skin = _skin(paint, surface.normals is None, opacity=opacity, depthWrite=False, side=2 if plate else 0)
+            drawn, side, opacity = surface(placed.shape), 0, BODY_OPACITY
+        skin = _skin(paint, drawn.normals is None, opacity=opacity, depthWrite=False, side=side)
         edge = geometry.LineBasicMaterial(color=paint, opacity=opacity, transparent=True, depthWrite=False)
-        return _Group((geometry.Mesh(surface, skin), {}), (geometry.LineSegments(_lines(lines), edge), {}))
+        return _Group(
+            (geometry.Mesh(_Mesh(drawn.vertices, drawn.faces, drawn.normals), skin), {}),
+            (geometry.LineSegments(_lines(drawn.edges), edge), {}),
+        )
 
     def overlap(self, overlap: Overlap) -> _Group:
         """Facets by owner, patch outline and normal; about the centroid, where float32 is fine enough."""
@@ -318,20 +323,21 @@ class _Stage:
             overlap = common_part(*overlap.shapes, tolerance=0.03) or overlap
         centroid = np.asarray(overlap.centroid)
         vertices = overlap.vertices - centroid
-        triangles = _triangles(overlap.facets)
+        faces = triangles(overlap.facets)
         owners = np.repeat(overlap.owner, [len(facet) - 2 for facet in overlap.facets])
         parts: list[tuple[geometry.Object, dict[str, Any]]] = []
         for owner in np.unique(owners):
-            used, faces = np.unique(triangles[owners == owner], return_inverse=True)
-            surface = _Surface(vertices[used], faces.reshape(-1, 3))
-            parts.append((geometry.Mesh(surface, self._owner_skins[owner % len(OWNER_COLORS)]), {"renderOrder": 1}))
+            used, renumbered = np.unique(faces[owners == owner], return_inverse=True)
+            mesh = _Mesh(vertices[used], renumbered.reshape(-1, 3))
+            parts.append((geometry.Mesh(mesh, self._owner_skins[owner % len(OWNER_COLORS)]), {"renderOrder": 1}))
         lines = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) - centroid for ring in overlap.patch]
         if overlap.normal is not None:
             # In proportion to the patch, but neither lost in the scene nor in the way of others.
             length = float(np.clip(np.sqrt(overlap.area) / 3, 0.03 * self.size, 0.06 * self.size))
             lines.append(np.array([[np.zeros(3), length * overlap.normal]]))
-            turned = {"quaternion": _from_z(overlap.normal).tolist(), "scale": [length] * 3}
-            parts.append((self._arrowhead, {"renderOrder": 2} | turned))
+            pose = np.eye(4)
+            pose[:3, :3] = length * rotation_from_z(overlap.normal)
+            parts.append((self._arrowhead, {"renderOrder": 2, "matrix": pose.T.ravel().tolist()}))
         if lines:
             parts.append((geometry.LineSegments(_lines(np.concatenate(lines)), self._shining), {"renderOrder": 2}))
         if np.ptp(vertices, axis=0).max() < 0.015 * self.size:
@@ -359,24 +365,6 @@ class _Stage:
         light.set_property("position", (center + [0.5, -0.8, 1.4]).tolist())
         light.set_property("intensity", 0.55)
         visualizer["/Lights/AmbientLight/<object>"].set_property("intensity", 0.45)
-
-    def _plate(self, shape: HalfSpace, placed: Placed) -> tuple[_Surface, Array]:
-        """The part of the plane near the scene, with a grid whose lines are a round number of metres apart."""
-        basis = _basis(shape.normal)
-        center = basis.T @ _rotation(placed).T @ (self.center - placed.position)
-        step = 10 ** np.floor(np.log10(self.size / 2))
-        half = np.ceil(self.size / step) * step
-        (left, bottom), (right, top) = (np.round(center[:2] / step) * step + side for side in (-half, half))
-        corners = [(left, bottom), (right, bottom), (right, top), (left, top)]
-        grid = [((u, bottom), (u, top)) for u in np.arange(left, right + step / 2, step)]
-        grid += [((left, v), (right, v)) for v in np.arange(bottom, top + step / 2, step)]
-
-        def on_plane(points: Any) -> Array:
-            flat = np.asarray(points, dtype=float)
-            solid: Array = np.insert(flat, 2, shape.offset, axis=-1) @ basis.T
-            return solid
-
-        return _Surface(on_plane(corners), np.array([[0, 1, 2], [0, 2, 3]])), on_plane(grid)
 
 
 class _Group(geometry.Object):  # type: ignore[misc]
@@ -415,8 +403,8 @@ class _DotMaterial(geometry.GenericMaterial):  # type: ignore[misc]
     _type = "PointsMaterial"
 
 
-class _Surface(geometry.TriangularMeshGeometry):  # type: ignore[misc]
-    """Triangles (k, 3) over vertices (n, 3): smooth where normals (n, 3) are given, else flat."""
+class _Mesh(geometry.TriangularMeshGeometry):  # type: ignore[misc]
+    """meshcat's triangles, with normals."""
 
     def __init__(self, vertices: Array, faces: NDArray[Any], normals: Array | None = None) -> None:
         super().__init__(vertices, faces)
@@ -440,68 +428,6 @@ def _lines(segments: Array) -> geometry.PointsGeometry:
     return geometry.PointsGeometry(np.ascontiguousarray(segments.reshape(-1, 3).T, dtype=np.float32))
 
 
-def _corners(shape: Box | Hull) -> tuple[Array, Sequence[Any]]:
-    if isinstance(shape, Hull):
-        return np.asarray(shape.vertices), shape.facets
-    signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    facets = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return signs * np.asarray(shape.half_extents), [np.array(facet) for facet in facets]
-
-
-def _triangles(facets: Sequence[Any]) -> NDArray[Any]:
-    return np.array([(facet[0], facet[i], facet[i + 1]) for facet in facets for i in range(1, len(facet) - 1)])
-
-
-def _creases(vertices: Array, facets: Sequence[Any]) -> Array:
-    """The edges (k, 2, 3) where two facets, both counter-clockwise from outside, meet at an angle of more than 20°."""
-    normals: dict[tuple[int, int], Array] = {}
-    for facet in facets:
-        ring = vertices[facet]
-        normal = np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)
-        normals.update(dict.fromkeys(zip(facet, np.roll(facet, -1), strict=True), normal / np.linalg.norm(normal)))
-    smooth = np.cos(np.deg2rad(20))
-    creases = [(i, j) for (i, j), normal in normals.items() if i < j and normal @ normals[j, i] < smooth]
-    edges: Array = vertices[np.array(creases, dtype=int).reshape(-1, 2)]
-    return edges
-
-
-def _round(shape: Sphere | Capsule | Cylinder) -> tuple[_Surface, Array]:
-    """The surface of a solid of revolution about z, and its rims (k, 2, 3)."""
-    if isinstance(shape, Cylinder):
-        half = shape.length / 2
-        radii = shape.radius * np.array([0, 1, 1, 1, 1, 0])
-        slopes = np.deg2rad([-90, -90, 0, 0, 90, 90])
-        surface, rings = _revolved(radii, np.repeat([-half, half], 3), slopes)
-        return surface, np.stack([rings[[1, 4], :-1], rings[[1, 4], 1:]], axis=2).reshape(-1, 2, 3)
-    half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
-    slopes = np.concatenate([np.linspace(-np.pi / 2, 0, 13), np.linspace(0, np.pi / 2, 13)])
-    heights = shape.radius * np.sin(slopes) + np.repeat([-half, half], 13)
-    return _revolved(shape.radius * np.cos(slopes), heights, slopes)[0], np.empty((0, 2, 3))
-
-
-def _cone(radius: float, bottom: float, top: float) -> _Surface:
-    return _revolved(np.array([0, radius, 0]), np.array([bottom, bottom, top]), np.zeros(3))[0]
-
-
-def _revolved(radii: Array, heights: Array, slopes: Array) -> tuple[_Surface, Array]:
-    """A profile (radius, height, angle of its normal above the horizon) turned about z; and its rings (n, turns, 3)."""
-    turn = np.linspace(0, 2 * np.pi, 49)
-    across, up = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1), np.array([0.0, 0.0, 1.0])
-    rings = radii[:, None, None] * across + heights[:, None, None] * up
-    normals = np.cos(slopes)[:, None, None] * across + np.sin(slopes)[:, None, None] * up
-    a = np.arange(rings[..., 0].size).reshape(rings.shape[:2])
-    low, low_next, high, high_next = a[:-1, :-1], a[:-1, 1:], a[1:, :-1], a[1:, 1:]
-    faces = np.stack([low, low_next, high_next, low, high_next, high], axis=-1).reshape(-1, 3)
-    return _Surface(rings.reshape(-1, 3), faces, normals.reshape(-1, 3)), rings
-
-
-def _basis(normal: Array) -> Array:
-    """A rotation whose third column is the unit `normal`."""
-    across = np.cross((0, 1, 0) if abs(normal[1]) < 0.8 else (0, 0, 1), normal)
-    across /= np.linalg.norm(across)
-    return np.column_stack([across, np.cross(normal, across), normal])
-
-
 def _camera(framed: Sequence[Array]) -> tuple[Array, Array, float]:
     """The point to look at, the unit direction from it to the camera, and how far off that sees all boxes, in 4 : 3."""
     boxes = np.array(framed)
@@ -512,18 +438,6 @@ def _camera(framed: Sequence[Array]) -> tuple[Array, Array, float]:
     slope = np.tan(np.deg2rad(FIELD_OF_VIEW) / 2)
     aside = np.maximum(np.abs(corners @ np.cross(back, right)), np.abs(corners @ right) / (4 / 3))
     return center, back, float(1.15 * np.max(aside / slope + corners @ back))
-
-
-def _from_z(direction: Array) -> Array:
-    """A quaternion xyzw that turns z to the unit `direction`."""
-    x, y, z = direction
-    turn = np.array([-y, x, 0.0, 1 + z]) if z > -1 + 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
-    unit: Array = turn / np.linalg.norm(turn)
-    return unit
-
-
-def _rotation(placed: Placed) -> Array:
-    return _matrix(placed)[:3, :3]
 
 
 def _matrix(placed: Placed) -> Array:
@@ -562,7 +476,7 @@ def _link_names(bodies: Bodies) -> dict[tuple[int, int], tuple[str, str]]:
 
 def _body_paths(bodies: Bodies) -> list[str]:
     names = _link_names(bodies)
-    return [f"/overlapper/bodies/{'/'.join(names[body, link])}/{shape}" for body, link, shape in bodies.keys]
+    return [f"{BODIES}/{'/'.join(names[body, link])}/{shape}" for body, link, shape in bodies.keys]
 
 
 def _pairs(bodies: Bodies, contacts: Iterable[Contact]) -> dict[tuple[str, str], Overlap]:
@@ -582,13 +496,14 @@ def _pairs(bodies: Bodies, contacts: Iterable[Contact]) -> dict[tuple[str, str],
 
 
 def _overlap_path(pair: tuple[str, str]) -> str:
-    return "/overlapper/overlaps/" + "-".join(pair)
+    return f"{OVERLAPS}/{pair[0]}-{pair[1]}"
 
 
 def _volume_text(volume: float) -> str:
-    if volume < 1e-6:
-        return f"{volume * 1e9:.3g} mm³"
-    return f"{volume * 1e6:.3g} cm³" if volume < 1e-3 else f"{volume:.3g} m³"
+    for cubic_metres, unit in ((1e-9, "mm³"), (1e-6, "cm³"), (1e-3, "dm³")):
+        if volume < 1000 * cubic_metres:
+            return f"{volume / cubic_metres:.3g} {unit}"
+    return f"{volume:.3g} m³"
 
 
 def _row(pair: tuple[str, str], overlap: Overlap) -> dict[str, Any]:

@@ -1,0 +1,109 @@
+"""Triangles and lines to draw a shape by, in the shape's own frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Sphere
+
+Array = NDArray[np.float64]
+Facets = Sequence[NDArray[np.integer[Any]]]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles `faces` (k, 3), counter-clockwise from outside, over `vertices` (n, 3).
+
+    `normals` (n, 3) are the directions to shade by, None if the triangles are meant flat. `edges` (m, 2, 3) are lines
+    that show the shape: creases, rims, a grid.
+    """
+
+    vertices: Array
+    faces: NDArray[np.integer[Any]]
+    normals: Array | None
+    edges: Array
+
+
+def surface(shape: Box | Sphere | Capsule | Cylinder | Hull) -> Surface:
+    """The surface of a bounded shape; round ones within 0.3 % of the radius."""
+    if isinstance(shape, Box | Hull):
+        vertices, facets = _box(shape) if isinstance(shape, Box) else (shape.vertices, shape.facets)
+        return Surface(vertices, triangles(facets), None, _creases(vertices, facets))
+    if isinstance(shape, Cylinder):
+        half = shape.length / 2
+        slopes = np.deg2rad([-90, -90, 0, 0, 90, 90])
+        return _revolved(shape.radius * np.array([0, 1, 1, 1, 1, 0]), np.repeat([-half, half], 3), slopes, rims=(1, 4))
+    half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
+    slopes = np.concatenate([np.linspace(-np.pi / 2, 0, 13), np.linspace(0, np.pi / 2, 13)])
+    heights = shape.radius * np.sin(slopes) + np.repeat([-half, half], 13)
+    return _revolved(shape.radius * np.cos(slopes), heights, slopes)
+
+
+def plate(shape: HalfSpace, center: Array, size: float) -> Surface:
+    """The part of the boundary plane around `center` that reaches `size` metres, with a grid 1, 0.1, ... m wide."""
+    basis = rotation_from_z(shape.normal)
+    step = 10 ** np.floor(np.log10(size / 2))
+    half = np.ceil(size / step) * step
+    (left, bottom), (right, top) = (np.round((center @ basis)[:2] / step) * step + side for side in (-half, half))
+    corners = np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
+    across = [((u, bottom), (u, top)) for u in np.arange(left, right + step / 2, step)]
+    along = [((left, v), (right, v)) for v in np.arange(bottom, top + step / 2, step)]
+    vertices, grid = (
+        np.insert(flat, 2, shape.offset, axis=-1) @ basis.T for flat in (corners, np.array(across + along))
+    )
+    return Surface(vertices, np.array([[0, 1, 2], [0, 2, 3]]), None, grid)
+
+
+def cone(radius: float, bottom: float, top: float) -> Surface:
+    """A cone about z, its base at height `bottom`, its tip at `top`."""
+    return _revolved(np.array([0, radius, 0]), np.array([bottom, bottom, top]), np.zeros(3))
+
+
+def triangles(facets: Facets) -> NDArray[np.integer[Any]]:
+    """Convex facets, rings of indices, cut into len(ring) - 2 triangles each: (k, 3), in the order of the facets."""
+    return np.array([(ring[0], ring[i], ring[i + 1]) for ring in facets for i in range(1, len(ring) - 1)])
+
+
+def rotation_from_z(direction: Array) -> Array:
+    """A rotation (3, 3) whose third column is the unit `direction`."""
+    across = np.cross((0, 1, 0) if abs(direction[1]) < 0.8 else (0, 0, 1), direction)
+    across /= np.linalg.norm(across)
+    return np.column_stack([across, np.cross(direction, across), direction])
+
+
+def _box(shape: Box) -> tuple[Array, Facets]:
+    signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    rings = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return signs * shape.half_extents, [np.array(ring) for ring in rings]
+
+
+def _creases(vertices: Array, facets: Facets) -> Array:
+    """The edges where two facets, counter-clockwise from outside, meet at an angle of more than 20°."""
+    normals: dict[tuple[int, int], Array] = {}
+    for ring in facets:
+        corners = vertices[ring]
+        normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+        normals.update(dict.fromkeys(zip(ring, np.roll(ring, -1), strict=True), normal / np.linalg.norm(normal)))
+    smooth = np.cos(np.deg2rad(20))
+    creases = [(i, j) for (i, j), normal in normals.items() if i < j and normal @ normals[j, i] < smooth]
+    edges: Array = vertices[np.array(creases, dtype=int).reshape(-1, 2)]
+    return edges
+
+
+def _revolved(radii: Array, heights: Array, slopes: Array, rims: Sequence[int] = ()) -> Surface:
+    """A profile turned about z: radius, height, and how far its normal points above the horizon; `rims` are edges."""
+    turn = np.linspace(0, 2 * np.pi, 49)
+    outward, up = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1), np.array([0.0, 0.0, 1.0])
+    rings = radii[:, None, None] * outward + heights[:, None, None] * up
+    normals = np.cos(slopes)[:, None, None] * outward + np.sin(slopes)[:, None, None] * up
+    index = np.arange(rings[..., 0].size).reshape(rings.shape[:2])
+    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
+    faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    rim = rings[list(rims)]
+    edges = np.stack([rim[:, :-1], rim[:, 1:]], axis=2).reshape(-1, 2, 3)
+    return Surface(rings.reshape(-1, 3), faces, normals.reshape(-1, 3), edges)
