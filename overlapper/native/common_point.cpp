@@ -123,7 +123,7 @@ std::array<OwnedPlane, 4> surrounding_simplex(std::span<const Placed> bodies, st
 }  // namespace
 
 DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, std::span<const OwnedPlane> hints) {
-  DeepestBall best{{}, -kInfinity, kInfinity, 0, {}};
+  DeepestBall best{{}, -kInfinity, kInfinity, 0, false, {}};
   const std::array<OwnedPlane, 4> simplex = surrounding_simplex(bodies, planes);
   best.cuts.assign(simplex.begin(), simplex.end());
   Basis basis({simplex[0].plane, simplex[1].plane, simplex[2].plane, simplex[3].plane});
@@ -135,15 +135,17 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const OwnedPl
   constexpr int kMaxRounds = 256;
   for (int round = 0; round < kMaxRounds; ++round) {
     const auto [centre, radius] = basis.ball();
-    best.upper = std::min(best.upper, radius);
+    // At a nearly singular corner the centre runs away, and both figures with it.
+    const double rounding_here = rounding(basis.magnitude() + norm(centre));
+    best.upper = std::min(best.upper, radius + rounding_here);
+    best.apart = radius < -rounding_here;
     const OwnedPlane worst = tightest(bodies, planes, centre);
     const double slack = -signed_distance(worst.plane, centre);
-    best.rounding = rounding(basis.magnitude() + norm(centre));
-    if (slack > best.lower) best.lower = slack, best.centre = centre;
-    const bool deep = best.lower > best.rounding && best.lower >= best.upper / 2;
-    const bool apart = best.upper < -best.rounding;
-    const bool optimal = best.upper - best.lower <= best.rounding;
-    if (deep || apart || optimal || !basis.exchange(worst.plane)) break;
+    if (slack > best.lower) best.lower = slack, best.centre = centre, best.rounding = rounding_here;
+    // Newton's method starts from any inner point; a share of the depth is enough.
+    const bool deep = best.lower > best.rounding && best.lower >= best.upper / 4;
+    const bool optimal = best.upper - best.lower <= 2 * best.rounding;
+    if (deep || best.apart || optimal || !basis.exchange(worst.plane)) break;
     best.cuts.push_back(worst);
   }
   return best;

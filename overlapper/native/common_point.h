@@ -17,13 +17,14 @@ struct OwnedPlane {
 /// The largest ball in the common set of the bodies, as far as it had to be known. Its radius r solves the linear programme
 /// max r with dot(n, x) + r <= offset for every supporting plane (n, offset) of every body, four unknowns, of which planes
 /// are added one by one: always the one that the present centre violates most (Kelley's cutting planes, by dual simplex).
-/// `upper` < 0 proves that nothing is common, with at most four planes (Helly; Farkas). `lower` > 0 proves the contrary:
-/// the centre lies that far inside all planes.
+/// A negative upper bound proves that nothing is common, with at most four planes (Helly; Farkas). A positive lower bound
+/// proves the contrary: the centre lies that far inside all planes.
 struct DeepestBall {
   Vec3 centre;
   double lower;                  ///< least slack at the centre, negative outside
   double upper;                  ///< no point has more slack than this
-  double rounding;               ///< of either figure
+  double rounding;               ///< of `lower`
+  bool apart;                    ///< `upper` is below zero by more than its rounding
   std::vector<OwnedPlane> cuts;  ///< the planes asked for; they bound the common set
 };
 

@@ -378,7 +378,7 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
       for (const OwnedPlane& plane : region().planes)
         if (plane.owner < 0) throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
     }
-  } else if (ball_.upper >= -ball_.rounding) {
+  } else if (!ball_.apart) {
     status_ = Status::kTouching;
   }
 }
