@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import ctypes
 import json
 import os
@@ -24,7 +23,7 @@ except ImportError:
     sys.exit(2)
 
 from overlapper import __version__
-from overlapper.scene import SceneError, load_scene, scene_paths
+from overlapper.scene import SceneError, headline, load_scene, scene_paths
 from overlapper.table import TABLES, rows
 
 if TYPE_CHECKING:
@@ -44,9 +43,8 @@ class Refused(Exception):
 
 def main() -> NoReturn:
     """The entry point: what the user can mend ends as one sentence on stderr, with exit code 2."""
-    usage_error: Any = typer.BadParameter.__bases__[
-        0
-    ]  # UsageError, of typer or of click, as the version of typer has it
+    # UsageError, which is click's or typer's own, as the version of typer has it.
+    usage_error: Any = typer.BadParameter.__bases__[0]
     try:
         sys.exit(app(sys.argv[1:] or ["--help"], prog_name="overlapper", standalone_mode=False))
     except Refused as error:
@@ -84,9 +82,7 @@ def overlapper(
 def scenes() -> None:
     """List the scenes that can be run by name: those of the checkout, and of the folder `scenes` here."""
     for name, path in scene_paths().items():
-        print(
-            f"{name:22}{(ast.get_docstring(ast.parse(path.read_text(encoding='utf-8'))) or '').partition(chr(10))[0]}"
-        )
+        print(f"{name:22}{headline(path)}")
 
 
 @app.command()
@@ -242,7 +238,7 @@ def _show(summary: Summary, finished: bool, files: dict[str, str]) -> None:
     from overlapper.summary import overlaps_table, remarks
 
     console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
-    console.print(overlaps_table(summary))
+    console.print(overlaps_table(summary) if summary.pairs else f"Nothing overlaps in {summary.steps} steps.")
     for line in remarks(summary):
         console.print(line, markup=False)
     if not finished:

@@ -6,6 +6,7 @@ pybullet client and may return `step(i)`, called before every stepSimulation.
 
 from __future__ import annotations
 
+import ast
 import difflib
 import importlib.util
 import traceback
@@ -38,11 +39,20 @@ class Scene:
 
 
 def scene_paths() -> dict[str, Path]:
-    """The scenes that can be run by name: those in the folder `scenes` here, and those of the checkout, by name."""
+    """The scenes that can be run by name: those of the folder `scenes` here, then those of the checkout."""
     checkout = Path(__file__).parents[1]
     folders = [checkout / "scenes"] if (checkout / "pyproject.toml").is_file() else []
-    folders.append(Path("scenes"))
-    return {path.stem: path for folder in folders for path in sorted(folder.glob("*.py"))}
+    paths = {path.stem: path for folder in [*folders, Path("scenes")] for path in folder.glob("[!_]*.py")}
+    return dict(sorted(paths.items()))
+
+
+def headline(path: Path) -> str:
+    """The first line of a scene's docstring; the scene is not run."""
+    try:
+        docstring = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+    except SyntaxError:
+        return "(not a Python file)"
+    return (docstring or "").partition("\n")[0]
 
 
 def load_scene(name_or_path: str | Path) -> Scene:

@@ -130,9 +130,9 @@ def _sum(before: Report | None, now: Report) -> Report:
 
 
 def overlaps_table(summary: Summary, limit: int = 20) -> Table:
-    """The `limit` largest pairs, for a reader who knows nothing of this program."""
+    """The `limit` largest pairs, of which there must be one, for a reader who knows nothing of this program."""
     pairs = summary.largest()
-    unit = next((unit for unit, size in VOLUME_UNITS.items() if pairs and pairs[0].volume >= 0.1 * size), "µm³")
+    unit = next((unit for unit, size in VOLUME_UNITS.items() if pairs[0].volume >= 0.1 * size), "µm³")
     left_out = f"\nThe {limit} largest of {len(pairs)} pairs." if len(pairs) > limit else ""
     table = Table(
         title=f"Overlaps of {summary.scene} in {summary.steps} steps, {summary.seconds:.3g} s",

@@ -1,7 +1,7 @@
 """Two hundred boxes of five kinds are poured into a tray and come to rest.
 
-Hard: hundreds of pairs at once, boxes from 6 mm to 15 cm, edges across edges, faces on faces, and thin dominoes
-that are pressed through each other at the impacts.
+Hard: hundreds of pairs at once, boxes from 6 mm to 15 cm, edges across edges, faces on faces, and impacts that
+press thin dominoes deep into their neighbours.
 """
 
 import random

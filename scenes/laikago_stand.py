@@ -1,7 +1,7 @@
 """A laikago drops a few millimetres and stands on its four toes.
 
-Hard: ninety-two hulls of which almost none touch anything, and four spheres that sink microns into the ground, so
-that the caps are ten thousand times wider than thick.
+Hard: ninety-two hulls of which almost none touch anything, so that what is left out decides how long it takes; and
+four spheres in a half-space without bounds, whose shallow caps no polytope meets exactly.
 """
 
 import pybullet as p

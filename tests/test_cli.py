@@ -33,6 +33,21 @@ def build(client):
     return step
 '''
 
+BENT = """
+import pybullet as p
+STEPS = 2
+
+
+def build(client):
+    cube = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
+    p.createMultiBody(0, cube, physicsClientId=client)
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    bent = p.createCollisionShape(
+        p.GEOM_MESH, vertices=corners, indices=[0, 1, 2, 0, 2, 3], physicsClientId=client
+    )
+    p.createMultiBody(0, bent, physicsClientId=client)
+"""
+
 FAILS_LATE = TWO_CUBES.replace("i < STEPS", "i < 5")
 
 
@@ -64,6 +79,22 @@ def test_help_shows_examples_and_is_what_a_bare_command_says():
 
 def test_scenes_are_listed_with_what_happens_in_them():
     assert re.search(r"^box_pile +Two hundred boxes", overlapper("scenes").stdout, re.MULTILINE)
+
+
+def test_a_scene_that_is_no_python_is_listed_as_such(tmp_path):
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "half.py").write_text("def build(")
+    assert re.search(r"^half +\(not a Python file\)$", overlapper("scenes").stdout, re.MULTILINE)
+
+
+def test_what_is_not_modelled_is_named_below_the_table(tmp_path):
+    (tmp_path / "bent.py").write_text(BENT)
+    done = overlapper("run", "bent.py")
+    assert done.returncode == 0
+    assert "Nothing overlaps in 2 steps." in done.stdout
+    assert "2 bodies, 1 of 2 shapes read" in done.stdout
+    assert re.search(r"^Not modelled: body 1/.*concave", done.stdout, re.MULTILINE)
+    assert done.stderr == ""
 
 
 def test_a_run_prints_a_table_of_pairs_with_units():
