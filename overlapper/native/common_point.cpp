@@ -100,7 +100,8 @@ OwnedPlane tightest(std::span<const Placed> bodies, std::span<const OwnedPlane> 
   return result;
 }
 
-/// A tetrahedron around one of the bounded bodies, of its supporting planes; around everything of interest if none is bounded.
+/// A tetrahedron around one of the bounded bodies, of its supporting planes; around everything of interest if none is
+/// bounded.
 std::array<OwnedPlane, 4> surrounding_simplex(std::span<const Placed> bodies, std::span<const OwnedPlane> planes) {
   const double s = 1 / std::sqrt(3.0);
   const std::array<Vec3, 4> directions{Vec3{s, s, s}, Vec3{s, -s, -s}, Vec3{-s, s, -s}, Vec3{-s, -s, s}};
@@ -122,7 +123,8 @@ std::array<OwnedPlane, 4> surrounding_simplex(std::span<const Placed> bodies, st
 
 }  // namespace
 
-DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, std::span<const OwnedPlane> hints) {
+DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const OwnedPlane> planes,
+                         std::span<const OwnedPlane> hints) {
   DeepestBall best{{}, -kInfinity, kInfinity, 0, false, {}};
   const std::array<OwnedPlane, 4> simplex = surrounding_simplex(bodies, planes);
   best.cuts.assign(simplex.begin(), simplex.end());
@@ -212,9 +214,9 @@ Mat3 axes_along(Vec3 first) {
   return {first, second, cross(first, second)};
 }
 
-/// The step along `direction` that makes the product of the slacks largest. Row q has the slack 1 - step * dot(q, direction)
-/// of what it had; the sum of their logarithms is concave, so its slope is bisected. Unlike the damped step, which at most
-/// doubles a slack, this crosses a sliver of any aspect in one go.
+/// The step along `direction` that makes the product of the slacks largest. Row q has the slack 1 - step * dot(q,
+/// direction) of what it had; the sum of their logarithms is concave, so its slope is bisected. Unlike the damped step,
+/// which at most doubles a slack, this crosses a sliver of any aspect in one go.
 double best_step(std::span<const Vec3> rows, Vec3 direction) {
   double steepest = 0;
   for (Vec3 q : rows) steepest = std::max(steepest, dot(q, direction));
@@ -235,8 +237,8 @@ double best_step(std::span<const Vec3> rows, Vec3 direction) {
   return low;
 }
 
-/// Newton's method for the analytic centre of the planes, from a point strictly inside all of them. Works in the frame of
-/// the last step, so that slacks of any ratio meet as numbers near one.
+/// Newton's method for the analytic centre of the planes, from a point strictly inside all of them. Works in the frame
+/// of the last step, so that slacks of any ratio meet as numbers near one.
 class AnalyticCentre {
  public:
   explicit AnalyticCentre(Vec3 inside) { frame_.origin = inside; }
@@ -282,7 +284,8 @@ Vec3 dual_in_frame(const Frame& frame, const Plane& plane) {
 Frame round_frame(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, const DeepestBall& ball) {
   std::vector<OwnedPlane> cuts(ball.cuts);
   Vec3 safe = ball.centre;
-  // A cut may pass through the ball's centre by rounding only; such a plane would stop Newton's method before it starts.
+  // A cut may pass through the ball's centre by rounding only; such a plane would stop Newton's method before it
+  // starts.
   AnalyticCentre centre(safe);
   constexpr int kMaxRounds = 64;
   for (int round = 0; round < kMaxRounds; ++round) {

@@ -14,11 +14,11 @@ struct OwnedPlane {
   int owner;
 };
 
-/// The largest ball in the common set of the bodies, as far as it had to be known. Its radius r solves the linear programme
-/// max r with dot(n, x) + r <= offset for every supporting plane (n, offset) of every body, four unknowns, of which planes
-/// are added one by one: always the one that the present centre violates most (Kelley's cutting planes, by dual simplex).
-/// A negative upper bound proves that nothing is common, with at most four planes (Helly; Farkas). A positive lower bound
-/// proves the contrary: the centre lies that far inside all planes.
+/// The largest ball in the common set of the bodies, as far as it had to be known. Its radius r solves the linear
+/// programme max r with dot(n, x) + r <= offset for every supporting plane (n, offset) of every body, four unknowns, of
+/// which planes are added one by one: always the one that the present centre violates most (Kelley's cutting planes, by
+/// dual simplex). A negative upper bound proves that nothing is common, with at most four planes (Helly; Farkas). A
+/// positive lower bound proves the contrary: the centre lies that far inside all planes.
 struct DeepestBall {
   Vec3 centre;
   double lower;                  ///< least slack at the centre, negative outside
@@ -30,12 +30,13 @@ struct DeepestBall {
 
 /// `planes` holds all facets of the polytopes among the bodies and some tangent planes of the rest. `hints` are further
 /// planes to begin with. Owner -1 marks planes of the simplex around a set that no body bounds.
-DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, std::span<const OwnedPlane> hints);
+DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const OwnedPlane> planes,
+                         std::span<const OwnedPlane> hints);
 
-/// An affine frame, x = origin + axes * y, in which the common set is round: it holds the ball of radius 1 / kEccentricity
-/// and no dual point is longer than kEccentricity, be it a sliver of any thickness. The origin is the analytic centre of the
-/// planes that matter, and the axes are its Dikin ellipsoid (Nesterov and Nemirovskii 1994, section 2), so that the dual
-/// points of those planes sum to zero and their second moments to the identity.
+/// An affine frame, x = origin + axes * y, in which the common set is round: it holds the ball of radius 1 /
+/// kEccentricity and no dual point is longer than kEccentricity, be it a sliver of any thickness. The origin is the
+/// analytic centre of the planes that matter, and the axes are its Dikin ellipsoid (Nesterov and Nemirovskii 1994,
+/// section 2), so that the dual points of those planes sum to zero and their second moments to the identity.
 struct Frame {
   Vec3 origin;
   Mat3 axes;

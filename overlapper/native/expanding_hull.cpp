@@ -19,8 +19,8 @@ int farthest(std::span<const Vec3> points, Measure measure) {
   return best;
 }
 
-/// Four points that span a solid, roughly as large as possible, counter-clockwise seen from the fourth's far side; false if
-/// none do.
+/// Four points that span a solid, roughly as large as possible, counter-clockwise seen from the fourth's far side;
+/// false if none do.
 bool extreme_tetrahedron(std::span<const Vec3> points, std::array<int, 4>& corner) {
   if (points.size() < 4) return false;
   const Vec3 first = points[0];
@@ -206,8 +206,8 @@ bool ExpandingHull::build(std::span<const double> negligible) {
       continue;
     }
     insert(apex, facet);
-    // A point that saw a removed facet and is still outside sees one of the cone: at the horizon, the plane of a cone facet
-    // lies between the planes of the two facets that met there.
+    // A point that saw a removed facet and is still outside sees one of the cone: at the horizon, the plane of a cone
+    // facet lies between the planes of the two facets that met there.
     for (int gone : removed_) hand_on_conflicts(gone, cone_, apex);
     pending.insert(pending.end(), cone_.begin(), cone_.end());
   }

@@ -9,7 +9,7 @@
 namespace overlapper {
 namespace {
 
-Vec3 combine(const Simplex& s, Vec3 DifferencePoint::*point) {
+Vec3 combine(const Simplex& s, Vec3 DifferencePoint::* point) {
   Vec3 sum;
   for (int i = 0; i < s.size; ++i) sum += s.weight[i] * (s.corner[i].*point);
   return sum;
@@ -53,8 +53,9 @@ bool weigh(Vec3 a, Vec3 b, Vec3 c, Vec3 d, std::array<double, 4>& weight) {
   return true;
 }
 
-/// Keeps the corners that support the point nearest to the origin. All sub-simplices are tried and the nearest valid one
-/// wins, which needs no case analysis of Voronoi regions that rounding could contradict. True if the origin is inside.
+/// Keeps the corners that support the point nearest to the origin. All sub-simplices are tried and the nearest valid
+/// one wins, which needs no case analysis of Voronoi regions that rounding could contradict. True if the origin is
+/// inside.
 bool reduce(Simplex& s) {
   Simplex best;
   double least = std::numeric_limits<double>::infinity();
@@ -123,8 +124,8 @@ Separation separate_cores(const Placed& a, const Placed& b) {
   Vec3 nearest = simplex.corner[0].difference();
   result.gap = -std::numeric_limits<double>::infinity();
 
-  // Polytopes end by themselves, as each round finds a new vertex; a cylinder's rim converges, and no bit improves after
-  // some dozens of rounds.
+  // Polytopes end by themselves, as each round finds a new vertex; a cylinder's rim converges, and no bit improves
+  // after some dozens of rounds.
   for (int round = 0; round < 256; ++round) {
     const double length = norm(nearest);
     if (length == 0) {
@@ -166,8 +167,9 @@ Distance distance(const Placed& a, const Placed& b) {
   Distance result;
   result.distance = cores.distance - radius_a - radius_b;
   result.gap = cores.gap - radius_a - radius_b;
-  // Along the line of the witness points, distance * normal is their difference. On a curved rim that direction is known to
-  // half of the digits only; where so little separates it that this matters, the direction that proves the gap is given.
+  // Along the line of the witness points, distance * normal is their difference. On a curved rim that direction is
+  // known to half of the digits only; where so little separates it that this matters, the direction that proves the gap
+  // is given.
   const Vec3 along = unit(cores.simplex.nearest());
   const double gap_along = dot(along, core_support(a, b, -along).difference());
   result.normal = cores.origin_inside || gap_along <= 0 ? cores.normal : along;
@@ -243,7 +245,8 @@ class DepthSearch {
     return best;
   }
 
-  /// The difference of two points or segments in one plane: across the plane, its support is its offset, whatever the rest.
+  /// The difference of two points or segments in one plane: across the plane, its support is its offset, whatever the
+  /// rest.
   Penetration flat() {
     Vec3 u, v;
     for (Vec3 p : hull_.points) {
@@ -271,7 +274,8 @@ class DepthSearch {
 }  // namespace
 
 Penetration penetration(const Placed& a, const Placed& b) {
-  if (half_space(a) && half_space(b)) throw std::invalid_argument("two half-spaces have no least translation that separates them");
+  if (half_space(a) && half_space(b))
+    throw std::invalid_argument("two half-spaces have no least translation that separates them");
   if (half_space(a) || half_space(b)) {
     const Distance height = distance(a, b);
     return {-height.distance, height.normal};

@@ -68,8 +68,8 @@ struct Growth {
     planes.push_back(plane);
   }
 
-  /// The plane of the smooth bodies through which the ray from the origin to `vertex` leaves first. `reach` is the distance
-  /// of the vertex over that of the exit.
+  /// The plane of the smooth bodies through which the ray from the origin to `vertex` leaves first. `reach` is the
+  /// distance of the vertex over that of the exit.
   std::optional<OwnedPlane> first_exit(Vec3 vertex, double& reach) const {
     std::optional<OwnedPlane> first;
     reach = 0;
@@ -109,8 +109,8 @@ struct Growth {
   }
 };
 
-Region grow(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, const DeepestBall& ball, double tolerance,
-            double rounding_of_planes) {
+Region grow(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, const DeepestBall& ball,
+            double tolerance, double rounding_of_planes) {
   Growth growth{bodies, round_frame(bodies, planes, ball), {}, {}, {}};
   std::vector<double> negligible;
   for (const OwnedPlane& p : planes) {
@@ -177,8 +177,8 @@ Quantities measure_region(const Region& region) {
   const double outer = scale * in_frame.volume;
   const bool exact = std::all_of(region.inner.begin(), region.inner.end(), [](double t) { return t == 1; });
   const double inner = exact ? outer : scale * inner_volume(region);
-  // On a doubly curved surface, a regular facet's tangent polygon leaves 5/12 of the shell between the two polytopes outside
-  // of the body and the fan over its pulled-in corners 7/12 inside of it.
+  // On a doubly curved surface, a regular facet's tangent polygon leaves 5/12 of the shell between the two polytopes
+  // outside of the body and the fan over its pulled-in corners 7/12 inside of it.
   q.volume = outer - 5.0 / 12.0 * (outer - inner);
 
   const Vec3 centre = in_frame.first_moment / in_frame.volume;
@@ -201,8 +201,9 @@ Quantities measure_region(const Region& region) {
   }
   double reach = 0;
   for (Vec3 y : region.polytope.vertices) reach = std::max(reach, norm(axes * y));
-  // First order: every plane moved by `rounding`. Second and third: what the moved planes add along ridges and corners, which
-  // is at most the shell of that thickness around a body that fits into a ball of radius `reach`. Then the sums themselves.
+  // First order: every plane moved by `rounding`. Second and third: what the moved planes add along ridges and corners,
+  // which is at most the shell of that thickness around a body that fits into a ball of radius `reach`. Then the sums
+  // themselves.
   const double r = region.rounding;
   const double moved = r * (q.area + r * (4 * 3.15 * reach + 4.2 * r));
   q.volume_error = 7.0 / 12.0 * (outer - inner) + moved + 64 * DBL_EPSILON * outer + region.missing;
@@ -214,7 +215,8 @@ Quantities measure_region(const Region& region) {
 /// The facet on the other side of each directed ridge of a polytope.
 class Ridges {
  public:
-  explicit Ridges(const Polytope& polytope) : polytope_(polytope), count_(static_cast<int64_t>(polytope.vertices.size())) {
+  explicit Ridges(const Polytope& polytope)
+      : polytope_(polytope), count_(static_cast<int64_t>(polytope.vertices.size())) {
     for (int f = 0; f < polytope.facets(); ++f) {
       const auto ring = polytope.facet(f);
       for (size_t i = 0; i < ring.size(); ++i) facet_left_of_[key(ring[i], ring[(i + 1) % ring.size()])] = f;
@@ -239,7 +241,8 @@ class Ridges {
 /// outside.
 void trace_patch(const Polytope& polytope, std::span<const OwnedPlane> planes, const Ridges& ridges, int owner,
                  std::vector<std::vector<int>>& loops) {
-  std::unordered_map<int, std::vector<int>> open;  // vertices that begin border ridges not yet walked, and where they lead
+  std::unordered_map<int, std::vector<int>>
+      open;  // vertices that begin border ridges not yet walked, and where they lead
   const auto mine = [&](int facet) { return planes[facet].owner == owner; };
   std::vector<std::pair<int, int>> border;
   for (int f = 0; f < polytope.facets(); ++f) {
@@ -369,14 +372,17 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
     if (d.gap > rounding(reach)) return;
     hints = facing_planes(relative_, d);
   }
-  planes_ = gather_planes(relative_);
-  ball_ = deepest_ball(relative_, planes_, hints);
+  std::vector<OwnedPlane> planes = gather_planes(relative_);
+  ball_ = deepest_ball(relative_, planes, hints);
   if (ball_.lower > ball_.rounding) {
     status_ = Status::kOverlapping;
-    const bool none_bounded = std::none_of(bodies_.begin(), bodies_.end(), [](const Placed& b) { return bounded(b.shape); });
+    lazy_->planes = std::move(planes);
+    const bool none_bounded =
+        std::none_of(bodies_.begin(), bodies_.end(), [](const Placed& b) { return bounded(b.shape); });
     if (none_bounded) {
       for (const OwnedPlane& plane : region().planes)
-        if (plane.owner < 0) throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
+        if (plane.owner < 0)
+          throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
     }
   } else if (!ball_.apart) {
     status_ = Status::kTouching;
@@ -405,7 +411,7 @@ const Region& Overlap::region() const {
   if (!lazy_->region) {
     double reach = 0;
     for (const Placed& body : relative_) reach = std::max(reach, magnitude(body));
-    std::vector<OwnedPlane> planes = planes_;
+    std::vector<OwnedPlane> planes = std::move(lazy_->planes);
     if (std::none_of(bodies_.begin(), bodies_.end(), [](const Placed& b) { return bounded(b.shape); }))
       planes.insert(planes.end(), ball_.cuts.begin(), ball_.cuts.begin() + 4);
     lazy_->region = grow(relative_, planes, ball_, tolerance_, rounding(reach));

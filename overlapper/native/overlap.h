@@ -14,8 +14,9 @@ namespace overlapper {
 enum class Status { kSeparated, kTouching, kOverlapping };
 enum class Method { kAuto, kPaper };
 
-/// The polytope around the common set, in a frame about a point inside it: world x = reference + frame.origin + frame.axes y.
-/// For polyhedra it is the common set; for smooth shapes it contains it, and shrinks to fit inside vertex by vertex.
+/// The polytope around the common set, in a frame about a point inside it: world x = reference + frame.origin +
+/// frame.axes y. For polyhedra it is the common set; for smooth shapes it contains it, and shrinks to fit inside vertex
+/// by vertex.
 struct Region {
   Vec3 reference;
   Frame frame;
@@ -23,8 +24,8 @@ struct Region {
   std::vector<OwnedPlane> planes;  ///< one per facet of the polytope, relative to `reference`
   std::vector<double> inner;       ///< per vertex y: inner * y lies in the common set; 1 where the vertex itself does
   double rounding = 0;             ///< m: by how much rounding may have moved a plane
-  double missing = 0;              ///< m³: at most so much of the common set lies outside, where smooth shapes were tessellated
-  int facets_touched = 0;          ///< how many planes entered the dual hull
+  double missing = 0;      ///< m³: at most so much of the common set lies outside, where smooth shapes were tessellated
+  int facets_touched = 0;  ///< how many planes entered the dual hull
 
   Vec3 to_world(Vec3 y) const { return reference + (frame.origin + frame.axes * y); }
 };
@@ -33,8 +34,8 @@ struct Region {
 struct Quantities {
   double volume = 0, volume_error = 0, area = 0;
   Vec3 centroid;
-  Mat3 inertia;                       ///< about the centroid, unit density
-  std::vector<Vec3> area_vector;      ///< per facet, outward, of length its area
+  Mat3 inertia;                   ///< about the centroid, unit density
+  std::vector<Vec3> area_vector;  ///< per facet, outward, of length its area
   std::vector<Vec3> facet_centroid;
 };
 
@@ -51,12 +52,12 @@ struct Surface {
   }
 };
 
-/// The common set of two or more placed shapes. Only the status is found on construction; each quantity when first asked for,
-/// then kept. Safe to share between threads.
+/// The common set of two or more placed shapes. Only the status is found on construction; each quantity when first
+/// asked for, then kept. Safe to share between threads.
 class Overlap {
  public:
-  /// Throws std::invalid_argument if the common set is unbounded. `tolerance` is the fraction by which the polytope may have
-  /// to shrink, about its inner point, to fit into smooth shapes; polyhedra are exact whatever it is.
+  /// Throws std::invalid_argument if the common set is unbounded. `tolerance` is the fraction by which the polytope may
+  /// have to shrink, about its inner point, to fit into smooth shapes; polyhedra are exact whatever it is.
   Overlap(std::vector<Placed> bodies, double tolerance, Method method);
 
   const std::vector<Placed>& bodies() const { return bodies_; }
@@ -65,9 +66,9 @@ class Overlap {
   Status status() const { return status_; }
   bool pair() const { return bodies_.size() == 2; }
 
-  /// What a set that only touches may still hold, m³: its inradius is rounding, and a convex set's volume is at most its
-  /// inradius times its surface, which is no larger than that of a box around any of the bodies. Method kPaper, which may lose
-  /// an overlap altogether, can only say that the smallest body bounds it. 0 if separated.
+  /// What a set that only touches may still hold, m³: its inradius is rounding, and a convex set's volume is at most
+  /// its inradius times its surface, which is no larger than that of a box around any of the bodies. Method kPaper,
+  /// which may lose an overlap altogether, can only say that the smallest body bounds it. 0 if separated.
   double touching_volume() const;
 
   /// Only for overlapping bodies.
@@ -84,7 +85,7 @@ class Overlap {
     double depth = 0;     ///< 0 unless overlapping
     Vec3 normal;          ///< unit, from b to a
     Vec3 witness_a, witness_b;
-    Plane separating;     ///< a where dot(normal, x) >= offset, b on the other side; meaningless if overlapping
+    Plane separating;  ///< a where dot(normal, x) >= offset, b on the other side; meaningless if overlapping
   };
   const Contact& contact() const;
 
@@ -94,11 +95,11 @@ class Overlap {
   Method method_;
   Vec3 reference_;
   Status status_ = Status::kSeparated;
-  std::vector<OwnedPlane> planes_;
   DeepestBall ball_;
 
   struct Lazy {
     std::mutex mutex;
+    std::vector<OwnedPlane> planes;  ///< of all bodies, until the region is built
     std::optional<Region> region;
     std::optional<Quantities> quantities;
     std::optional<Surface> surface;

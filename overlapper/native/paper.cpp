@@ -13,8 +13,8 @@
 namespace overlapper {
 namespace {
 
-/// The minimal step of the 26 shifts, as a fraction of the smaller polytope's extent. The text gives no number. Half of a
-/// double's digits are spent on getting off the boundary, half are left to the dual points.
+/// The minimal step of the 26 shifts, as a fraction of the smaller polytope's extent. The text gives no number. Half of
+/// a double's digits are spent on getting off the boundary, half are left to the dual points.
 constexpr double kMinimalStep = 0x1p-26;
 
 /// A polytope on the way up the tree, in the common coordinates, and the body that each of its facets came from.
@@ -52,7 +52,8 @@ Hull stand_in(const Plane& plane, std::span<const Placed> bodies) {
   std::vector<Vec3> corners;
   for (double a : {-2.0, 2.0})
     for (double b : {-2.0, 2.0})
-      for (double c : {0.0, -2 * depth - reach}) corners.push_back(a * reach * u + b * reach * v + (plane.offset + c) * n);
+      for (double c : {0.0, -2 * depth - reach})
+        corners.push_back(a * reach * u + b * reach * v + (plane.offset + c) * n);
   return make_hull(corners);
 }
 
@@ -85,9 +86,10 @@ bool shift_inside(const Part& a, const Part& b, double on_boundary, Vec3& point)
   return false;
 }
 
-/// The planes through the vertex dual to a face of the first hull: its own three, and where more planes meet in one point,
-/// those of the faces around it that have the same dual.
-std::vector<int> planes_through(const ExpandingHull& dual, int face, std::span<const Vec3> vertex_of_face, double same) {
+/// The planes through the vertex dual to a face of the first hull: its own three, and where more planes meet in one
+/// point, those of the faces around it that have the same dual.
+std::vector<int> planes_through(const ExpandingHull& dual, int face, std::span<const Vec3> vertex_of_face,
+                                double same) {
   std::vector<int> planes, stack{face}, seen{face};
   while (!stack.empty()) {
     const ExpandingHull::Facet& facet = dual.facets[stack.back()];
@@ -103,8 +105,10 @@ std::vector<int> planes_through(const ExpandingHull& dual, int face, std::span<c
   return planes;
 }
 
-/// The source plane that a facet of the second hull lies in: of those through its corners, the one that all corners fit best.
-int plane_of_facet(const HullData& hull, int facet, std::span<const std::vector<int>> planes_at, std::span<const Plane> planes) {
+/// The source plane that a facet of the second hull lies in: of those through its corners, the one that all corners fit
+/// best.
+int plane_of_facet(const HullData& hull, int facet, std::span<const std::vector<int>> planes_at,
+                   std::span<const Plane> planes) {
   int best = -1;
   double least = std::numeric_limits<double>::infinity();
   for (int corner : hull.facet(facet)) {
@@ -118,7 +122,8 @@ int plane_of_facet(const HullData& hull, int facet, std::span<const std::vector<
   return best;
 }
 
-/// Steps 3 to 5: the dual points of all planes about `origin`, their hull, the dual of its faces, and the hull of those.
+/// Steps 3 to 5: the dual points of all planes about `origin`, their hull, the dual of its faces, and the hull of
+/// those.
 Intersection intersect_about(const Part& a, const Part& b, Vec3 origin) {
   ExpandingHull dual;
   std::vector<Plane> planes;
@@ -149,7 +154,8 @@ Intersection intersect_about(const Part& a, const Part& b, Vec3 origin) {
   std::vector<std::vector<int>> planes_at;
   for (int s : source) planes_at.push_back(planes_through(dual, face_of[s], vertex_of_face, 1e-9 * extent_of_vertices));
   Part part = placed_part({hull}, {{}, hull->origin}, -1);
-  for (int f = 0; f < static_cast<int>(part.owner.size()); ++f) part.owner[f] = owner[plane_of_facet(*hull, f, planes_at, planes)];
+  for (int f = 0; f < static_cast<int>(part.owner.size()); ++f)
+    part.owner[f] = owner[plane_of_facet(*hull, f, planes_at, planes)];
   return {Status::kOverlapping, std::move(part)};
 }
 

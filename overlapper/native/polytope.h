@@ -10,9 +10,9 @@
 namespace overlapper {
 
 /// A bounded polytope about the origin, as dual of a hull of dual points. Facet f is the polygon
-/// ring[ring_start[f] .. ring_start[f + 1]) of vertices, counter-clockwise from outside, in the plane dot(dual[f], x) = 1,
-/// that is plane number plane[f] of those that were dualised. Every vertex lies on exactly three facets: where more than
-/// three planes meet, vertices coincide and some ridges have no length.
+/// ring[ring_start[f] .. ring_start[f + 1]) of vertices, counter-clockwise from outside, in the plane dot(dual[f], x) =
+/// 1, that is plane number plane[f] of those that were dualised. Every vertex lies on exactly three facets: where more
+/// than three planes meet, vertices coincide and some ridges have no length.
 struct Polytope {
   std::vector<Vec3> vertices;
   std::vector<Vec3> dual;
@@ -34,9 +34,9 @@ Polytope polar_dual(const ExpandingHull& hull);
 /// Integrals over a solid that has the origin inside.
 struct Measures {
   double volume = 0;
-  Vec3 first_moment;         ///< ∫ x dV
+  Vec3 first_moment;                                    ///< ∫ x dV
   Mat3 second_moment{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};  ///< ∫ x xᵀ dV
-  std::vector<double> cone_volume;    ///< of the cone from the origin to each facet
+  std::vector<double> cone_volume;                      ///< of the cone from the origin to each facet
   std::vector<Vec3> facet_centroid;
 };
 

@@ -40,7 +40,8 @@ struct Expansion {
 /// a - b without rounding.
 Two exact_difference(double a, double b) { return two_sum(a, -b); }
 
-/// Adds sign * u * v * w, each factor an exact pair, without rounding: eight products of three doubles, four terms each.
+/// Adds sign * u * v * w, each factor an exact pair, without rounding: eight products of three doubles, four terms
+/// each.
 template <int Capacity>
 void add_product(Expansion<Capacity>& sum, double sign, Two u, Two v, Two w) {
   for (double p : {u.head, u.tail}) {
@@ -118,7 +119,8 @@ WideVector wide_cross(const WideVector& u, const WideVector& v) {
 
 Vec3 wide_polar_vertex(Vec3 a, Vec3 b, Vec3 c) {
   const WideVector normal = wide_cross(wide_difference(b, a), wide_difference(c, a));
-  const DoubleDouble height = normal.x * DoubleDouble{a.x} + normal.y * DoubleDouble{a.y} + normal.z * DoubleDouble{a.z};
+  const DoubleDouble height =
+      normal.x * DoubleDouble{a.x} + normal.y * DoubleDouble{a.y} + normal.z * DoubleDouble{a.z};
   return {normal.x.head / height.head, normal.y.head / height.head, normal.z.head / height.head};
 }
 

@@ -62,9 +62,7 @@ Plane Sphere::ray_exit(Vec3 origin, Vec3 direction) const {
   return tangent(origin + t * direction, {}, radius);
 }
 
-Plane Sphere::tightest(Vec3 point) const {
-  return tangent(norm2(point) > 0 ? point : Vec3{0, 0, 1}, {}, radius);
-}
+Plane Sphere::tightest(Vec3 point) const { return tangent(norm2(point) > 0 ? point : Vec3{0, 0, 1}, {}, radius); }
 
 Vec3 Box::support(Vec3 d) const {
   return {std::copysign(half_extents.x, d.x), std::copysign(half_extents.y, d.y), std::copysign(half_extents.z, d.z)};
@@ -152,7 +150,8 @@ Vec3 Hull::support(Vec3 direction) const {
 }
 
 Plane Hull::ray_exit(Vec3 origin, Vec3 direction) const {
-  return best_plane(data->planes, [&](const Plane& p) { return dot(p.normal, direction) / -signed_distance(p, origin); });
+  return best_plane(data->planes,
+                    [&](const Plane& p) { return dot(p.normal, direction) / -signed_distance(p, origin); });
 }
 
 Plane Hull::tightest(Vec3 point) const {
@@ -291,9 +290,7 @@ Bounds bounds(const Placed& placed) {
   if (const HalfSpace* half = std::get_if<HalfSpace>(&placed.shape)) {
     const Plane plane = placed.pose * half->plane;
     const Vec3 touch = plane.offset * plane.normal;
-    const auto limit = [&](int i, double side) {
-      return side * plane.normal[i] == 1 ? touch[i] : side * kInfinity;
-    };
+    const auto limit = [&](int i, double side) { return side * plane.normal[i] == 1 ? touch[i] : side * kInfinity; };
     return {{limit(0, -1), limit(1, -1), limit(2, -1)}, {limit(0, 1), limit(1, 1), limit(2, 1)}};
   }
   const auto reach = [&](int i, double side) { return placed.support(side * axis(i))[i]; };
@@ -304,8 +301,8 @@ Bounds bounds(const Placed& placed) {
 
 namespace {
 
-/// Subtracting it is exact: Sterbenz' lemma holds for coordinates within a factor of two of the middle, so the middle is
-/// used on an axis only where the points keep farther from zero than that.
+/// Subtracting it is exact: Sterbenz' lemma holds for coordinates within a factor of two of the middle, so the middle
+/// is used on an axis only where the points keep farther from zero than that.
 Vec3 lossless_origin(Vec3 lower, Vec3 upper) {
   const auto middle = [](double low, double high) {
     const double centre = low / 2 + high / 2;
@@ -314,13 +311,13 @@ Vec3 lossless_origin(Vec3 lower, Vec3 upper) {
   return {middle(lower.x, upper.x), middle(lower.y, upper.y), middle(lower.z, upper.z)};
 }
 
-/// Which facet each triangle of a hull belongs to. A triangle joins its neighbour's facet if it lies within rounding of the
-/// facet's plane, that of its largest triangle.
+/// Which facet each triangle of a hull belongs to. A triangle joins its neighbour's facet if it lies within rounding of
+/// the facet's plane, that of its largest triangle.
 struct CoplanarRegions {
   const ExpandingHull& hull;
   double rounding;
-  std::vector<int> region;       ///< per triangle of the hull, -1 for removed ones
-  std::vector<int> first;        ///< per region: its largest triangle
+  std::vector<int> region;  ///< per triangle of the hull, -1 for removed ones
+  std::vector<int> first;   ///< per region: its largest triangle
 
   Plane plane_of(int triangle) const {
     const auto& [a, b, c] = hull.facets[triangle].vertex;
@@ -415,7 +412,8 @@ Plane supporting_plane(const std::vector<Vec3>& vertices, std::span<const int> r
   return {normal, offset};
 }
 
-HullData hull_data(const ExpandingHull& hull, const std::vector<std::vector<int>>& loops, Vec3 origin, std::vector<int>* source) {
+HullData hull_data(const ExpandingHull& hull, const std::vector<std::vector<int>>& loops, Vec3 origin,
+                   std::vector<int>* source) {
   HullData data;
   data.origin = origin;
   std::vector<int> index(hull.points.size(), -1);
@@ -446,8 +444,8 @@ std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>
   for (Vec3 p : points) hull.points.push_back(p - origin);
   if (!hull.build()) return nullptr;
 
-  // Corners computed by a user as centre plus rotated half extents carry a few roundings each, relative to the extent; a
-  // plane through three of them misses a fourth by up to about eight of those.
+  // Corners computed by a user as centre plus rotated half extents carry a few roundings each, relative to the extent;
+  // a plane through three of them misses a fourth by up to about eight of those.
   const double rounding = 16 * DBL_EPSILON * max_component(max(abs(lower - origin), abs(upper - origin)));
   std::vector<std::vector<int>> loops = region_loops(merge_coplanar(hull, rounding));
   drop_edge_points(loops, static_cast<int>(hull.points.size()));

@@ -13,9 +13,13 @@ namespace overlapper {
 /// A closed convex solid, known only by asking. Directions need not be unit length.
 template <class T>
 concept ConvexOracle = requires(const T& shape, Vec3 point, Vec3 direction) {
-  { shape.support(direction) } -> std::same_as<Vec3>;           // a farthest point; ties are free
-  { shape.ray_exit(point, direction) } -> std::same_as<Plane>;  // supporting plane through which the ray leaves; point strictly inside
-  { shape.tightest(point) } -> std::same_as<Plane>;             // supporting plane with the least slack at the point, inside or out
+  { shape.support(direction) } -> std::same_as<Vec3>;  // a farthest point; ties are free
+  {
+    shape.ray_exit(point, direction)
+  } -> std::same_as<Plane>;  // supporting plane through which the ray leaves; point strictly inside
+  {
+    shape.tightest(point)
+  } -> std::same_as<Plane>;  // supporting plane with the least slack at the point, inside or out
 };
 
 struct Sphere {
@@ -62,8 +66,8 @@ struct HalfSpace {
 };
 
 /// What a convex polytope is made of. Facet f is the polygon ring[ring_start[f] .. ring_start[f + 1]) of vertices,
-/// counter-clockwise from outside, in the plane planes[f]. Coordinates are relative to `origin`: subtracting it lost no bit,
-/// and it keeps the digits of a hull that lies far from where its points are counted from.
+/// counter-clockwise from outside, in the plane planes[f]. Coordinates are relative to `origin`: subtracting it lost no
+/// bit, and it keeps the digits of a hull that lies far from where its points are counted from.
 struct HullData {
   Vec3 origin;
   std::vector<Vec3> vertices;
@@ -107,7 +111,8 @@ bool bounded(const Shape& shape);
 /// True for shapes with infinitely many supporting planes along their boundary: sphere, capsule, cylinder.
 bool smooth(const Shape& shape);
 
-/// All facet planes of a polytope; for a smooth shape a few of its tangent planes that already bound it. About the shape's origin.
+/// All facet planes of a polytope; for a smooth shape a few of its tangent planes that already bound it. About the
+/// shape's origin.
 void append_planes(const Shape& shape, std::vector<Plane>& planes);
 
 /// A smooth shape is its core (a point or a segment) grown by a radius; every other shape is its own core, of radius 0.

@@ -33,7 +33,8 @@ inline Vec3 min(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y)
 inline Vec3 max(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
 inline bool finite(Vec3 a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
 
-/// `a` scaled to length one; {0, 0, 0} stays as it is. Dividing by the largest component first keeps the squares in range.
+/// `a` scaled to length one; {0, 0, 0} stays as it is. Dividing by the largest component first keeps the squares in
+/// range.
 inline Vec3 unit(Vec3 a) {
   const double largest = max_component(abs(a));
   if (!(largest > 0)) return a;
