@@ -1,0 +1,137 @@
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "shape.h"
+
+/// numpy and the core, both ways.
+namespace overlapper::python {
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+using Vector = nb::ndarray<nb::numpy, const double, nb::ndim<1>>;
+using Matrix = nb::ndarray<nb::numpy, const double, nb::ndim<2>>;
+using Indices = nb::ndarray<nb::numpy, const int, nb::ndim<1>>;
+using IndexMatrix = nb::ndarray<nb::numpy, const int, nb::ndim<2>>;
+
+/// Hands a vector over to numpy, which frees it.
+template <class Array, class T>
+Array to_numpy(std::vector<T> values, std::initializer_list<size_t> shape) {
+  auto* owned = new std::vector<T>(std::move(values));
+  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  return Array(owned->data(), shape, owner);
+}
+
+inline Vector to_numpy(Vec3 v) { return to_numpy<Vector>(std::vector<double>{v.x, v.y, v.z}, {3}); }
+
+inline Matrix to_numpy(std::span<const Vec3> rows) {
+  std::vector<double> values;
+  values.reserve(3 * rows.size());
+  for (Vec3 v : rows) values.insert(values.end(), {v.x, v.y, v.z});
+  return to_numpy<Matrix>(std::move(values), {rows.size(), 3});
+}
+
+inline Indices to_numpy(std::span<const int> values) {
+  return to_numpy<Indices>(std::vector<int>(values.begin(), values.end()), {values.size()});
+}
+
+inline Matrix to_numpy(const Mat3& m) { return to_numpy(std::vector<Vec3>{m.row0, m.row1, m.row2}); }
+
+inline Matrix to_numpy(const Bounds& box) { return to_numpy(std::vector<Vec3>{box.lower, box.upper}); }
+
+/// Rows [normal, -offset], so that normal · x + b <= 0 inside: scipy's form.
+inline Matrix halfspace_rows(std::span<const Plane> planes) {
+  std::vector<double> values;
+  for (const Plane& p : planes) values.insert(values.end(), {p.normal.x, p.normal.y, p.normal.z, -p.offset});
+  return to_numpy<Matrix>(std::move(values), {planes.size(), 4});
+}
+
+inline nb::list polygons(std::span<const int> ring, std::span<const int> ring_start) {
+  nb::list list;
+  for (size_t f = 0; f + 1 < ring_start.size(); ++f)
+    list.append(nb::cast(to_numpy(ring.subspan(ring_start[f], ring_start[f + 1] - ring_start[f]))));
+  return list;
+}
+
+using Doubles = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
+
+[[noreturn]] inline void fail(const std::string& name, const std::string& reason) {
+  throw nb::value_error((name + " " + reason).c_str());
+}
+
+/// Any array_like as contiguous doubles. `expected` describes the shape wanted, for the message.
+inline Doubles to_doubles(nb::handle value, const std::string& name, const std::string& expected) {
+  try {
+    return nb::cast<Doubles>(nb::module_::import_("numpy").attr("ascontiguousarray")(value, "dtype"_a = "float64"));
+  } catch (nb::python_error& error) {
+    if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_TypeError)) throw;
+    fail(name, "must be " + expected);
+  }
+}
+
+inline std::string shape_text(const Doubles& array) {
+  std::string text = "(";
+  for (size_t i = 0; i < array.ndim(); ++i) text += (i ? ", " : "") + std::to_string(array.shape(i));
+  return text + (array.ndim() == 1 ? ",)" : ")");
+}
+
+inline Vec3 to_vec3(nb::handle value, const std::string& name) {
+  const Doubles array = to_doubles(value, name, "three numbers");
+  if (array.ndim() != 1 || array.shape(0) != 3)
+    fail(name, "must be three numbers, not an array of shape " + shape_text(array));
+  return {array.data()[0], array.data()[1], array.data()[2]};
+}
+
+inline Quaternion to_quaternion(nb::handle value) {
+  const Doubles array = to_doubles(value, "orientation", "a quaternion (x, y, z, w)");
+  if (array.ndim() != 1 || array.shape(0) != 4)
+    fail("orientation", "must be a quaternion (x, y, z, w), not an array of shape " + shape_text(array));
+  return {array.data()[0], array.data()[1], array.data()[2], array.data()[3]};
+}
+
+inline double to_double(nb::handle value, const std::string& name) {
+  try {
+    return nb::cast<double>(value.type().is(nb::handle((PyObject*)&PyFloat_Type))
+                                ? nb::borrow(value)
+                                : nb::module_::import_("builtins").attr("float")(value));
+  } catch (nb::python_error& error) {
+    if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_TypeError)) throw;
+    fail(name, "must be a number");
+  }
+}
+
+inline std::vector<Vec3> to_rows(nb::handle value, const std::string& name) {
+  const std::string expected = "an array of numbers of shape (n, 3)";
+  const Doubles array = to_doubles(value, name, expected);
+  if (array.ndim() != 2 || array.shape(1) != 3)
+    fail(name, "must be " + expected + ", not of shape " + shape_text(array));
+  std::vector<Vec3> rows(array.shape(0));
+  for (size_t i = 0; i < rows.size(); ++i)
+    rows[i] = {array.data()[3 * i], array.data()[3 * i + 1], array.data()[3 * i + 2]};
+  return rows;
+}
+
+/// A read-only property that makes a new array each time it is asked for.
+template <class Class, class Getter>
+void array_property(Class& cls, const char* name, Getter getter, const char* doc) {
+  cls.def_prop_ro(name, getter, nb::rv_policy::move, doc);
+}
+
+/// A shape as it came, or the hull of an (n, 3) array. TypeError or ValueError naming the argument.
+Shape to_shape(nb::handle value, const std::string& name);
+/// The same, placed at the origin unless it is a Placed.
+Placed to_placed(nb::handle value, const std::string& name);
+/// A number as printed in a repr.
+std::string number(double value);
+
+void define_shapes(nb::module_& m);
+void define_overlaps(nb::module_& m);
+
+}  // namespace overlapper::python

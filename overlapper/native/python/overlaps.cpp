@@ -1,0 +1,395 @@
+#include "candidates.h"
+#include "minkowski.h"
+#include "overlap.h"
+#include "python/arrays.h"
+
+namespace overlapper::python {
+namespace {
+
+const char* status_name(Status status) {
+  return status == Status::kSeparated ? "separated" : status == Status::kTouching ? "touching" : "overlapping";
+}
+
+Method to_method(const std::string& name) {
+  if (name == "auto") return Method::kAuto;
+  if (name == "paper") return Method::kPaper;
+  fail("method", "must be 'auto' or 'paper', not '" + name + "'");
+}
+
+bool solid(const Overlap& o) { return o.status() == Status::kOverlapping; }
+
+Matrix empty_rows(size_t columns) { return to_numpy<Matrix>(std::vector<double>{}, {0, columns}); }
+
+std::vector<Placed> to_bodies(nb::args shapes) {
+  std::vector<Placed> bodies;
+  for (size_t i = 0; i < shapes.size(); ++i)
+    bodies.push_back(to_placed(shapes[i], "shapes[" + std::to_string(i) + "]"));
+  return bodies;
+}
+
+Overlap make_overlap(std::vector<Placed> bodies, double tolerance, Method method) {
+  const nb::gil_scoped_release release;
+  return Overlap(std::move(bodies), tolerance, method);
+}
+
+/// Computes what the properties are about to read while other Python threads run.
+const Overlap& measured(const Overlap& o) {
+  if (solid(o)) {
+    const nb::gil_scoped_release release;
+    o.quantities();
+  }
+  return o;
+}
+
+IndexMatrix triangles(const Surface& surface) {
+  std::vector<int> indices;
+  for (size_t f = 0; f + 1 < surface.ring_start.size(); ++f) {
+    const auto ring = surface.facet(static_cast<int>(f));
+    for (size_t i = 1; i + 1 < ring.size(); ++i) indices.insert(indices.end(), {ring[0], ring[i], ring[i + 1]});
+  }
+  const size_t rows = indices.size() / 3;
+  return to_numpy<IndexMatrix>(std::move(indices), {rows, 3});
+}
+
+/// A property that is None for three or more bodies, or when `given` says so.
+template <class Getter, class Given>
+void contact_property(nb::class_<Overlap>& cls, const char* name, Given given, Getter getter, const nb::sig& sig,
+                      const char* doc) {
+  cls.def_prop_ro(
+      name,
+      [given, getter](const Overlap& o) -> nb::object {
+        if (!o.pair() || !given(o)) return nb::none();
+        return nb::cast(getter(o.contact()), nb::rv_policy::move);
+      },
+      sig, doc);
+}
+
+std::string repr(const Overlap& o) {
+  std::string text = "Overlap(" + std::string(status_name(o.status()));
+  if (solid(o))
+    text += ", volume=" + number(o.quantities().volume) + " ± " + number(o.quantities().volume_error) + " m³";
+  if (o.pair() && solid(o)) text += ", depth=" + number(o.contact().depth) + " m";
+  if (o.pair() && o.status() == Status::kSeparated) text += ", distance=" + number(o.contact().distance) + " m";
+  return text + ", " + std::to_string(o.bodies().size()) + " bodies)";
+}
+
+void define_contact(nb::class_<Overlap>& cls) {
+  const auto always = [](const Overlap&) { return true; };
+  const auto apart = [](const Overlap& o) { return !solid(o); };
+  using Contact = Overlap::Contact;
+  const nb::sig vector_or_none_normal("def normal(self) -> numpy.typing.NDArray[numpy.float64] | None");
+  contact_property(
+      cls, "normal", always, [](const Contact& c) { return to_numpy(c.normal); }, vector_or_none_normal,
+      "(3,) unit, from b to a as pybullet's contactNormalOnB: moving a by depth * normal separates an overlapping\n"
+      "pair. Also given for pairs that touch or are apart. None for three or more bodies.");
+  contact_property(
+      cls, "depth", always, [](const Contact& c) { return c.depth; }, nb::sig("def depth(self) -> float | None"),
+      "m, the least translation that separates the pair; 0 unless overlapping. None for three or more bodies.");
+  contact_property(
+      cls, "distance", always, [](const Contact& c) { return c.distance; },
+      nb::sig("def distance(self) -> float | None"),
+      "m between the nearest points; 0 unless separated. None for three or more bodies.");
+  contact_property(
+      cls, "witness_a", apart, [](const Contact& c) { return to_numpy(c.witness_a); },
+      nb::sig("def witness_a(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+      "(3,) the point of a nearest to b, with witness_a - witness_b = distance * normal. None if overlapping.");
+  contact_property(
+      cls, "witness_b", apart, [](const Contact& c) { return to_numpy(c.witness_b); },
+      nb::sig("def witness_b(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+      "(3,) the point of b nearest to a. None if overlapping.");
+  contact_property(
+      cls, "separating_plane", apart,
+      [](const Contact& c) {
+        const Vec3 n = c.separating.normal;
+        return to_numpy<Vector>(std::vector<double>{n.x, n.y, n.z, -c.separating.offset}, {4});
+      },
+      nb::sig("def separating_plane(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+      "(4,) [n, b] with n · x + b >= 0 on a and <= 0 on b, n the unit normal. None if overlapping.");
+}
+
+void define_measures(nb::class_<Overlap>& cls) {
+  cls.def_prop_ro(
+      "volume", [](const Overlap& o) { return solid(o) ? measured(o).quantities().volume : 0.0; },
+      "m³, the best estimate; 0 unless overlapping.");
+  cls.def_prop_ro(
+      "volume_error",
+      [](const Overlap& o) { return solid(o) ? measured(o).quantities().volume_error : o.touching_volume(); },
+      "m³, certified: the true volume is within volume ± volume_error. For polyhedra it bounds the rounding: every "
+      "plane\n"
+      "moved by 16 half-ulps of the coordinates' magnitude, times the area. For smooth shapes it is half the distance "
+      "of an\n"
+      "outer and an inner polytope, plus that. A pair that touches may hide a volume of rounding size. 0 if "
+      "separated.");
+  cls.def_prop_ro(
+      "area", [](const Overlap& o) { return solid(o) ? measured(o).quantities().area : 0.0; },
+      "m², of the surface of the common polytope; 0 unless overlapping.");
+  cls.def_prop_ro(
+      "centroid",
+      [](const Overlap& o) -> nb::object {
+        return solid(o) ? nb::cast(to_numpy(measured(o).quantities().centroid), nb::rv_policy::move) : nb::none();
+      },
+      nb::sig("def centroid(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+      "(3,) centre of the common volume, m; None unless overlapping.");
+  array_property(
+      cls, "inertia",
+      [](const Overlap& o) {
+        return solid(o) ? to_numpy(measured(o).quantities().inertia) : to_numpy(Mat3{{}, {}, {}});
+      },
+      "(3, 3) inertia tensor about the centroid at unit density, world axes, m⁵ (trimesh's moment_inertia); zeros "
+      "unless overlapping.");
+  array_property(
+      cls, "gradient",
+      [](const Overlap& o) {
+        std::vector<double> values;
+        for (const auto& row : o.gradient()) values.insert(values.end(), row.begin(), row.end());
+        return to_numpy<Matrix>(std::move(values), {o.bodies().size(), 6});
+      },
+      "(m, 6) d volume / d (translation, rotation vector about the body's own position) of each body, world axes: the "
+      "area vector\n"
+      "of the facets that the body owns, and its moment. m² and m³; zeros unless overlapping.");
+}
+
+void define_surface(nb::class_<Overlap>& cls) {
+  array_property(
+      cls, "vertices", [](const Overlap& o) { return solid(o) ? to_numpy(o.surface().vertices) : empty_rows(3); },
+      "(n, 3) corners of the common polytope, m; empty unless overlapping.");
+  array_property(
+      cls, "faces",
+      [](const Overlap& o) {
+        return solid(o) ? triangles(o.surface()) : to_numpy<IndexMatrix>(std::vector<int>{}, {0, 3});
+      },
+      "(k, 3) the facets as triangles, counter-clockwise from outside: indices into vertices.");
+  cls.def_prop_ro(
+      "facets",
+      [](const Overlap& o) { return solid(o) ? polygons(o.surface().ring, o.surface().ring_start) : nb::list(); },
+      nb::sig("def facets(self) -> list[numpy.typing.NDArray[numpy.int32]]"),
+      "Indices of the vertices around each facet, counter-clockwise from outside.");
+  array_property(
+      cls, "halfspaces", [](const Overlap& o) { return solid(o) ? halfspace_rows(o.surface().planes) : empty_rows(4); },
+      "(f, 4) rows [n, b], one per facet: n · x + b <= 0 inside, n unit (scipy's form).");
+  array_property(
+      cls, "owner",
+      [](const Overlap& o) {
+        return to_numpy(std::span<const int>(solid(o) ? o.surface().owner : std::vector<int>{}));
+      },
+      "(f,) which of the shapes each facet belongs to.");
+  cls.def_prop_ro(
+      "patch",
+      [](const Overlap& o) {
+        nb::list list;
+        if (solid(o))
+          for (const auto& polygon : o.surface().patch) list.append(nb::cast(to_numpy(polygon), nb::rv_policy::move));
+        return list;
+      },
+      nb::sig("def patch(self) -> list[numpy.typing.NDArray[numpy.float64]]"),
+      "Closed polygons (k, 3) along the ridges where the owner changes, the first point not repeated. For a pair they "
+      "go\n"
+      "counter-clockwise around a's part of the surface; for more bodies, around the part of each.");
+  cls.def_prop_ro(
+      "bounds",
+      [](const Overlap& o) -> nb::object {
+        if (!solid(o)) return nb::none();
+        const auto& vertices = o.surface().vertices;
+        Bounds box{vertices[0], vertices[0]};
+        for (Vec3 v : vertices) box = {min(box.lower, v), max(box.upper, v)};
+        return nb::cast(to_numpy(box), nb::rv_policy::move);
+      },
+      nb::sig("def bounds(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+      "(2, 3) lower and upper corner of the box around the common polytope; None unless overlapping.");
+}
+
+void define_overlap(nb::module_& m) {
+  nb::class_<Overlap> cls(
+      m, "Overlap",
+      "What two or more convex shapes share. True only if they overlap.\n\n"
+      "Immutable; each quantity is computed when first asked for. SI units, world coordinates. For smooth shapes the\n"
+      "polytope contains the common set and could shrink into it by the fraction `tolerance`.");
+  cls.def_prop_ro(
+      "status", [](const Overlap& o) { return status_name(o.status()); },
+      nb::sig("def status(self) -> typing.Literal['separated', 'touching', 'overlapping']"),
+      "'touching' if rounding cannot tell whether the common set has an inside.");
+  cls.def("__bool__", [](const Overlap& o) { return solid(o); });
+  cls.def_prop_ro(
+      "shapes",
+      [](const Overlap& o) {
+        nb::list list;
+        for (const Placed& p : o.bodies()) list.append(nb::cast(p));
+        return nb::tuple(list);
+      },
+      nb::sig("def shapes(self) -> tuple[Placed, ...]"), "The bodies in the order given.");
+  cls.def_prop_ro("tolerance", &Overlap::tolerance);
+  cls.def_prop_ro(
+      "method", [](const Overlap& o) { return o.method() == Method::kAuto ? "auto" : "paper"; },
+      nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
+  cls.def_prop_ro(
+      "facets_touched", [](const Overlap& o) { return solid(o) ? o.region().facets_touched : 0; },
+      "How many planes of the shapes took part in building the polytope.");
+  define_measures(cls);
+  define_surface(cls);
+  define_contact(cls);
+  cls.def("__repr__", [](const Overlap& o) { return repr(o); });
+  cls.def("__copy__", [](nb::handle self) { return nb::borrow(self); });
+  cls.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
+  cls.def(
+      "__reduce__",
+      [](nb::handle self) {
+        const nb::object again =
+            nb::module_::import_("functools")
+                .attr("partial")(nb::module_::import_("overlapper._core").attr("overlap"),
+                                 "tolerance"_a = self.attr("tolerance"), "method"_a = self.attr("method"));
+        return nb::make_tuple(again, self.attr("shapes"));
+      },
+      nb::sig("def __reduce__(self) -> tuple[object, tuple[Placed, ...]]"));
+}
+
+std::pair<Placed, Placed> relative_pair(nb::handle a, nb::handle b) {
+  const Placed placed_a = to_placed(a, "a"), placed_b = to_placed(b, "b");
+  const Vec3 reference = placed_a.pose.translation;
+  return {placed_a.seen_from(reference), placed_b.seen_from(reference)};
+}
+
+double union_ratio(nb::handle a, nb::handle b, double tolerance) {
+  const Overlap common = make_overlap({to_placed(a, "a"), to_placed(b, "b")}, tolerance, Method::kAuto);
+  if (!solid(common)) return 0;
+  const double shared = measured(common).quantities().volume;
+  const double both = volume(common.bodies()[0].shape) + volume(common.bodies()[1].shape) - shared;
+  return std::min(1.0, shared / both);
+}
+
+void define_functions(nb::module_& m) {
+  m.def(
+      "overlap",
+      [](nb::args shapes, double tolerance, const std::string& method) {
+        return make_overlap(to_bodies(shapes), tolerance, to_method(method));
+      },
+      "shapes"_a, "tolerance"_a = 1e-3, "method"_a = "auto",
+      nb::sig("def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | "
+              "numpy.typing.ArrayLike, "
+              "tolerance: float = 0.001, method: typing.Literal['auto', 'paper'] = 'auto') -> Overlap"),
+      "The common set of two or more convex shapes.\n\n"
+      "Each is a Placed, a bare shape, or an (n, 3) array of points, which stands for their hull. `tolerance`, between "
+      "0 and 1,\n"
+      "is the fraction by which the polytope may have to shrink to fit inside smooth shapes; polyhedra are exact "
+      "whatever it is.\n"
+      "No overlap is an answer, not an error. Raises ValueError if the common set is unbounded.\n\n"
+      "method 'auto' grows the hull of the dual points about a point well inside, in a frame in which the common set "
+      "is round.\n"
+      "method 'paper' is that of Tereshchenko, Chevokin and Fisunenko, 'Algorithm for finding the domain intersection "
+      "of a set of\n"
+      "polytopes' (ICCS 2013), step for step and with what it loses: GJK with witness points gives a common point; on "
+      "a boundary\n"
+      "it is shifted by a minimal step (2^-26 of the smaller polytope) along one of 26 directions; the hull of the "
+      "dual points of\n"
+      "all face planes, the dual of that hull's faces, and their hull follow; more than two bodies pairwise by divide "
+      "and conquer.\n"
+      "It departs from the text in tessellating smooth shapes from inside, in replacing half-spaces by large boxes, "
+      "and in\n"
+      "deciding by exact signs inside its hulls. Where no shift lands inside, it says 'touching'.");
+  m.def(
+      "distance",
+      [](nb::handle a, nb::handle b) {
+        const auto [p, q] = relative_pair(a, b);
+        return std::max(0.0, distance(p, q).distance);
+      },
+      "a"_a, "b"_a,
+      nb::sig("def distance(a: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike, "
+              "b: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float"),
+      "Distance (m) of the nearest points of two shapes; 0 if they touch or overlap.");
+  m.def(
+      "penetration_depth",
+      [](nb::handle a, nb::handle b) {
+        const auto [p, q] = relative_pair(a, b);
+        return std::max(0.0, penetration(p, q).depth);
+      },
+      "a"_a, "b"_a,
+      nb::sig("def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | "
+              "numpy.typing.ArrayLike, "
+              "b: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float"),
+      "Length (m) of the least translation that separates two shapes; 0 if they do not overlap. Positive where "
+      "pybullet's contact\n"
+      "distance is negative. Raises ValueError for two half-spaces.");
+  m.def(
+      "iou", [](nb::handle a, nb::handle b, double tolerance) { return union_ratio(a, b, tolerance); }, "a"_a, "b"_a,
+      "tolerance"_a = 1e-3,
+      nb::sig("def iou(a: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike, "
+              "b: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: "
+              "float = 0.001) -> float"),
+      "Intersection over union of two shapes: common volume over the volume of their union, from 0 to 1.");
+}
+
+std::vector<Placed> place_all(nb::list shapes, nb::handle positions, nb::handle orientations) {
+  const Doubles p = to_doubles(positions, "positions", "an array of shape (k, 3)");
+  const Doubles q = to_doubles(orientations, "orientations", "an array of shape (k, 4)");
+  const size_t k = shapes.size();
+  if (p.ndim() != 2 || p.shape(0) != k || p.shape(1) != 3)
+    fail("positions", "must have the shape (k, 3), one row per shape");
+  if (q.ndim() != 2 || q.shape(0) != k || q.shape(1) != 4)
+    fail("orientations", "must have the shape (k, 4), one row per shape");
+  std::vector<Placed> placed;
+  placed.reserve(k);
+  for (size_t i = 0; i < k; ++i) {
+    const double *x = p.data() + 3 * i, *r = q.data() + 4 * i;
+    placed.push_back(make_placed(to_shape(shapes[i], "shapes[" + std::to_string(i) + "]"), {x[0], x[1], x[2]},
+                                 {r[0], r[1], r[2], r[3]}));
+  }
+  return placed;
+}
+
+nb::list overlap_pairs(nb::list shapes, nb::handle positions, nb::handle orientations, nb::handle pairs,
+                       double tolerance, const std::string& method_name) {
+  const std::vector<Placed> placed = place_all(shapes, positions, orientations);
+  const Method method = to_method(method_name);
+  const auto index = nb::cast<nb::ndarray<const int, nb::c_contig, nb::device::cpu>>(
+      nb::module_::import_("numpy").attr("ascontiguousarray")(pairs, "dtype"_a = "int32"));
+  if (index.ndim() != 2 || index.shape(1) != 2) fail("pairs", "must have the shape (p, 2)");
+  std::vector<Overlap> overlaps;
+  overlaps.reserve(index.shape(0));
+  for (size_t i = 0; i < 2 * index.shape(0); ++i)
+    if (index.data()[i] < 0 || index.data()[i] >= static_cast<int>(placed.size()))
+      fail("pairs", "must index the shapes");
+  {
+    const nb::gil_scoped_release release;
+    for (size_t i = 0; i < index.shape(0); ++i)
+      overlaps.emplace_back(std::vector<Placed>{placed[index.data()[2 * i]], placed[index.data()[2 * i + 1]]},
+                            tolerance, method);
+  }
+  nb::list list;
+  for (Overlap& o : overlaps) list.append(nb::cast(std::move(o)));
+  return list;
+}
+
+void define_batch(nb::module_& m) {
+  m.def(
+      "candidate_pairs",
+      [](nb::list shapes, nb::handle positions, nb::handle orientations) {
+        std::vector<int> flat;
+        for (const auto& pair : candidate_pairs(place_all(shapes, positions, orientations)))
+          flat.insert(flat.end(), pair.begin(), pair.end());
+        const size_t rows = flat.size() / 2;
+        return to_numpy<IndexMatrix>(std::move(flat), {rows, 2});
+      },
+      nb::rv_policy::move, "shapes"_a, "positions"_a, "orientations"_a,
+      nb::sig("def candidate_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: "
+              "numpy.typing.ArrayLike, "
+              "orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]"),
+      "(p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that "
+      "reaches into it;\n"
+      "two half-spaces are no pair.");
+  m.def("overlap_pairs", &overlap_pairs, "shapes"_a, "positions"_a, "orientations"_a, "pairs"_a, "tolerance"_a = 1e-3,
+        "method"_a = "auto",
+        nb::sig("def overlap_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: "
+                "numpy.typing.ArrayLike, "
+                "orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike, tolerance: float = 0.001, "
+                "method: typing.Literal['auto', 'paper'] = 'auto') -> list[Overlap]"),
+        "overlap() of each pair (p, 2) of the shapes at positions (k, 3) and orientations (k, 4), in one call.");
+}
+
+}  // namespace
+
+void define_overlaps(nb::module_& m) {
+  define_overlap(m);
+  define_functions(m);
+  define_batch(m);
+}
+
+}  // namespace overlapper::python

@@ -1,0 +1,300 @@
+#include <sstream>
+
+#include "polytope.h"
+#include "python/arrays.h"
+
+namespace overlapper::python {
+namespace {
+
+template <class T>
+nb::object wrap(const T& value) {
+  return nb::cast(value);
+}
+
+nb::object to_python(const Shape& shape) {
+  return std::visit([](const auto& s) { return wrap(s); }, shape);
+}
+
+template <class... Types>
+bool try_shapes(nb::handle value, Shape& shape, std::variant<Types...>*) {
+  return ((nb::isinstance<Types>(value) && (shape = nb::cast<Types>(value), true)) || ...);
+}
+
+bool is_shape(nb::handle value, Shape& shape) { return try_shapes(value, shape, static_cast<Shape*>(nullptr)); }
+
+}  // namespace
+
+Shape to_shape(nb::handle value, const std::string& name) {
+  Shape shape;
+  if (is_shape(value, shape)) return shape;
+  if (nb::isinstance<Placed>(value))
+    throw nb::type_error((name + " must be a bare shape, it is already placed").c_str());
+  const bool array_like = PySequence_Check(value.ptr()) || nb::hasattr(value, "__array__");
+  if (!array_like || nb::isinstance<nb::str>(value) || nb::isinstance<nb::bytes>(value))
+    throw nb::type_error((name + " must be a shape or an (n, 3) array of points, not " +
+                          nb::cast<std::string>(value.type().attr("__name__")))
+                             .c_str());
+  return make_hull(to_rows(value, name));
+}
+
+Placed to_placed(nb::handle value, const std::string& name) {
+  if (nb::isinstance<Placed>(value)) return nb::cast<Placed>(value);
+  return make_placed(to_shape(value, name), {}, {});
+}
+
+std::string number(double value) {
+  std::ostringstream text;
+  text.precision(6);
+  text << value;
+  return text.str();
+}
+
+namespace {
+
+std::string tuple_text(std::initializer_list<double> values) {
+  std::string text = "(";
+  for (double v : values) text += (text.size() > 1 ? ", " : "") + number(v);
+  return text + ")";
+}
+
+std::string text(Vec3 v) { return tuple_text({v.x, v.y, v.z}); }
+
+std::string repr(const Sphere& s) { return "Sphere(radius=" + number(s.radius) + ")"; }
+std::string repr(const Box& b) { return "Box(half_extents=" + text(b.half_extents) + ")"; }
+std::string repr(const Capsule& c) {
+  return "Capsule(radius=" + number(c.radius) + ", length=" + number(c.length) + ")";
+}
+std::string repr(const Cylinder& c) {
+  return "Cylinder(radius=" + number(c.radius) + ", length=" + number(c.length) + ")";
+}
+std::string repr(const Hull& h) {
+  return "Hull(" + std::to_string(h.data->vertices.size()) + " vertices, " + std::to_string(h.data->planes.size()) +
+         " facets)";
+}
+std::string repr(const HalfSpace& h) {
+  return "HalfSpace(normal=" + text(h.plane.normal) + ", offset=" + number(h.plane.offset) + ")";
+}
+std::string repr(const Shape& shape) {
+  return std::visit([](const auto& s) { return repr(s); }, shape);
+}
+std::string repr(const Placed& p) {
+  return "Placed(" + repr(p.shape) + ", position=" + text(p.position) +
+         ", orientation=" + tuple_text({p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w}) + ")";
+}
+
+Vec3 world_origin(const Hull& hull) { return hull.data->origin; }
+
+/// What all shapes share: measures, printing, copies that are the same object.
+template <class T>
+void define_common(nb::class_<T>& cls) {
+  cls.def_prop_ro("volume", [](const T& s) { return volume(Shape(s)); }, "Volume in m³; infinite for a half-space.");
+  array_property(
+      cls, "centroid",
+      [](const T& s) {
+        if constexpr (std::is_same_v<T, Hull>) return to_numpy(centroid(s) + world_origin(s));
+        else return to_numpy(centroid(Shape(s)));
+      },
+      "(3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.");
+  array_property(
+      cls, "bounds", [](const T& s) { return to_numpy(bounds(make_placed(s, {}, {}))); },
+      "(2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.");
+  cls.def("__repr__", [](const T& s) { return repr(s); });
+  cls.def("__copy__", [](nb::handle self) { return nb::borrow(self); });
+  cls.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
+}
+
+/// Pickles a shape as the arguments of its constructor.
+template <class T, class Arguments>
+void define_pickle(nb::class_<T>& cls, Arguments arguments) {
+  cls.def(
+      "__reduce__",
+      [arguments](nb::handle self) { return nb::make_tuple(self.type(), arguments(nb::cast<const T&>(self))); },
+      nb::sig("def __reduce__(self) -> tuple[type, tuple[object, ...]]"));
+}
+
+/// A hull travels as it was built, so that indices into its facets mean the same in another process.
+nb::tuple hull_state(const Hull& hull) {
+  const HullData& d = *hull.data;
+  return nb::make_tuple(nb::cast(to_numpy(d.origin), nb::rv_policy::move),
+                        nb::cast(to_numpy(d.vertices), nb::rv_policy::move),
+                        nb::cast(halfspace_rows(d.planes), nb::rv_policy::move),
+                        nb::cast(to_numpy(std::span<const int>(d.ring)), nb::rv_policy::move),
+                        nb::cast(to_numpy(std::span<const int>(d.ring_start)), nb::rv_policy::move));
+}
+
+Hull hull_from_state(nb::tuple state) {
+  auto data = std::make_shared<HullData>();
+  data->origin = to_vec3(state[0], "origin");
+  data->vertices = to_rows(state[1], "vertices");
+  const Doubles planes = to_doubles(state[2], "planes", "an array of shape (k, 4)");
+  for (size_t i = 0; i < planes.shape(0); ++i) {
+    const double* row = planes.data() + 4 * i;
+    data->planes.push_back({{row[0], row[1], row[2]}, -row[3]});
+  }
+  const auto integers = [](nb::handle value) {
+    const auto array = nb::cast<nb::ndarray<const int, nb::ndim<1>, nb::c_contig, nb::device::cpu>>(value);
+    return std::vector<int>(array.data(), array.data() + array.shape(0));
+  };
+  data->ring = integers(state[3]);
+  data->ring_start = integers(state[4]);
+  const HullMeasures measures = measure(*data);
+  data->volume = measures.volume;
+  data->centroid = measures.centroid;
+  return {std::move(data)};
+}
+
+void define_shape_types(nb::module_& m) {
+  nb::class_<Sphere> sphere(m, "Sphere", "A ball of the given radius (m) about the origin.");
+  sphere.def(
+      "__init__", [](Sphere* self, nb::handle radius) { new (self) Sphere(make_sphere(to_double(radius, "radius"))); },
+      "radius"_a.none(), nb::sig("def __init__(self, radius: float) -> None"));
+  sphere.def_ro("radius", &Sphere::radius, "m");
+  define_common(sphere);
+  define_pickle(sphere, [](const Sphere& s) { return nb::make_tuple(s.radius); });
+
+  nb::class_<Box> box(m, "Box", "A box about the origin with half extents (m) along x, y, z.");
+  box.def(
+      "__init__",
+      [](Box* self, nb::handle half_extents) { new (self) Box(make_box(to_vec3(half_extents, "half_extents"))); },
+      "half_extents"_a.none(), nb::sig("def __init__(self, half_extents: numpy.typing.ArrayLike) -> None"));
+  array_property(box, "half_extents", [](const Box& b) { return to_numpy(b.half_extents); }, "(3,) m");
+  define_common(box);
+  define_pickle(box, [](const Box& b) {
+    return nb::make_tuple(nb::make_tuple(b.half_extents.x, b.half_extents.y, b.half_extents.z));
+  });
+
+  nb::class_<Capsule> capsule(
+      m, "Capsule",
+      "All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.\n\n"
+      "As in pybullet, `length` lies between the centres of the caps; it may be 0.");
+  capsule.def(
+      "__init__",
+      [](Capsule* self, nb::handle radius, nb::handle length) {
+        new (self) Capsule(make_capsule(to_double(radius, "radius"), to_double(length, "length")));
+      },
+      "radius"_a.none(), "length"_a.none(), nb::sig("def __init__(self, radius: float, length: float) -> None"));
+  capsule.def_ro("radius", &Capsule::radius, "m");
+  capsule.def_ro("length", &Capsule::length, "m, between the centres of the caps");
+  define_common(capsule);
+  define_pickle(capsule, [](const Capsule& c) { return nb::make_tuple(c.radius, c.length); });
+
+  nb::class_<Cylinder> cylinder(m, "Cylinder",
+                                "A cylinder of `radius` (m) and `length` (m) along local z, about the origin.");
+  cylinder.def(
+      "__init__",
+      [](Cylinder* self, nb::handle radius, nb::handle length) {
+        new (self) Cylinder(make_cylinder(to_double(radius, "radius"), to_double(length, "length")));
+      },
+      "radius"_a.none(), "length"_a.none(), nb::sig("def __init__(self, radius: float, length: float) -> None"));
+  cylinder.def_ro("radius", &Cylinder::radius, "m");
+  cylinder.def_ro("length", &Cylinder::length, "m");
+  define_common(cylinder);
+  define_pickle(cylinder, [](const Cylinder& c) { return nb::make_tuple(c.radius, c.length); });
+
+  nb::class_<HalfSpace> half(m, "HalfSpace",
+                             "The closed half-space { x : normal · x <= offset }.\n\n"
+                             "`normal` may have any length but 0; both it and `offset` are divided by it.");
+  half.def(
+      "__init__",
+      [](HalfSpace* self, nb::handle normal, nb::handle offset) {
+        new (self) HalfSpace(make_half_space(to_vec3(normal, "normal"), to_double(offset, "offset")));
+      },
+      "normal"_a.none(), "offset"_a.none(),
+      nb::sig("def __init__(self, normal: numpy.typing.ArrayLike, offset: float) -> None"));
+  array_property(
+      half, "normal", [](const HalfSpace& h) { return to_numpy(h.plane.normal); }, "(3,) unit, out of the solid");
+  half.def_prop_ro("offset", [](const HalfSpace& h) { return h.plane.offset; }, "m along the unit normal");
+  define_common(half);
+  define_pickle(half, [](const HalfSpace& h) {
+    const Vec3 n = h.plane.normal;
+    return nb::make_tuple(nb::make_tuple(n.x, n.y, n.z), h.plane.offset);
+  });
+
+  nb::class_<Hull> hull(
+      m, "Hull",
+      "The convex hull of (n, 3) points (m).\n\n"
+      "Interior, duplicate and coplanar points are welcome; coplanar triangles become one facet. Raises\n"
+      "ValueError for fewer than four points, for points that are not finite and for points in one plane.");
+  hull.def(
+      "__init__", [](Hull* self, nb::handle vertices) { new (self) Hull(make_hull(to_rows(vertices, "vertices"))); },
+      "vertices"_a.none(), nb::sig("def __init__(self, vertices: numpy.typing.ArrayLike) -> None"));
+  array_property(
+      hull, "vertices",
+      [](const Hull& h) {
+        std::vector<Vec3> vertices;
+        for (Vec3 v : h.data->vertices) vertices.push_back(v + h.data->origin);
+        return to_numpy(vertices);
+      },
+      "(n, 3) the corners only, m");
+  hull.def_prop_ro(
+      "facets", [](const Hull& h) { return polygons(h.data->ring, h.data->ring_start); },
+      nb::sig("def facets(self) -> list[numpy.typing.NDArray[numpy.int32]]"),
+      "Indices of the vertices around each facet, counter-clockwise from outside.");
+  array_property(
+      hull, "halfspaces",
+      [](const Hull& h) {
+        std::vector<Plane> planes = h.data->planes;
+        for (Plane& p : planes) p.offset += dot(p.normal, h.data->origin);
+        return halfspace_rows(planes);
+      },
+      "(k, 4) rows [n, b], one per facet: n · x + b <= 0 inside, n unit (scipy's form).");
+  define_common(hull);
+  hull.def("__getstate__", &hull_state, nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+  hull.def(
+      "__setstate__", [](Hull& self, nb::tuple state) { new (&self) Hull(hull_from_state(state)); },
+      nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
+}
+
+void define_placed(nb::module_& m) {
+  nb::class_<Placed> placed(
+      m, "Placed",
+      "A shape and where it is in the world.\n\n"
+      "position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0.");
+  placed.def(
+      "__init__",
+      [](Placed* self, nb::handle shape, nb::handle position, nb::handle orientation) {
+        new (self)
+            Placed(make_placed(to_shape(shape, "shape"), to_vec3(position, "position"), to_quaternion(orientation)));
+      },
+      "shape"_a.none(), "position"_a.none() = nb::make_tuple(0.0, 0.0, 0.0),
+      "orientation"_a.none() = nb::make_tuple(0.0, 0.0, 0.0, 1.0),
+      nb::sig("def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | "
+              "numpy.typing.ArrayLike, position: "
+              "numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None"));
+  placed.def_prop_ro(
+      "shape", [](const Placed& p) { return to_python(p.shape); },
+      nb::sig("def shape(self) -> Box | Sphere | Capsule | Cylinder | Hull | HalfSpace"));
+  array_property(placed, "position", [](const Placed& p) { return to_numpy(p.position); }, "(3,) m");
+  array_property(
+      placed, "orientation",
+      [](const Placed& p) {
+        return to_numpy<Vector>(std::vector<double>{p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w},
+                                {4});
+      },
+      "(4,) unit quaternion x, y, z, w");
+  placed.def_prop_ro("volume", [](const Placed& p) { return volume(p.shape); }, "m³; infinite for a half-space");
+  array_property(
+      placed, "centroid", [](const Placed& p) { return to_numpy(p.pose * centroid(p.shape)); }, "(3,) in the world, m");
+  array_property(
+      placed, "bounds", [](const Placed& p) { return to_numpy(bounds(p)); },
+      "(2, 3) lower and upper corner of the box around it in the world, m");
+  placed.def("__repr__", [](const Placed& p) { return repr(p); });
+  placed.def(
+      "__reduce__",
+      [](nb::handle self) {
+        return nb::make_tuple(self.type(),
+                              nb::make_tuple(self.attr("shape"), self.attr("position"), self.attr("orientation")));
+      },
+      nb::sig("def __reduce__(self) -> tuple[type, tuple[object, ...]]"));
+  placed.def("__copy__", [](nb::handle self) { return nb::borrow(self); });
+  placed.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
+}
+
+}  // namespace
+
+void define_shapes(nb::module_& m) {
+  define_shape_types(m);
+  define_placed(m);
+}
+
+}  // namespace overlapper::python
