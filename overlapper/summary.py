@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
+from decimal import ROUND_UP, Context
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
@@ -16,6 +18,10 @@ from overlapper.simulation import Contact, Report, Skipped
 
 # Units for the volumes of one table, in m³: the largest of them that makes the largest volume a tenth or more.
 VOLUME_UNITS = {"m³": 1.0, "cm³": 1e-6, "mm³": 1e-9, "µm³": 1e-18}
+
+
+# One digit of an error bound, which must remain one.
+ROUNDED_UP = Context(prec=1, rounding=ROUND_UP)
 
 
 @dataclass(slots=True)
@@ -139,17 +145,22 @@ def overlaps_table(summary: Summary, limit: int = 20) -> Table:
         caption="Volume: the largest in any step, true to within ±. Depth: the shortest way to part the two, in the "
         "step where that is longest. Normal: that way, for the first of them." + left_out,
         caption_justify="left",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+        collapse_padding=True,
     )
+    # Two lines a pair and narrow numbers, so that a terminal of 80 columns holds the table.
     table.add_column("pair of links", overflow="fold")
-    for header in ("steps", f"volume {unit}", f"± {unit}", "depth mm", "normal x, y, z", "at step"):
+    for header in ("steps", f"volume\n{unit}", f"±\n{unit}", "depth\nmm", "normal\nx, y, z", "at\nstep"):
         table.add_column(header, justify="right", no_wrap=True)
     for pair in pairs[:limit]:
         table.add_row(
-            Text(" – ".join(pair.names)),
+            Text("\n ".join(pair.names)),
             str(pair.steps),
             f"{pair.volume / VOLUME_UNITS[unit]:.4g}",
-            f"{pair.volume_error / VOLUME_UNITS[unit]:.1e}",
-            f"{1e3 * pair.depth:.4g}",
+            f"{ROUNDED_UP.create_decimal(pair.volume_error / VOLUME_UNITS[unit]):e}",
+            f"{1e3 * pair.depth:.3g}",
             " ".join(f"{round(component, 2) + 0.0:+.2f}" for component in pair.normal),
             str(pair.depth_step),
         )
