@@ -2,7 +2,7 @@
 
 VENV := .venv
 SCENE := franka_grasp
-NATIVE := $(wildcard overlapper/native/*)
+NATIVE := $(shell find overlapper/native -type f)
 
 .PHONY: run test lint format clean
 
