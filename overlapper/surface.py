@@ -83,13 +83,13 @@ def _box(shape: Box) -> tuple[Array, Facets]:
 
 
 def _creases(vertices: Array, facets: Facets) -> Array:
-    """The edges where two facets, counter-clockwise from outside, meet at an angle of more than 20°."""
+    """The edges where two facets, counter-clockwise from outside, meet at an angle of more than 40°."""
     normals: dict[tuple[int, int], Array] = {}
     for ring in facets:
         corners = vertices[ring]
         normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
         normals.update(dict.fromkeys(zip(ring, np.roll(ring, -1), strict=True), normal / np.linalg.norm(normal)))
-    smooth = np.cos(np.deg2rad(20))
+    smooth = np.cos(np.deg2rad(40))
     creases = [(i, j) for (i, j), normal in normals.items() if i < j and normal @ normals[j, i] < smooth]
     edges: Array = vertices[np.array(creases, dtype=int).reshape(-1, 2)]
     return edges

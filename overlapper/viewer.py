@@ -42,7 +42,15 @@ except ImportError as missing:
 Array = NDArray[np.float64]
 
 BODIES, OVERLAPS = "/overlapper/bodies", "/overlapper/overlaps"
-OWNER_COLORS = (0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442, 0xCC79A7, 0xD55E00, 0x0072B2)
+OWNER_COLORS = [
+    (0.90, 0.62, 0.00),
+    (0.34, 0.71, 0.91),
+    (0.00, 0.62, 0.45),
+    (0.94, 0.89, 0.26),
+    (0.80, 0.47, 0.65),
+    (0.84, 0.37, 0.00),
+    (0.00, 0.45, 0.70),
+]
 BODY_OPACITY = 0.35
 INK = 0xFF4FA3  # for what shines through: a colour that models hardly ever have
 MANY_FACETS = 300  # more than are seen: what is round is drawn within 3 % of its size, with a fraction of them
@@ -146,7 +154,8 @@ class Recording:
     """A run as one self-contained HTML file with a time slider; made without a server, read without a network.
 
     The page shows one recorded frame at a time and never a mixture of two, so the bodies drawn are those that made the
-    overlaps drawn. `recording.html#t=0.25` opens at that time, paused. About 30 frames a second are enough to look at.
+    overlaps drawn. `recording.html#t=0.25` opens at that time, paused; `#t=0.25&from=1,0,1&at=0,0,0.5` with the camera
+    at one point of the world and turned to another. About 30 frames a second are enough to look at.
     """
 
     def __init__(self) -> None:
@@ -291,13 +300,14 @@ class _Stage:
         lower, upper = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
         self.center = (lower + upper) / 2
         self.size = float(np.linalg.norm(upper - lower))
-        self._owner_skins = [_skin(paint, flat=True, emissive=paint, emissiveIntensity=0.15) for paint in OWNER_COLORS]
+        # Mostly of their own light, so that an owner is known from the shaded side, too.
+        self._owner_skins = [_skin(_rgb(color, 0.7), flat=True, emissive=_rgb(color, 0.4)) for color in OWNER_COLORS]
         through_everything = {"color": INK, "transparent": True, "depthTest": False}
         self._shining = geometry.LineBasicMaterial(**through_everything)
         self._dot = geometry.Points(
             _lines(np.zeros((1, 1, 3))), _DotMaterial(size=5, sizeAttenuation=False, **through_everything)
         )
-        head = cone(radius=0.08, bottom=0.7, top=1.0)
+        head = cone(radius=0.05, bottom=0.8, top=1.0)
         self._arrowhead = geometry.Mesh(
             _Mesh(head.vertices, head.faces), geometry.MeshBasicMaterial(**through_everything)
         )
@@ -517,8 +527,9 @@ def _row(pair: tuple[str, str], overlap: Overlap) -> dict[str, Any]:
     }
 
 
-def _rgb(color: Sequence[float]) -> int:
-    red, green, blue = (round(255 * min(max(part, 0.0), 1.0)) for part in color[:3])
+def _rgb(color: Sequence[float], brightness: float = 1.0) -> int:
+    """Red, green and blue in 0..1 as three.js's one number."""
+    red, green, blue = (round(255 * min(max(part * brightness, 0.0), 1.0)) for part in color[:3])
     return red << 16 | green << 8 | blue
 
 
