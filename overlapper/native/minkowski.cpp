@@ -15,25 +15,30 @@ Vec3 combine(const Simplex& s, Vec3 DifferencePoint::* point) {
   return sum;
 }
 
-/// Weights of the point of a segment's line nearest to the origin; false unless both are positive.
-bool weigh(Vec3 a, Vec3 b, std::array<double, 4>& weight) {
+/// Weights of the point of a segment's line nearest to the origin, and that point; false unless both are positive.
+bool weigh(Vec3 a, Vec3 b, std::array<double, 4>& weight, Vec3& nearest) {
   const Vec3 ab = b - a;
   const double wb = -dot(a, ab), wa = dot(b, ab);
   if (!(wa > 0 && wb > 0)) return false;
   // Divided by their own sum and not by |ab|²: on a short segment the two differ by far more than rounding.
   const double sum = wa + wb;
   weight = {wa / sum, wb / sum};
+  nearest = wa > wb ? a + weight[1] * ab : b - weight[0] * ab;
   return true;
 }
 
 /// The same for a triangle's plane: areas seen along its normal.
-bool weigh(Vec3 a, Vec3 b, Vec3 c, std::array<double, 4>& weight) {
-  const Vec3 n = cross(b - a, c - a);
+bool weigh(Vec3 a, Vec3 b, Vec3 c, std::array<double, 4>& weight, Vec3& nearest) {
+  const Vec3 n = accurate_normal(a, b, c);
   const double area2 = norm2(n);
   const double wa = dot(n, cross(b, c)), wb = dot(n, cross(c, a)), wc = dot(n, cross(a, b));
   if (!(wa > 0 && wb > 0 && wc > 0 && area2 > 0)) return false;
   const double sum = wa + wb + wc;
   weight = {wa / sum, wb / sum, wc / sum};
+  // The normal of a needle is known to more digits than a sum of its far corners, of which nearly all cancels.
+  const double aa = norm2(a), bb = norm2(b), cc = norm2(c);
+  const Vec3 shortest = aa <= bb && aa <= cc ? a : bb <= cc ? b : c;
+  nearest = dot(n, shortest) / area2 * n;
   return true;
 }
 
@@ -69,9 +74,9 @@ bool reduce(Simplex& s) {
     }
     bool valid = false;
     switch (part.size) {
-      case 1: part.weight = {1}, valid = true; break;
-      case 2: valid = weigh(p[0], p[1], part.weight); break;
-      case 3: valid = weigh(p[0], p[1], p[2], part.weight); break;
+      case 1: part.weight = {1}, part.nearest = p[0], valid = true; break;
+      case 2: valid = weigh(p[0], p[1], part.weight, part.nearest); break;
+      case 3: valid = weigh(p[0], p[1], p[2], part.weight, part.nearest); break;
       case 4:
         if (weigh(p[0], p[1], p[2], p[3], part.weight)) {
           s = part;
@@ -79,7 +84,7 @@ bool reduce(Simplex& s) {
         }
     }
     if (!valid) continue;
-    const double distance2 = norm2(part.nearest());
+    const double distance2 = norm2(part.nearest);
     if (distance2 < least) least = distance2, best = part;
   }
   s = best;
@@ -109,7 +114,6 @@ Distance mirrored(const Distance& d) { return {d.distance, d.gap, -d.normal, d.w
 
 }  // namespace
 
-Vec3 Simplex::nearest() const { return witness_a() - witness_b(); }
 Vec3 Simplex::witness_a() const { return combine(*this, &DifferencePoint::on_a); }
 Vec3 Simplex::witness_b() const { return combine(*this, &DifferencePoint::on_b); }
 
@@ -121,18 +125,18 @@ Separation separate_cores(const Placed& a, const Placed& b) {
   simplex.corner[0] = core_support(a, b, -towards);
   simplex.weight = {1};
   simplex.size = 1;
-  Vec3 nearest = simplex.corner[0].difference();
+  simplex.nearest = simplex.corner[0].difference();
   result.gap = -std::numeric_limits<double>::infinity();
 
   // Polytopes end by themselves, as each round finds a new vertex; a cylinder's rim converges, and no bit improves
   // after some dozens of rounds.
   for (int round = 0; round < 256; ++round) {
-    const double length = norm(nearest);
+    const double length = norm(simplex.nearest);
     if (length == 0) {
       result.origin_inside = true;
       break;
     }
-    const Vec3 direction = nearest / length;
+    const Vec3 direction = simplex.nearest / length;
     const DifferencePoint farthest = core_support(a, b, -direction);
     const Vec3 w = farthest.difference();
     const double gap = dot(w, direction);
@@ -146,16 +150,14 @@ Separation separate_cores(const Placed& a, const Placed& b) {
       result.origin_inside = true;
       break;
     }
-    const Vec3 nearer = grown.nearest();
-    if (!(norm2(nearer) < norm2(nearest))) break;
+    if (!(norm2(grown.nearest) < norm2(simplex.nearest))) break;
     simplex = grown;
-    nearest = nearer;
   }
   if (result.origin_inside) {
     result.normal = {};
     return result;
   }
-  result.distance = norm(nearest);
+  result.distance = norm(simplex.nearest);
   return result;
 }
 
@@ -170,7 +172,7 @@ Distance distance(const Placed& a, const Placed& b) {
   // Along the line of the witness points, distance * normal is their difference. On a curved rim that direction is
   // known to half of the digits only; where so little separates it that this matters, the direction that proves the gap
   // is given.
-  const Vec3 along = unit(cores.simplex.nearest());
+  const Vec3 along = unit(cores.simplex.nearest);
   const double gap_along = dot(along, core_support(a, b, -along).difference());
   result.normal = cores.origin_inside || gap_along <= 0 ? cores.normal : along;
   result.witness_a = cores.simplex.witness_a() - radius_a * result.normal;

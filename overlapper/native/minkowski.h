@@ -19,10 +19,10 @@ struct Simplex {
   std::array<DifferencePoint, 4> corner;
   std::array<double, 4> weight{};
   int size = 0;
+  Vec3 nearest;  ///< that point: from the plane or line of the corners, so that it has a direction even when it is tiny
 
-  Vec3 nearest() const;  ///< of A - B to the origin
-  Vec3 witness_a()
-      const;  ///< the same combination of the points of A; a common point of both if nearest() is the origin
+  /// The same combination of the points of A; a common point of both if `nearest` is the origin.
+  Vec3 witness_a() const;
   Vec3 witness_b() const;
 };
 
