@@ -130,7 +130,7 @@ class Bodies:
         self._mark = f"overlapper {uuid.uuid4()}"
         self._bodies: dict[int, _Body] = {}
         self._unidentified = 0
-        self._pairs_examined = self._pairs_overlapping = self._facets_touched = 0
+        self._examined: list[Overlap] = []
         self._arrange()
         self._refresh()
 
@@ -151,9 +151,7 @@ class Bodies:
             for (i, j), overlap in zip(pairs, overlaps)
             if overlap.status != "separated"
         ]
-        self._pairs_examined = len(pairs)
-        self._pairs_overlapping = sum(map(bool, overlaps))
-        self._facets_touched = sum(overlap.facets_touched for overlap in overlaps)
+        self._examined = overlaps
         return contacts
 
     def report(self) -> Report:
@@ -164,9 +162,9 @@ class Bodies:
             shapes=sum(body.shape_count for body in self._bodies.values()) + self._unidentified,
             shapes_read=len(self._keys),
             pairs_possible=_pairs_between(owners) - _pairs_between(owners[static]),
-            pairs_examined=self._pairs_examined,
-            pairs_overlapping=self._pairs_overlapping,
-            facets_touched=self._facets_touched,
+            pairs_examined=len(self._examined),
+            pairs_overlapping=sum(map(bool, self._examined)),
+            facets_touched=sum(overlap.facets_touched for overlap in self._examined),
         )
 
     @property
