@@ -323,9 +323,12 @@ class Overlap:
     @property
     def volume_error(self) -> float:
         """
-        m³, certified: the true volume is within volume ± volume_error. For polyhedra it bounds the rounding: every plane
-        moved by 16 half-ulps of the coordinates' magnitude, times the area. For smooth shapes it is half the distance of an
-        outer and an inner polytope, plus that. A pair that touches may hide a volume of rounding size. 0 if separated.
+        m³, certified: the true volume is within volume ± volume_error.
+
+        For polyhedra it bounds the rounding: every plane moved by 16 half-ulps of the coordinates' magnitude, times the
+        area. For smooth shapes it is the share of the volume between an outer and an inner polytope, plus that. A pair
+        that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
+        difference from what 'auto' finds, plus the error of that. 0 if separated.
         """
 
     @property

@@ -206,7 +206,7 @@ Quantities measure_region(const Region& region) {
   // themselves.
   const double r = region.rounding;
   const double moved = r * (q.area + r * (4 * 3.15 * reach + 4.2 * r));
-  q.volume_error = 7.0 / 12.0 * (outer - inner) + moved + 64 * DBL_EPSILON * outer + region.missing;
+  q.volume_error = 7.0 / 12.0 * (outer - inner) + moved + 64 * DBL_EPSILON * outer;
   return q;
 }
 
@@ -389,18 +389,32 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
   }
 }
 
+double Overlap::volume() const { return status_ == Status::kOverlapping ? quantities().volume : 0; }
+
+double Overlap::volume_error() const {
+  if (method_ == Method::kAuto) {
+    if (status_ == Status::kSeparated) return 0;
+    return status_ == Status::kTouching ? touching_volume() : quantities().volume_error;
+  }
+  const double claimed = volume();
+  const std::scoped_lock lock(lazy_->mutex);
+  if (!lazy_->error_of_paper) {
+    const Overlap judge(bodies_, tolerance_, Method::kAuto);
+    lazy_->error_of_paper = std::abs(claimed - judge.volume()) + judge.volume_error();
+  }
+  return *lazy_->error_of_paper;
+}
+
+/// The inradius is rounding, and a convex set's volume is at most its inradius times its surface, which is no larger
+/// than that of a box around any of the bodies.
 double Overlap::touching_volume() const {
-  if (status_ != Status::kTouching) return 0;
   double least = std::numeric_limits<double>::infinity();
   const double inradius = std::max(0.0, ball_.upper) + ball_.rounding;
   for (const Placed& body : bodies_) {
-    if (method_ == Method::kPaper) {
-      least = std::min(least, volume(body.shape));
-    } else if (bounded(body.shape)) {
-      const Bounds box = bounds(body);
-      const Vec3 side = box.upper - box.lower;
-      least = std::min(least, 2 * inradius * (side.x * side.y + side.y * side.z + side.z * side.x));
-    }
+    if (!bounded(body.shape)) continue;
+    const Bounds box = bounds(body);
+    const Vec3 side = box.upper - box.lower;
+    least = std::min(least, 2 * inradius * (side.x * side.y + side.y * side.z + side.z * side.x));
   }
   return least;
 }

@@ -24,8 +24,7 @@ struct Region {
   std::vector<OwnedPlane> planes;  ///< one per facet of the polytope, relative to `reference`
   std::vector<double> inner;       ///< per vertex y: inner * y lies in the common set; 1 where the vertex itself does
   double rounding = 0;             ///< m: by how much rounding may have moved a plane
-  double missing = 0;      ///< m³: at most so much of the common set lies outside, where smooth shapes were tessellated
-  int facets_touched = 0;  ///< how many planes entered the dual hull
+  int facets_touched = 0;          ///< how many planes entered the dual hull
 
   Vec3 to_world(Vec3 y) const { return reference + (frame.origin + frame.axes * y); }
 };
@@ -66,10 +65,13 @@ class Overlap {
   Status status() const { return status_; }
   bool pair() const { return bodies_.size() == 2; }
 
-  /// What a set that only touches may still hold, m³: its inradius is rounding, and a convex set's volume is at most
-  /// its inradius times its surface, which is no larger than that of a box around any of the bodies. Method kPaper,
-  /// which may lose an overlap altogether, can only say that the smallest body bounds it. 0 if separated.
-  double touching_volume() const;
+  /// m³; 0 unless overlapping.
+  double volume() const;
+
+  /// The true volume is within volume() ± volume_error(). For a set that only touches, what it may still hold. The
+  /// article gives no bound, and what its method loses may be a whole overlap: for kPaper it is the difference from
+  /// what kAuto finds, plus the error of that.
+  double volume_error() const;
 
   /// Only for overlapping bodies.
   const Region& region() const;
@@ -90,6 +92,8 @@ class Overlap {
   const Contact& contact() const;
 
  private:
+  double touching_volume() const;
+
   std::vector<Placed> bodies_, relative_;
   double tolerance_;
   Method method_;
@@ -104,6 +108,7 @@ class Overlap {
     std::optional<Quantities> quantities;
     std::optional<Surface> surface;
     std::optional<Contact> contact;
+    std::optional<double> error_of_paper;
   };
   std::shared_ptr<Lazy> lazy_ = std::make_shared<Lazy>();
 };

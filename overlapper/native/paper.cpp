@@ -220,7 +220,6 @@ Region region_of(const Part& part) {
 
 PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double tolerance) {
   std::vector<Part> parts;
-  double missing = 0;
   int planes = 0;
   for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
     const Placed& body = bodies[i];
@@ -229,7 +228,6 @@ PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double toleran
       parts.push_back(placed_part(box, {{}, box.data->origin}, i));
     } else {
       const Hull hull = tessellated(body.shape, tolerance);
-      if (smooth(body.shape)) missing += volume(body.shape) - hull.data->volume;
       parts.push_back(placed_part(hull, body.pose, i));
     }
     planes += static_cast<int>(parts.back().owner.size());
@@ -238,7 +236,6 @@ PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double toleran
   PaperResult result{common.status, std::nullopt};
   if (common.status == Status::kOverlapping) {
     result.region = region_of(common.part);
-    result.region->missing = missing;
     result.region->facets_touched = planes;
   }
   return result;

@@ -66,8 +66,7 @@ void contact_property(nb::class_<Overlap>& cls, const char* name, Given given, G
 
 std::string repr(const Overlap& o) {
   std::string text = "Overlap(" + std::string(status_name(o.status()));
-  if (solid(o))
-    text += ", volume=" + number(o.quantities().volume) + " ± " + number(o.quantities().volume_error) + " m³";
+  if (solid(o)) text += ", volume=" + number(o.volume()) + " ± " + number(o.volume_error()) + " m³";
   if (o.pair() && solid(o)) text += ", depth=" + number(o.contact().depth) + " m";
   if (o.pair() && o.status() == Status::kSeparated) text += ", distance=" + number(o.contact().distance) + " m";
   return text + ", " + std::to_string(o.bodies().size()) + " bodies)";
@@ -80,8 +79,8 @@ void define_contact(nb::class_<Overlap>& cls) {
   const nb::sig vector_or_none_normal("def normal(self) -> numpy.typing.NDArray[numpy.float64] | None");
   contact_property(
       cls, "normal", always, [](const Contact& c) { return to_numpy(c.normal); }, vector_or_none_normal,
-      "(3,) unit, from b to a as pybullet's contactNormalOnB: moving a by depth * normal separates an overlapping\n"
-      "pair. Also given for pairs that touch or are apart. None for three or more bodies.");
+      R"((3,) unit, from b to a as pybullet's contactNormalOnB: moving a by depth * normal separates an overlapping
+pair. Also given for pairs that touch or are apart. None for three or more bodies.)");
   contact_property(
       cls, "depth", always, [](const Contact& c) { return c.depth; }, nb::sig("def depth(self) -> float | None"),
       "m, the least translation that separates the pair; 0 unless overlapping. None for three or more bodies.");
@@ -109,17 +108,15 @@ void define_contact(nb::class_<Overlap>& cls) {
 
 void define_measures(nb::class_<Overlap>& cls) {
   cls.def_prop_ro(
-      "volume", [](const Overlap& o) { return solid(o) ? measured(o).quantities().volume : 0.0; },
-      "m³, the best estimate; 0 unless overlapping.");
+      "volume", [](const Overlap& o) { return measured(o).volume(); }, "m³, the best estimate; 0 unless overlapping.");
   cls.def_prop_ro(
-      "volume_error",
-      [](const Overlap& o) { return solid(o) ? measured(o).quantities().volume_error : o.touching_volume(); },
-      "m³, certified: the true volume is within volume ± volume_error. For polyhedra it bounds the rounding: every "
-      "plane\n"
-      "moved by 16 half-ulps of the coordinates' magnitude, times the area. For smooth shapes it is half the distance "
-      "of an\n"
-      "outer and an inner polytope, plus that. A pair that touches may hide a volume of rounding size. 0 if "
-      "separated.");
+      "volume_error", [](const Overlap& o) { return measured(o).volume_error(); },
+      R"(m³, certified: the true volume is within volume ± volume_error.
+
+For polyhedra it bounds the rounding: every plane moved by 16 half-ulps of the coordinates' magnitude, times the
+area. For smooth shapes it is the share of the volume between an outer and an inner polytope, plus that. A pair
+that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
+difference from what 'auto' finds, plus the error of that. 0 if separated.)");
   cls.def_prop_ro(
       "area", [](const Overlap& o) { return solid(o) ? measured(o).quantities().area : 0.0; },
       "m², of the surface of the common polytope; 0 unless overlapping.");
@@ -144,9 +141,8 @@ void define_measures(nb::class_<Overlap>& cls) {
         for (const auto& row : o.gradient()) values.insert(values.end(), row.begin(), row.end());
         return to_numpy<Matrix>(std::move(values), {o.bodies().size(), 6});
       },
-      "(m, 6) d volume / d (translation, rotation vector about the body's own position) of each body, world axes: the "
-      "area vector\n"
-      "of the facets that the body owns, and its moment. m² and m³; zeros unless overlapping.");
+      R"((m, 6) d volume / d (translation, rotation vector about the body's own position) of each body, world axes: the area vector
+of the facets that the body owns, and its moment. m² and m³; zeros unless overlapping.)");
 }
 
 void define_surface(nb::class_<Overlap>& cls) {
@@ -182,9 +178,8 @@ void define_surface(nb::class_<Overlap>& cls) {
         return list;
       },
       nb::sig("def patch(self) -> list[numpy.typing.NDArray[numpy.float64]]"),
-      "Closed polygons (k, 3) along the ridges where the owner changes, the first point not repeated. For a pair they "
-      "go\n"
-      "counter-clockwise around a's part of the surface; for more bodies, around the part of each.");
+      R"(Closed polygons (k, 3) along the ridges where the owner changes, the first point not repeated. For a pair they go
+counter-clockwise around a's part of the surface; for more bodies, around the part of each.)");
   cls.def_prop_ro(
       "bounds",
       [](const Overlap& o) -> nb::object {
@@ -199,11 +194,11 @@ void define_surface(nb::class_<Overlap>& cls) {
 }
 
 void define_overlap(nb::module_& m) {
-  nb::class_<Overlap> cls(
-      m, "Overlap",
-      "What two or more convex shapes share. True only if they overlap.\n\n"
-      "Immutable; each quantity is computed when first asked for. SI units, world coordinates. For smooth shapes the\n"
-      "polytope contains the common set and could shrink into it by the fraction `tolerance`.");
+  nb::class_<Overlap> cls(m, "Overlap",
+                          R"(What two or more convex shapes share. True only if they overlap.
+
+Immutable; each quantity is computed when first asked for. SI units, world coordinates. For smooth shapes the
+polytope contains the common set and could shrink into it by the fraction `tolerance`.)");
   cls.def_prop_ro(
       "status", [](const Overlap& o) { return status_name(o.status()); },
       nb::sig("def status(self) -> typing.Literal['separated', 'touching', 'overlapping']"),
@@ -266,25 +261,19 @@ void define_functions(nb::module_& m) {
       nb::sig("def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | "
               "numpy.typing.ArrayLike, "
               "tolerance: float = 0.001, method: typing.Literal['auto', 'paper'] = 'auto') -> Overlap"),
-      "The common set of two or more convex shapes.\n\n"
-      "Each is a Placed, a bare shape, or an (n, 3) array of points, which stands for their hull. `tolerance`, between "
-      "0 and 1,\n"
-      "is the fraction by which the polytope may have to shrink to fit inside smooth shapes; polyhedra are exact "
-      "whatever it is.\n"
-      "No overlap is an answer, not an error. Raises ValueError if the common set is unbounded.\n\n"
-      "method 'auto' grows the hull of the dual points about a point well inside, in a frame in which the common set "
-      "is round.\n"
-      "method 'paper' is that of Tereshchenko, Chevokin and Fisunenko, 'Algorithm for finding the domain intersection "
-      "of a set of\n"
-      "polytopes' (ICCS 2013), step for step and with what it loses: GJK with witness points gives a common point; on "
-      "a boundary\n"
-      "it is shifted by a minimal step (2^-26 of the smaller polytope) along one of 26 directions; the hull of the "
-      "dual points of\n"
-      "all face planes, the dual of that hull's faces, and their hull follow; more than two bodies pairwise by divide "
-      "and conquer.\n"
-      "It departs from the text in tessellating smooth shapes from inside, in replacing half-spaces by large boxes, "
-      "and in\n"
-      "deciding by exact signs inside its hulls. Where no shift lands inside, it says 'touching'.");
+      R"(The common set of two or more convex shapes.
+
+Each is a Placed, a bare shape, or an (n, 3) array of points, which stands for their hull. `tolerance`, between 0 and 1,
+is the fraction by which the polytope may have to shrink to fit inside smooth shapes; polyhedra are exact whatever it is.
+No overlap is an answer, not an error. Raises ValueError if the common set is unbounded.
+
+method 'auto' grows the hull of the dual points about a point well inside, in a frame in which the common set is round.
+method 'paper' is that of Tereshchenko, Chevokin and Fisunenko, 'Algorithm for finding the domain intersection of a set of
+polytopes' (ICCS 2013), step for step and with what it loses: GJK with witness points gives a common point; on a boundary
+it is shifted by a minimal step (2^-26 of the smaller polytope) along one of 26 directions; the hull of the dual points of
+all face planes, the dual of that hull's faces, and their hull follow; more than two bodies pairwise by divide and conquer.
+It departs from the text in tessellating smooth shapes from inside, in replacing half-spaces by large boxes, and in
+deciding by exact signs inside its hulls. Where no shift lands inside, it says 'touching'.)");
   m.def(
       "distance",
       [](nb::handle a, nb::handle b) {
@@ -305,9 +294,8 @@ void define_functions(nb::module_& m) {
       nb::sig("def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | "
               "numpy.typing.ArrayLike, "
               "b: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float"),
-      "Length (m) of the least translation that separates two shapes; 0 if they do not overlap. Positive where "
-      "pybullet's contact\n"
-      "distance is negative. Raises ValueError for two half-spaces.");
+      R"(Length (m) of the least translation that separates two shapes; 0 if they do not overlap. Positive where pybullet's contact
+distance is negative. Raises ValueError for two half-spaces.)");
   m.def(
       "iou", [](nb::handle a, nb::handle b, double tolerance) { return union_ratio(a, b, tolerance); }, "a"_a, "b"_a,
       "tolerance"_a = 1e-3,
@@ -372,9 +360,8 @@ void define_batch(nb::module_& m) {
       nb::sig("def candidate_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: "
               "numpy.typing.ArrayLike, "
               "orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]"),
-      "(p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that "
-      "reaches into it;\n"
-      "two half-spaces are no pair.");
+      R"((p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
+two half-spaces are no pair.)");
   m.def("overlap_pairs", &overlap_pairs, "shapes"_a, "positions"_a, "orientations"_a, "pairs"_a, "tolerance"_a = 1e-3,
         "method"_a = "auto",
         nb::sig("def overlap_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: "

@@ -165,8 +165,9 @@ void define_shape_types(nb::module_& m) {
 
   nb::class_<Capsule> capsule(
       m, "Capsule",
-      "All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.\n\n"
-      "As in pybullet, `length` lies between the centres of the caps; it may be 0.");
+      R"(All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.
+
+As in pybullet, `length` lies between the centres of the caps; it may be 0.)");
   capsule.def(
       "__init__",
       [](Capsule* self, nb::handle radius, nb::handle length) {
@@ -192,8 +193,9 @@ void define_shape_types(nb::module_& m) {
   define_pickle(cylinder, [](const Cylinder& c) { return nb::make_tuple(c.radius, c.length); });
 
   nb::class_<HalfSpace> half(m, "HalfSpace",
-                             "The closed half-space { x : normal · x <= offset }.\n\n"
-                             "`normal` may have any length but 0; both it and `offset` are divided by it.");
+                             R"(The closed half-space { x : normal · x <= offset }.
+
+`normal` may have any length but 0; both it and `offset` are divided by it.)");
   half.def(
       "__init__",
       [](HalfSpace* self, nb::handle normal, nb::handle offset) {
@@ -210,11 +212,11 @@ void define_shape_types(nb::module_& m) {
     return nb::make_tuple(nb::make_tuple(n.x, n.y, n.z), h.plane.offset);
   });
 
-  nb::class_<Hull> hull(
-      m, "Hull",
-      "The convex hull of (n, 3) points (m).\n\n"
-      "Interior, duplicate and coplanar points are welcome; coplanar triangles become one facet. Raises\n"
-      "ValueError for fewer than four points, for points that are not finite and for points in one plane.");
+  nb::class_<Hull> hull(m, "Hull",
+                        R"(The convex hull of (n, 3) points (m).
+
+Interior, duplicate and coplanar points are welcome; coplanar triangles become one facet. Raises
+ValueError for fewer than four points, for points that are not finite and for points in one plane.)");
   hull.def(
       "__init__", [](Hull* self, nb::handle vertices) { new (self) Hull(make_hull(to_rows(vertices, "vertices"))); },
       "vertices"_a.none(), nb::sig("def __init__(self, vertices: numpy.typing.ArrayLike) -> None"));
@@ -246,10 +248,10 @@ void define_shape_types(nb::module_& m) {
 }
 
 void define_placed(nb::module_& m) {
-  nb::class_<Placed> placed(
-      m, "Placed",
-      "A shape and where it is in the world.\n\n"
-      "position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0.");
+  nb::class_<Placed> placed(m, "Placed",
+                            R"(A shape and where it is in the world.
+
+position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0.)");
   placed.def(
       "__init__",
       [](Placed* self, nb::handle shape, nb::handle position, nb::handle orientation) {
