@@ -188,13 +188,21 @@ class DepthSearch {
   DepthSearch(const Placed& a, const Placed& b) : a_(a), b_(b) {}
 
   Penetration run() {
-    // Both bodies are solid, or their cores are a point or a segment; in the latter case A - B may be flat.
     for (int axis = 0; axis < 3; ++axis)
       for (double side : {-1.0, 1.0}) ask({axis == 0 ? side : 0, axis == 1 ? side : 0, axis == 2 ? side : 0});
     for (double x : {-1.0, 1.0})
       for (double y : {-1.0, 1.0})
         for (double z : {-1.0, 1.0}) ask({x, y, z});
-    if (!hull_.build()) return flat();
+    // A slender difference may show its corners in one plane only. Asked across that plane, it shows more, unless it is
+    // flat itself, which the difference of two segments is.
+    bool solid = hull_.build();
+    for (int attempt = 0; attempt < 3 && !solid; ++attempt) {
+      const Vec3 across = across_all();
+      ask(across);
+      ask(-across);
+      solid = hull_.build();
+    }
+    if (!solid) return best_;
     for (int round = 0; round < kMaxRounds; ++round) {
       const int facet = least_facet();
       if (facet < 0) break;
@@ -247,9 +255,8 @@ class DepthSearch {
     return best;
   }
 
-  /// The difference of two points or segments in one plane: across the plane, its support is its offset, whatever the
-  /// rest.
-  Penetration flat() {
+  /// Orthogonal to the plane, or to the line, of the points so far.
+  Vec3 across_all() const {
     Vec3 u, v;
     for (Vec3 p : hull_.points) {
       const Vec3 edge = p - hull_.points[0];
@@ -259,11 +266,9 @@ class DepthSearch {
       const Vec3 edge = p - hull_.points[0];
       if (norm2(cross(u, edge)) > norm2(cross(u, v))) v = edge;
     }
-    Vec3 normal = unit(cross(u, v));
-    if (norm2(normal) == 0) normal = norm2(u) > 0 ? any_orthogonal(unit(u)) : Vec3{0, 0, 1};
-    ask(normal);
-    ask(-normal);
-    return best_;
+    const Vec3 normal = unit(cross(u, v));
+    if (norm2(normal) > 0) return normal;
+    return norm2(u) > 0 ? any_orthogonal(unit(u)) : Vec3{0, 0, 1};
   }
 
   const Placed &a_, &b_;
