@@ -1,3 +1,5 @@
+#include <chrono>
+
 #include "candidates.h"
 #include "minkowski.h"
 #include "overlap.h"
@@ -323,6 +325,17 @@ std::vector<Placed> place_all(nb::list shapes, nb::handle positions, nb::handle 
   return placed;
 }
 
+/// Goes on with the pairs for a tenth of a second, while other Python threads run; then Ctrl-C is looked for.
+void overlap_for_a_while(const std::vector<Placed>& placed, const int* pairs, size_t count, double tolerance,
+                         Method method, std::vector<Overlap>& overlaps) {
+  const nb::gil_scoped_release release;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
+  while (overlaps.size() < count && std::chrono::steady_clock::now() < end) {
+    const int* pair = pairs + 2 * overlaps.size();
+    overlaps.emplace_back(std::vector<Placed>{placed[pair[0]], placed[pair[1]]}, tolerance, method);
+  }
+}
+
 nb::list overlap_pairs(nb::list shapes, nb::handle positions, nb::handle orientations, nb::handle pairs,
                        double tolerance, const std::string& method_name) {
   const std::vector<Placed> placed = place_all(shapes, positions, orientations);
@@ -335,11 +348,9 @@ nb::list overlap_pairs(nb::list shapes, nb::handle positions, nb::handle orienta
   for (size_t i = 0; i < 2 * index.shape(0); ++i)
     if (index.data()[i] < 0 || index.data()[i] >= static_cast<int>(placed.size()))
       fail("pairs", "must index the shapes");
-  {
-    const nb::gil_scoped_release release;
-    for (size_t i = 0; i < index.shape(0); ++i)
-      overlaps.emplace_back(std::vector<Placed>{placed[index.data()[2 * i]], placed[index.data()[2 * i + 1]]},
-                            tolerance, method);
+  while (overlaps.size() < index.shape(0)) {
+    overlap_for_a_while(placed, index.data(), index.shape(0), tolerance, method, overlaps);
+    if (PyErr_CheckSignals() != 0) throw nb::python_error();
   }
   nb::list list;
   for (Overlap& o : overlaps) list.append(nb::cast(std::move(o)));
