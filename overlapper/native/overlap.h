@@ -6,50 +6,14 @@
 #include <vector>
 
 #include "common_point.h"
-#include "polytope.h"
+#include "region.h"
 #include "shape.h"
+#include "surface.h"
 
 namespace overlapper {
 
 enum class Status { kSeparated, kTouching, kOverlapping };
 enum class Method { kAuto, kPaper };
-
-/// The polytope around the common set, in a frame about a point inside it: world x = reference + frame.origin +
-/// frame.axes y. For polyhedra it is the common set; for smooth shapes it contains it, and shrinks to fit inside vertex
-/// by vertex.
-struct Region {
-  Vec3 reference;
-  Frame frame;
-  Polytope polytope;               ///< in the coordinates y
-  std::vector<OwnedPlane> planes;  ///< one per facet of the polytope, relative to `reference`
-  std::vector<double> inner;       ///< per vertex y: inner * y lies in the common set; 1 where the vertex itself does
-  double rounding = 0;             ///< m: by how much rounding may have moved a plane
-  int facets_touched = 0;          ///< how many planes entered the dual hull
-
-  Vec3 to_world(Vec3 y) const { return reference + (frame.origin + frame.axes * y); }
-};
-
-/// What is computed from the region, all in world coordinates.
-struct Quantities {
-  double volume = 0, volume_error = 0, area = 0;
-  Vec3 centroid;
-  Mat3 inertia;                   ///< about the centroid, unit density
-  std::vector<Vec3> area_vector;  ///< per facet, outward, of length its area
-  std::vector<Vec3> facet_centroid;
-};
-
-/// The surface without the ridges and facets that rounding left of several planes through one point.
-struct Surface {
-  std::vector<Vec3> vertices;
-  std::vector<int> ring, ring_start;
-  std::vector<Plane> planes;
-  std::vector<int> owner;
-  std::vector<std::vector<Vec3>> patch;
-
-  std::span<const int> facet(int f) const {
-    return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
-  }
-};
 
 /// The common set of two or more placed shapes. Only the status is found on construction; each quantity when first
 /// asked for, then kept. Safe to share between threads.

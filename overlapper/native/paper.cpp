@@ -209,10 +209,10 @@ Region region_of(const Part& part) {
   for (int f = 0; f < static_cast<int>(hull.planes.size()); ++f) {
     region.polytope.dual.push_back(polar_dual(hull.planes[f], hull.centroid));
     region.polytope.plane.push_back(f);
-    region.planes.push_back({hull.planes[f], part.owner[f]});
+    region.facets.push_back(
+        {hull.planes[f].normal, -signed_distance(hull.planes[f], hull.centroid), rounding(magnitude), part.owner[f]});
   }
   region.inner.assign(hull.vertices.size(), 1);
-  region.rounding = rounding(magnitude);
   return region;
 }
 

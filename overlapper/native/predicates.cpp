@@ -1,22 +1,9 @@
 #include "predicates.h"
 
+#include "wide.h"
+
 namespace overlapper {
 namespace {
-
-/// The exact sum head + tail of one addition or product (Dekker; Knuth).
-struct Two {
-  double head, tail;
-};
-
-Two two_sum(double a, double b) {
-  const double sum = a + b, b_part = sum - a, a_part = sum - b_part;
-  return {sum, (a - a_part) + (b - b_part)};
-}
-
-Two two_product(double a, double b) {
-  const double product = a * b;
-  return {product, std::fma(a, b, -product)};
-}
 
 /// A sum of doubles that do not overlap, smallest first (Shewchuk 1997, section 2); its sign is that of the last one.
 template <int Capacity>
@@ -27,7 +14,7 @@ struct Expansion {
   void add(double value) {
     int kept = 0;
     for (int i = 0; i < count; ++i) {
-      const Two sum = two_sum(value, term[i]);
+      const DoubleDouble sum = two_sum(value, term[i]);
       value = sum.head;
       if (sum.tail != 0) term[kept++] = sum.tail;
     }
@@ -37,23 +24,20 @@ struct Expansion {
   int sign() const { return count == 0 ? 0 : (term[count - 1] > 0) - (term[count - 1] < 0); }
 };
 
-/// a - b without rounding.
-Two exact_difference(double a, double b) { return two_sum(a, -b); }
-
 /// Adds sign * u * v * w, each factor an exact pair, without rounding: eight products of three doubles, four terms
 /// each.
 template <int Capacity>
-void add_product(Expansion<Capacity>& sum, double sign, Two u, Two v, Two w) {
+void add_product(Expansion<Capacity>& sum, double sign, DoubleDouble u, DoubleDouble v, DoubleDouble w) {
   for (double p : {u.head, u.tail}) {
     if (p == 0) continue;
     for (double q : {v.head, v.tail}) {
       if (q == 0) continue;
-      const Two pq = two_product(sign * p, q);
+      const DoubleDouble pq = two_product(sign * p, q);
       for (double r : {w.head, w.tail}) {
         if (r == 0) continue;
         for (double part : {pq.head, pq.tail}) {
           if (part == 0) continue;
-          const Two product = two_product(part, r);
+          const DoubleDouble product = two_product(part, r);
           sum.add(product.tail);
           sum.add(product.head);
         }
@@ -62,16 +46,8 @@ void add_product(Expansion<Capacity>& sum, double sign, Two u, Two v, Two w) {
   }
 }
 
-struct ExactVector {
-  Two x, y, z;
-};
-
-ExactVector exact_difference(Vec3 a, Vec3 b) {
-  return {exact_difference(a.x, b.x), exact_difference(a.y, b.y), exact_difference(a.z, b.z)};
-}
-
 int exact_orientation(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
-  const ExactVector u = exact_difference(b, a), v = exact_difference(c, a), w = exact_difference(d, a);
+  const WideVector u = wide_difference(b, a), v = wide_difference(c, a), w = wide_difference(d, a);
   Expansion<6 * 32> det;  // six products of the determinant, each of at most 32 terms
   add_product(det, +1, u.x, v.y, w.z);
   add_product(det, -1, u.x, v.z, w.y);
@@ -80,41 +56,6 @@ int exact_orientation(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   add_product(det, +1, u.z, v.x, w.y);
   add_product(det, -1, u.z, v.y, w.x);
   return det.sign();
-}
-
-/// Double-double arithmetic: each operation is right to about 2^-100 of the larger operand.
-struct DoubleDouble {
-  double head = 0, tail = 0;
-};
-
-DoubleDouble normalised(double head, double tail) {
-  const double sum = head + tail;
-  return {sum, tail - (sum - head)};
-}
-DoubleDouble operator+(DoubleDouble a, DoubleDouble b) {
-  const Two high = two_sum(a.head, b.head), low = two_sum(a.tail, b.tail);
-  const DoubleDouble partial = normalised(high.head, high.tail + low.head);
-  return normalised(partial.head, partial.tail + low.tail);
-}
-DoubleDouble operator-(DoubleDouble a) { return {-a.head, -a.tail}; }
-DoubleDouble operator-(DoubleDouble a, DoubleDouble b) { return a + (-b); }
-DoubleDouble operator*(DoubleDouble a, DoubleDouble b) {
-  const Two product = two_product(a.head, b.head);
-  return normalised(product.head, product.tail + (a.head * b.tail + a.tail * b.head));
-}
-
-struct WideVector {
-  DoubleDouble x, y, z;
-};
-
-WideVector wide_difference(Vec3 a, Vec3 b) {
-  const auto wide = [](Two t) { return DoubleDouble{t.head, t.tail}; };
-  const ExactVector d = exact_difference(a, b);
-  return {wide(d.x), wide(d.y), wide(d.z)};
-}
-
-WideVector wide_cross(const WideVector& u, const WideVector& v) {
-  return {u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
 }
 
 Vec3 wide_polar_vertex(Vec3 a, Vec3 b, Vec3 c) {

@@ -428,6 +428,20 @@ HullData hull_data(const ExpandingHull& hull, const std::vector<std::vector<int>
     }
     data.ring_start.push_back(static_cast<int>(data.ring.size()));
   }
+  std::vector<int> corner(hull.points.size(), -1);
+  for (const ExpandingHull::Facet& facet : hull.facets) {
+    if (facet.removed()) continue;
+    std::array<int, 3> triangle;
+    for (int i = 0; i < 3; ++i) {
+      const int p = facet.vertex[i];
+      if (corner[p] < 0) {
+        corner[p] = static_cast<int>(data.corners.size());
+        data.corners.push_back(hull.points[p]);
+      }
+      triangle[i] = corner[p];
+    }
+    data.triangles.push_back(triangle);
+  }
   for (int f = 0; f < static_cast<int>(loops.size()); ++f)
     data.planes.push_back(supporting_plane(data.vertices, data.facet(f)));
   return data;

@@ -73,6 +73,10 @@ struct HullData {
   std::vector<Vec3> vertices;
   std::vector<Plane> planes;
   std::vector<int> ring, ring_start{0};
+  /// The surface as it is before coplanar triangles are merged and what rounding moved is forgotten, for wider
+  /// arithmetic.
+  std::vector<Vec3> corners;
+  std::vector<std::array<int, 3>> triangles;
   double volume = 0;
   Vec3 centroid;
 

@@ -120,6 +120,10 @@ area. For smooth shapes it is the share of the volume between an outer and an in
 that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
 difference from what 'auto' finds, plus the error of that. 0 if separated.)");
   cls.def_prop_ro(
+      "widened", [](const Overlap& o) { return solid(o) && measured(o).quantities().widened; },
+      R"(True if double arithmetic could not place the volume within 1e-12 of itself, and it was computed again in wider
+arithmetic from the shapes' own numbers, as were centroid, area, inertia and gradient.)");
+  cls.def_prop_ro(
       "area", [](const Overlap& o) { return solid(o) ? measured(o).quantities().area : 0.0; },
       "m², of the surface of the common polytope; 0 unless overlapping.");
   cls.def_prop_ro(

@@ -119,7 +119,10 @@ nb::tuple hull_state(const Hull& hull) {
                         nb::cast(to_numpy(d.vertices), nb::rv_policy::move),
                         nb::cast(halfspace_rows(d.planes), nb::rv_policy::move),
                         nb::cast(to_numpy(std::span<const int>(d.ring)), nb::rv_policy::move),
-                        nb::cast(to_numpy(std::span<const int>(d.ring_start)), nb::rv_policy::move));
+                        nb::cast(to_numpy(std::span<const int>(d.ring_start)), nb::rv_policy::move),
+                        nb::cast(to_numpy(d.corners), nb::rv_policy::move),
+                        nb::cast(to_numpy(std::span<const int>(d.triangles.data()->data(), 3 * d.triangles.size())),
+                                 nb::rv_policy::move));
 }
 
 Hull hull_from_state(nb::tuple state) {
@@ -137,6 +140,10 @@ Hull hull_from_state(nb::tuple state) {
   };
   data->ring = integers(state[3]);
   data->ring_start = integers(state[4]);
+  data->corners = to_rows(state[5], "corners");
+  const std::vector<int> triangles = integers(state[6]);
+  for (size_t i = 0; i + 2 < triangles.size(); i += 3)
+    data->triangles.push_back({triangles[i], triangles[i + 1], triangles[i + 2]});
   const HullMeasures measures = measure(*data);
   data->volume = measures.volume;
   data->centroid = measures.centroid;

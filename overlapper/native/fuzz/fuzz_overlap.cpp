@@ -1,0 +1,289 @@
+// libFuzzer harness: raw bytes become two to four placed shapes, near-degenerate ones above all, and every quantity of
+// their overlap is asked for and checked. With OVERLAPPER_FUZZ_PRINT set, the shapes are printed as Python before.
+
+#include <fuzzer/FuzzedDataProvider.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+
+#include "overlap.h"
+
+namespace overlapper {
+namespace {
+
+// ------------------------------------------------------------------------------------------------------ bytes to bodies
+
+/// Decodes bytes so that coincidences are likely: lattice points, copies off by an ulp, faces that just meet.
+class Decoder {
+ public:
+  Decoder(const uint8_t* data, size_t size) : bytes_(data, size) {}
+
+  int integer(int low, int high) { return bytes_.ConsumeIntegralInRange(low, high); }
+
+  double power_of_two(int low, int high) { return std::ldexp(1.0, integer(low, high)); }
+
+  double real() {
+    const double whole = integer(-3, 3);
+    switch (integer(0, 5)) {
+      case 0: return whole / 4;
+      case 1: return bytes_.ConsumeFloatingPointInRange(-1.0, 1.0);
+      case 2: return whole + integer(-2, 2) * 0x1p-52;
+      case 3: return whole * power_of_two(-40, 0);
+      default: return whole;
+    }
+  }
+
+  double positive() {
+    const double value = std::abs(real());
+    return value > 0 ? value : 1;
+  }
+
+  Vec3 vector() {
+    const double x = real(), y = real(), z = real();
+    return {x, y, z};
+  }
+
+  Vec3 direction() {
+    const double x = integer(-2, 2), y = integer(-2, 2), z = integer(-2, 2);
+    return unit(x == 0 && y == 0 && z == 0 ? Vec3{0, 0, 1} : Vec3{x, y, z});
+  }
+
+  Quaternion orientation() {
+    if (integer(0, 1) == 0) return {};
+    const Quaternion q{real(), real(), real(), real()};
+    return q.x == 0 && q.y == 0 && q.z == 0 && q.w == 0 ? Quaternion{} : q;
+  }
+
+  /// Points of which some are copies, nearly copies or middles of earlier ones, flattened by up to 2^-30.
+  std::vector<Vec3> points() {
+    std::vector<Vec3> points;
+    const int count = integer(4, 20);
+    while (static_cast<int>(points.size()) < count) {
+      const int kind = points.empty() ? 0 : integer(0, 7);
+      const auto earlier = [&] { return points[integer(0, static_cast<int>(points.size()) - 1)]; };
+      if (kind == 7) points.push_back(0.5 * (earlier() + earlier()));
+      else if (kind == 6) points.push_back(earlier() + power_of_two(-52, -1) * direction());
+      else points.push_back(vector());
+    }
+    const Vec3 stretch{power_of_two(-30, 0), 1, 1};
+    if (integer(0, 3) == 0)
+      for (Vec3& p : points) p.x *= stretch.x;
+    return points;
+  }
+
+  /// What bytes that have run out decode to, a box, is what is cheapest.
+  Shape shape() {
+    switch (integer(0, 8)) {
+      case 0:
+      case 1: return make_box({positive(), positive(), positive()});
+      case 2: return make_sphere(positive());
+      case 3: return make_capsule(positive(), positive());
+      case 4: return make_cylinder(positive(), positive());
+      case 5: return make_half_space(direction(), real());
+      default: return make_hull(points());
+    }
+  }
+
+  Placed placed() {
+    Shape chosen = shape();
+    const Vec3 position = vector();
+    return make_placed(std::move(chosen), position, orientation());
+  }
+
+  /// The body moved until its support plane against `direction` meets that of the other, but for a nudge.
+  Placed brought_to(const Placed& body, const Placed& other) {
+    const Vec3 u = direction();
+    const double nudge = integer(0, 2) == 0 ? 0 : integer(-2, 2) * power_of_two(-52, -1);
+    const double step = dot(u, other.support(u)) - dot(u, body.support(-u)) + nudge;
+    return make_placed(body.shape, body.position + step * u, body.orientation);
+  }
+
+  std::vector<Placed> bodies() {
+    std::vector<Placed> bodies;
+    const int count = 2 + std::max(0, integer(-4, 2));
+    while (static_cast<int>(bodies.size()) < count) {
+      const bool again = !bodies.empty() && integer(0, 7) == 0;
+      Placed body = again ? make_placed(bodies.back().shape, vector(), orientation()) : placed();
+      const bool both_bounded = !bodies.empty() && bounded(body.shape) && bounded(bodies[0].shape);
+      if (both_bounded && integer(0, 1) == 0) body = brought_to(body, bodies[0]);
+      bodies.push_back(std::move(body));
+    }
+    if (integer(0, 7) == 0) {
+      const Vec3 away = power_of_two(0, 26) * direction();
+      for (Placed& body : bodies) body = make_placed(body.shape, body.position + away, body.orientation);
+    }
+    return bodies;
+  }
+
+  double tolerance() { return 0.1 / power_of_two(0, 6); }
+
+ private:
+  FuzzedDataProvider bytes_;
+};
+
+// ---------------------------------------------------------------------------------------------------- bodies to Python
+
+void print(Vec3 v) { std::fprintf(stderr, "(%.17g, %.17g, %.17g)", v.x, v.y, v.z); }
+
+void print(const Shape& shape) {
+  struct Visitor {
+    void operator()(const Sphere& s) const { std::fprintf(stderr, "Sphere(%.17g)", s.radius); }
+    void operator()(const Box& b) const { std::fprintf(stderr, "Box("), print(b.half_extents), std::fprintf(stderr, ")"); }
+    void operator()(const Capsule& c) const { std::fprintf(stderr, "Capsule(%.17g, %.17g)", c.radius, c.length); }
+    void operator()(const Cylinder& c) const { std::fprintf(stderr, "Cylinder(%.17g, %.17g)", c.radius, c.length); }
+    void operator()(const Hull& h) const {
+      std::fprintf(stderr, "Hull([");
+      for (Vec3 v : h.data->vertices) print(v + h.data->origin), std::fprintf(stderr, ", ");
+      std::fprintf(stderr, "])");
+    }
+    void operator()(const HalfSpace& h) const {
+      std::fprintf(stderr, "HalfSpace("), print(h.plane.normal), std::fprintf(stderr, ", %.17g)", h.plane.offset);
+    }
+  };
+  std::visit(Visitor{}, shape);
+}
+
+void print(const std::vector<Placed>& bodies, double tolerance, const char* method) {
+  std::fprintf(stderr, "overlap(");
+  for (const Placed& body : bodies) {
+    const Quaternion q = body.orientation;
+    std::fprintf(stderr, "Placed("), print(body.shape), std::fprintf(stderr, ", "), print(body.position);
+    std::fprintf(stderr, ", (%.17g, %.17g, %.17g, %.17g)), ", q.x, q.y, q.z, q.w);
+  }
+  std::fprintf(stderr, "tolerance=%.17g, method='%s')\n", tolerance, method);
+}
+
+// ------------------------------------------------------------------------------------------------------------ invariants
+
+void require(bool condition, const char* what) {
+  if (condition) return;
+  std::fprintf(stderr, "violated: %s\n", what);
+  std::abort();
+}
+
+bool sound(double value) { return std::isfinite(value) && value >= 0; }
+
+bool any_bounded(const std::vector<Placed>& bodies) {
+  return std::any_of(bodies.begin(), bodies.end(), [](const Placed& b) { return bounded(b.shape); });
+}
+
+/// How far the bounded bodies reach from the origin.
+double extent(const std::vector<Placed>& bodies) {
+  double reach = 0;
+  for (const Placed& body : bodies) {
+    reach = std::max(reach, norm(body.position));
+    if (!bounded(body.shape)) continue;
+    const Bounds box = bounds(body);
+    reach = std::max(reach, norm(max(abs(box.lower), abs(box.upper))));
+  }
+  return reach;
+}
+
+void check_volume(const Overlap& overlap) {
+  const double volume = overlap.volume(), error = overlap.volume_error();
+  require(sound(volume), "the volume is finite and not negative");
+  require(error >= 0, "the error of the volume is not negative");
+  require(std::isfinite(error) || !any_bounded(overlap.bodies()), "the error of the volume is finite");
+  if (overlap.status() == Status::kSeparated && overlap.method() == Method::kAuto)
+    require(error == 0, "separated bodies have nothing in common for certain");
+  for (const Placed& body : overlap.bodies())
+    require(volume - error <= overlapper::volume(body.shape) * (1 + 1e-12), "the common part is no larger than a body");
+}
+
+void check_region(const Region& region, bool simple) {
+  const Polytope& p = region.polytope;
+  const int vertices = static_cast<int>(p.vertices.size()), edges = static_cast<int>(p.ring.size()) / 2;
+  require(vertices - edges + p.facets() == 2, "Euler's formula for the region");
+  if (simple) require(p.ring.size() == 3 * p.vertices.size(), "every vertex lies on three facets");
+  for (Vec3 v : p.vertices) require(finite(region.to_world(v)), "the region's vertices are finite");
+  for (double t : region.inner) require(t >= 0 && t <= 1, "vertices are pulled inwards");
+}
+
+void check_quantities(const Quantities& q) {
+  require(q.volume > 0 && q.area > 0 && std::isfinite(q.area), "an overlap has a volume and a surface");
+  require(finite(q.centroid), "the centroid is finite");
+  for (Vec3 row : {q.inertia.row0, q.inertia.row1, q.inertia.row2}) require(finite(row), "the inertia is finite");
+}
+
+void check_surface(const Surface& surface, int bodies) {
+  const int facets = static_cast<int>(surface.planes.size()), vertices = static_cast<int>(surface.vertices.size());
+  require(surface.ring.size() % 2 == 0 && surface.owner.size() == surface.planes.size(), "facets are complete");
+  require(vertices - static_cast<int>(surface.ring.size()) / 2 + facets == 2, "Euler's formula for the surface");
+  for (int v : surface.ring) require(v >= 0 && v < vertices, "facets refer to vertices");
+  for (int owner : surface.owner) require(owner >= 0 && owner < bodies, "facets have an owner");
+  for (const auto& polygon : surface.patch) {
+    require(polygon.size() >= 3, "the patch consists of polygons");
+    for (Vec3 v : polygon) require(finite(v), "the patch is finite");
+  }
+}
+
+void check_contact(const Overlap& overlap) {
+  const Overlap::Contact& c = overlap.contact();
+  const Placed &a = overlap.bodies()[0], &b = overlap.bodies()[1];
+  require(std::abs(norm(c.normal) - 1) < 1e-12, "the normal has length one");
+  require(sound(c.depth) && sound(c.distance), "depth and distance are finite and not negative");
+  if (overlap.status() == Status::kOverlapping) return;
+  require(finite(c.witness_a) && finite(c.witness_b), "the witness points are finite");
+  require(finite(c.separating.normal) && std::isfinite(c.separating.offset), "the separating plane is finite");
+  const double blur = 0x1p-46 * extent(overlap.bodies());
+  if (overlap.status() != Status::kSeparated) return;
+  require(c.distance > 0, "separated bodies are apart");
+  if (bounded(a.shape))
+    require(signed_distance(c.separating, a.support(-c.normal)) >= -blur, "the separating plane has a on its far side");
+  if (bounded(b.shape))
+    require(signed_distance(c.separating, b.support(c.normal)) <= blur, "the separating plane has b on its near side");
+}
+
+/// The forces are the area vectors of the facets, which close.
+void check_gradient(const Overlap& overlap) {
+  Vec3 sum;
+  for (const auto& row : overlap.gradient()) {
+    for (double slope : row) require(std::isfinite(slope), "the gradient is finite");
+    sum += {row[0], row[1], row[2]};
+  }
+  if (overlap.method() == Method::kAuto)
+    require(norm(sum) <= 0x1p-40 * overlap.quantities().area, "the area vectors sum to zero");
+}
+
+void check(const Overlap& overlap) {
+  check_volume(overlap);
+  if (overlap.status() == Status::kOverlapping) {
+    check_region(overlap.region(), overlap.method() == Method::kAuto);
+    check_quantities(overlap.quantities());
+    check_gradient(overlap);
+    check_surface(overlap.surface(), static_cast<int>(overlap.bodies().size()));
+  }
+  if (overlap.pair()) check_contact(overlap);
+}
+
+void check_order(const Overlap& overlap) {
+  const Overlap reversed({overlap.bodies().rbegin(), overlap.bodies().rend()}, overlap.tolerance(), overlap.method());
+  require(reversed.status() == overlap.status(), "the status does not depend on the order");
+  if (!any_bounded(overlap.bodies())) return;
+  require(std::abs(reversed.volume() - overlap.volume()) <= reversed.volume_error() + overlap.volume_error(),
+          "the volumes of two orders agree within their bounds");
+}
+
+void run(Decoder& decoder) {
+  const Method method = decoder.integer(0, 3) == 0 ? Method::kPaper : Method::kAuto;
+  const double tolerance = decoder.tolerance();
+  const std::vector<Placed> bodies = decoder.bodies();
+  if (std::getenv("OVERLAPPER_FUZZ_PRINT")) print(bodies, tolerance, method == Method::kPaper ? "paper" : "auto");
+  const Overlap overlap(bodies, tolerance, method);
+  check(overlap);
+  if (method == Method::kAuto) check_order(overlap);
+}
+
+}  // namespace
+}  // namespace overlapper
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  overlapper::Decoder decoder(data, size);
+  try {
+    overlapper::run(decoder);
+  } catch (const std::invalid_argument&) {
+    // Flat hulls and half-spaces alone are refused, which is an answer.
+  }
+  return 0;
+}

@@ -1,0 +1,64 @@
+#pragma once
+
+#include "vec.h"
+
+namespace overlapper {
+
+/// The sum head + tail, where tail is at most half an ulp of head. Of one addition or product it is exact (Knuth;
+/// Dekker); further operations are right to about 2^-100 of the larger operand.
+struct DoubleDouble {
+  double head = 0, tail = 0;
+};
+
+inline DoubleDouble two_sum(double a, double b) {
+  const double sum = a + b, b_part = sum - a, a_part = sum - b_part;
+  return {sum, (a - a_part) + (b - b_part)};
+}
+
+inline DoubleDouble two_product(double a, double b) {
+  const double product = a * b;
+  return {product, std::fma(a, b, -product)};
+}
+
+inline DoubleDouble normalised(double head, double tail) {
+  const double sum = head + tail;
+  return {sum, tail - (sum - head)};
+}
+inline DoubleDouble operator+(DoubleDouble a, DoubleDouble b) {
+  const DoubleDouble high = two_sum(a.head, b.head), low = two_sum(a.tail, b.tail);
+  const DoubleDouble partial = normalised(high.head, high.tail + low.head);
+  return normalised(partial.head, partial.tail + low.tail);
+}
+inline DoubleDouble operator-(DoubleDouble a) { return {-a.head, -a.tail}; }
+inline DoubleDouble operator-(DoubleDouble a, DoubleDouble b) { return a + (-b); }
+inline DoubleDouble operator*(DoubleDouble a, DoubleDouble b) {
+  const DoubleDouble product = two_product(a.head, b.head);
+  return normalised(product.head, product.tail + (a.head * b.tail + a.tail * b.head));
+}
+
+inline DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
+  const double first = a.head / b.head;
+  const DoubleDouble rest = a - DoubleDouble{first} * b;
+  return normalised(first, rest.head / b.head);
+}
+
+struct WideVector {
+  DoubleDouble x, y, z;
+};
+
+/// a - b, exactly.
+inline WideVector wide_difference(Vec3 a, Vec3 b) {
+  return {two_sum(a.x, -b.x), two_sum(a.y, -b.y), two_sum(a.z, -b.z)};
+}
+
+inline WideVector wide_cross(const WideVector& u, const WideVector& v) {
+  return {u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
+}
+
+inline WideVector wide(Vec3 v) { return {{v.x}, {v.y}, {v.z}}; }
+inline WideVector operator+(const WideVector& a, const WideVector& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline WideVector operator-(const WideVector& a, const WideVector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline DoubleDouble dot(const WideVector& a, const WideVector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Vec3 rounded(const WideVector& v) { return {v.x.head, v.y.head, v.z.head}; }
+
+}  // namespace overlapper

@@ -1,0 +1,93 @@
+#include "wide_dual.h"
+
+#include "wide.h"
+
+namespace overlapper {
+namespace {
+
+struct WideMatrix {
+  WideVector row0, row1, row2;
+};
+
+WideVector operator*(const WideMatrix& m, const WideVector& v) {
+  return {dot(m.row0, v), dot(m.row1, v), dot(m.row2, v)};
+}
+
+WideVector scaled(const WideVector& v, DoubleDouble s) { return {v.x * s, v.y * s, v.z * s}; }
+
+WideVector apply_transposed(const WideMatrix& m, const WideVector& v) {
+  return scaled(m.row0, v.x) + scaled(m.row1, v.y) + scaled(m.row2, v.z);
+}
+
+/// The rotation that a quaternion of any length stands for.
+WideMatrix wide_rotation(Quaternion q) {
+  const DoubleDouble xx = two_product(q.x, q.x), yy = two_product(q.y, q.y), zz = two_product(q.z, q.z),
+                     ww = two_product(q.w, q.w), xy = two_product(q.x, q.y), xz = two_product(q.x, q.z),
+                     yz = two_product(q.y, q.z), xw = two_product(q.x, q.w), yw = two_product(q.y, q.w),
+                     zw = two_product(q.z, q.w);
+  const DoubleDouble length2 = xx + yy + zz + ww, two{2};
+  const auto part = [&](DoubleDouble value) { return value / length2; };
+  return {{part(ww + xx - yy - zz), part(two * (xy - zw)), part(two * (xz + yw))},
+          {part(two * (xy + zw)), part(ww - xx + yy - zz), part(two * (yz - xw))},
+          {part(two * (xz - yw)), part(two * (yz + xw)), part(ww - xx - yy + zz)}};
+}
+
+/// Makes the dual points of one body: the frame's origin and axes are turned into its own coordinates once, and its
+/// planes stay as they are.
+class BodyDuals {
+ public:
+  BodyDuals(const Placed& body, int owner, Vec3 reference, const Frame& frame)
+      : owner_(owner), rotation_(wide_rotation(body.orientation)) {
+    const WideVector from_body = wide_difference(reference, body.position) + wide(frame.origin);
+    origin_ = apply_transposed(rotation_, from_body);
+    if (const Hull* hull = std::get_if<Hull>(&body.shape)) origin_ = origin_ - wide(hull->data->origin);
+    const Mat3 columns = transposed(frame.axes);
+    axis_ = {apply_transposed(rotation_, wide(columns.row0)), apply_transposed(rotation_, wide(columns.row1)),
+             apply_transposed(rotation_, wide(columns.row2))};
+  }
+
+  /// Of the plane with that normal, of any length, through a point or at a height along the normal.
+  WideDual through(const WideVector& normal, Vec3 point) const {
+    return make(normal, dot(normal, wide(point) - origin_));
+  }
+  WideDual at(const WideVector& normal, double height) const {
+    return make(normal, DoubleDouble{height} - dot(normal, origin_));
+  }
+
+ private:
+  WideDual make(const WideVector& normal, DoubleDouble slack) const {
+    const Vec3 direction = rounded(rotation_ * normal);
+    const WideVector along = axis_ * normal;
+    return {rounded({along.x / slack, along.y / slack, along.z / slack}), unit(direction), slack.head / norm(direction),
+            owner_};
+  }
+
+  int owner_;
+  WideMatrix rotation_;
+  WideVector origin_;  ///< of the frame, in the body's coordinates
+  WideMatrix axis_;    ///< of the frame, by rows, in the body's coordinates
+};
+
+}  // namespace
+
+std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference, const Frame& frame) {
+  std::vector<WideDual> duals;
+  for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
+    const BodyDuals body(bodies[i], i, reference, frame);
+    if (const Hull* hull = std::get_if<Hull>(&bodies[i].shape)) {
+      for (const auto& [a, b, c] : hull->data->triangles) {
+        const std::vector<Vec3>& corner = hull->data->corners;
+        const WideVector normal =
+            wide_cross(wide_difference(corner[b], corner[a]), wide_difference(corner[c], corner[a]));
+        duals.push_back(body.through(normal, corner[a]));
+      }
+      continue;
+    }
+    std::vector<Plane> planes;
+    append_planes(bodies[i].shape, planes);
+    for (const Plane& plane : planes) duals.push_back(body.at(wide(plane.normal), plane.offset));
+  }
+  return duals;
+}
+
+}  // namespace overlapper
