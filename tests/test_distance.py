@@ -14,6 +14,7 @@ from strategies import (
     overlapping_points,
     placed,
     polyhedra,
+    quaternion,
     reach,
     rotation,
     solids,
@@ -212,6 +213,15 @@ def test_depth_of_hulls_is_the_exact_one(seed):
     assert gap(*answer.shapes, answer.normal) == pytest.approx(-truth, rel=1e-12)
 
 
+@pytest.mark.parametrize("slenderness", [1e-1, 1e-2, 1e-3, 1e-6])
+def test_depth_of_slender_hulls_is_the_exact_one(slenderness):
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        p, q = (hull_points(rng, 10) * [1, *slenderness ** rng.random(2)] @ rotation(quaternion(rng)).T for _ in "pq")
+        truth = float(exact.depth_squared(exact.hull(p), exact.hull(q))) ** 0.5
+        assert penetration_depth(p, q) == pytest.approx(truth, rel=1e-9, abs=1e-15)
+
+
 @given(placed(solids), placed(solids))
 def test_no_direction_separates_sooner_than_the_depth(a, b):
     answer = overlap(a, b)
@@ -305,6 +315,16 @@ def test_a_body_in_the_hole_of_its_own_corner_touches_there():
     second = Hull(-CORNERS + (1, 1, 1))
     assert_array_equal(first.bounds[1], second.bounds[0])
     assert overlap(first, second).status == "touching"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_functions_and_the_answer_agree_on_what_touches(seed):
+    rng = np.random.default_rng(seed)
+    q, shape = rng.integers(1, 3, 4) * rng.choice([-1.0, 1.0], 4), Box(rng.uniform(0.2, 1.5, 3))
+    for _ in range(10):
+        a, b = (Placed(shape, rng.integers(-1, 2, 3) * shape.half_extents, q) for _ in "ab")
+        answer = overlap(a, b)
+        assert (distance(a, b), penetration_depth(a, b)) == (answer.distance, answer.depth)
 
 
 # Intersection over union
