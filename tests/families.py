@@ -1,0 +1,534 @@
+"""Hard cases by name and seed: bodies given as doubles, with their exact common part or a closed form.
+
+Every family is a function of a numpy generator. `parameter` of a case says how degenerate it is: thickness, tilt,
+offset, aspect, distance, as the family's docstring tells. Vertices are turned and moved in doubles first and then taken
+as given, so that the exact truth and the core see the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import product
+from math import pi
+from typing import NamedTuple
+from zlib import crc32
+
+import exact
+import numpy as np
+from scipy.spatial import ConvexHull
+from strategies import directions, hull_points, overlapping_points, quaternion, rotation, turn
+
+from overlapper import Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
+
+CORNERS = np.array(list(product((-1, 1), repeat=3)), float)
+OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
+TETRA = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], float)
+GOLDEN = (1 + np.sqrt(5)) / 2
+DODECAHEDRON = np.vstack(
+    [CORNERS, *(np.roll([0, s / GOLDEN, t * GOLDEN], k) for k in range(3) for s in (-1, 1) for t in (-1, 1))]
+)
+ULP = 2.0**-52
+FEATURES = ("face", "edge", "vertex")
+
+
+class Below(NamedTuple):
+    """{ x : normal . x <= offset }, the normal of any length."""
+
+    normal: tuple[float, float, float]
+    offset: float
+
+
+class Posed(NamedTuple):
+    """The hull of points, turned by a quaternion (x, y, z, w) of any length, then moved."""
+
+    points: np.ndarray
+    position: np.ndarray
+    orientation: np.ndarray
+
+
+@dataclass
+class Case:
+    detail: str
+    parameter: float
+    bodies: tuple[np.ndarray | Below | Posed | Placed, ...]
+    closed_form: float | None = None  # the volume, of cases with round bodies
+    family: str = ""
+    seed: int = 0
+
+    def __repr__(self) -> str:
+        return f"{self.family}[{self.seed}] {self.detail} {self.parameter:.3g}"
+
+    @property
+    def placed(self) -> list:
+        """What `overlap` is given."""
+        return [placed(body) for body in self.bodies]
+
+    @cached_property
+    def solids(self) -> list[exact.Polytope]:
+        return [exact.hull(points_of(body)) for body in self.bodies if not isinstance(body, Below)]
+
+    @cached_property
+    def truth(self) -> exact.Polytope:
+        """The common part without rounding."""
+        part = exact.common(*self.solids) if self.solids else exact.hull(CORNERS * 2.0**20)
+        for body in self.bodies:
+            if isinstance(body, Below):
+                part = exact.clipped(part, exact.halfspace(*body), -1)
+        return part
+
+    @cached_property
+    def boxes(self) -> list[np.ndarray]:
+        """Lower and upper corner of each bounded body."""
+        clouds = [np.array(points_of(body), float) for body in self.bodies if not isinstance(body, Below)]
+        return [np.array([cloud.min(0), cloud.max(0)]) for cloud in clouds]
+
+    @property
+    def size(self) -> float:
+        """Of the smallest body."""
+        return min((float(np.linalg.norm(box[1] - box[0])) for box in self.boxes), default=1.0)
+
+    @property
+    def extent(self) -> float:
+        """Of all bodies together, wherever they are in the world."""
+        if not self.boxes:
+            return 1.0
+        lower, upper = np.min([b[0] for b in self.boxes], 0), np.max([b[1] for b in self.boxes], 0)
+        return float(np.linalg.norm(upper - lower))
+
+
+def placed(body):
+    if isinstance(body, Below):
+        return HalfSpace(*body)
+    return Placed(Hull(body.points), body.position, body.orientation) if isinstance(body, Posed) else body
+
+
+def points_of(body):
+    return exact.placed(*body) if isinstance(body, Posed) else body
+
+
+# Parts
+
+
+def power(rng, low, high):
+    """10 to a random whole number, both ends included."""
+    return 10.0 ** int(rng.integers(low, high + 1))
+
+
+def coarse(values, bits=10):
+    """Multiples of 2^-bits: sums and small multiples of them are exact."""
+    return np.round(np.asarray(values, float) * 2.0**bits) / 2.0**bits
+
+
+def polygon(rng, sides):
+    angles = 2 * np.pi * (np.arange(sides) + rng.uniform(0, 0.4, sides)) / sides
+    return rng.uniform(0.4, 1.0, (sides, 1)) * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def standing(rng, feature):
+    """A body on the plane z = 0, with the origin inside of the face or edge or at the vertex it stands on."""
+    if feature == "face":
+        foot = coarse(polygon(rng, int(rng.integers(3, 7))))
+    elif feature == "edge":
+        along = coarse(directions(rng, 1)[0, :2] + [0.1, 0])
+        foot = np.outer([-rng.integers(1, 4) / 4, rng.integers(1, 4) / 4], along)
+    else:
+        foot = np.zeros((1, 2))
+    crown = coarse(polygon(rng, int(rng.integers(3, 8))) * rng.uniform(0.5, 1.5))
+    height = coarse(rng.uniform(0.4, 1.2, len(crown)))
+    return np.vstack([np.column_stack([foot, np.zeros(len(foot))]), np.column_stack([crown, height])])
+
+
+def sheared(rng):
+    """A matrix of small integers and determinant 1: it slants planes without rounding."""
+    lower = np.tril(rng.integers(-2, 3, (3, 3)), -1) + np.eye(3)
+    upper = np.triu(rng.integers(-2, 3, (3, 3)), 1) + np.eye(3)
+    return lower @ upper
+
+
+def mapped(points, matrix):
+    """Every point by the same few roundings, wherever in the array it is and whatever machine multiplies."""
+    return points[:, :1] * matrix[:, 0] + points[:, 1:2] * matrix[:, 1] + points[:, 2:] * matrix[:, 2]
+
+
+def turned(rng, points):
+    return mapped(points, rotation(quaternion(rng)))
+
+
+def somewhere(rng, bodies, ways=("straight", "sheared", "turned")):
+    """The same bodies left as they are, slanted without rounding, or turned and moved with it."""
+    way = str(rng.choice(ways))
+    if way == "sheared":
+        matrix, shift = sheared(rng), rng.integers(-3, 4, 3)
+    elif way == "turned":
+        matrix, shift = rotation(quaternion(rng)), rng.normal(size=3)
+    else:
+        matrix, shift = np.eye(3), np.zeros(3)
+    return way, tuple(mapped(points, matrix) + shift for points in bodies)
+
+
+def stacked(rng, low, high, gap, tilt=0.0):
+    """A body hanging below z = 0 by a feature, and one standing on it, lifted by a gap or sunk where it is negative."""
+    below = standing(rng, low) * [1, 1, -1]
+    above = standing(rng, high)
+    if tilt:
+        axis = directions(rng, 1)[0] * [1, 1, 0]
+        above = mapped(above, rotation(turn(tilt * axis)))
+    return below, above + [0, 0, gap]
+
+
+def two_features(rng):
+    return str(rng.choice(FEATURES)), str(rng.choice(FEATURES))
+
+
+def box_of(lower, upper):
+    return np.array(list(product(*zip(lower, upper))), float)
+
+
+def icosphere(subdivisions):
+    """Vertices of an icosahedron, its triangles halved in every edge so many times: 20, 80, 320, 1280 facets."""
+    points = [np.roll([0, s, t * GOLDEN], k) for k in range(3) for s in (-1, 1) for t in (-1, 1)]
+    points = [p / np.linalg.norm(p) for p in points]
+    reach = 1.2
+    for _ in range(subdivisions):
+        cloud = np.array(points)
+        near = np.linalg.norm(cloud[:, None] - cloud[None], axis=2) < reach
+        middles = [cloud[i] + cloud[j] for i, j in zip(*np.nonzero(np.triu(near, 1)))]
+        points += [m / np.linalg.norm(m) for m in middles]
+        reach *= 0.55
+    return np.array(points)
+
+
+def prism(sides, height=1.0):
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.vstack([np.column_stack([ring, np.full(sides, z)]) for z in (-height / 2, height / 2)])
+
+
+# Families of pairs
+
+
+def general(rng):
+    """Hulls that share the origin as an inner point."""
+    return Case("hulls", 1.0, tuple(overlapping_points(rng)))
+
+
+def posed(rng):
+    """Hulls under quaternions that nobody normalised, `parameter` metres from where their points are counted from."""
+    reach = power(rng, -1, 3)
+    centre = reach * rng.normal(size=3)
+    clouds = overlapping_points(rng)
+    return Case("quaternion", reach, tuple(Posed(p, centre, quaternion(rng) * rng.uniform(0.1, 10)) for p in clouds))
+
+
+def slivers(rng):
+    """A feature sunk into another: `parameter` is the depth, from a tenth to 1e-12 of the size."""
+    low, high = two_features(rng)
+    depth = power(rng, -12, -1)
+    way, bodies = somewhere(rng, stacked(rng, low, high, -depth))
+    return Case(f"{low}-{high} {way}", depth, bodies)
+
+
+def tilted_slivers(rng):
+    """Slivers of which one body is tilted by 1e-3 to 1e-12: `parameter` is the tilt."""
+    low, high = two_features(rng)
+    tilt, depth = power(rng, -12, -3), power(rng, -12, -1)
+    way, bodies = somewhere(rng, stacked(rng, low, high, -depth, tilt))
+    return Case(f"{low}-{high} depth {depth:.0e} {way}", tilt, bodies)
+
+
+def touching(rng):
+    """Two features in contact without rounding."""
+    low, high = two_features(rng)
+    way, bodies = somewhere(rng, stacked(rng, low, high, 0.0), ("straight", "sheared"))
+    return Case(f"{low}-{high} {way}", 0.0, bodies)
+
+
+def parallel_edges(rng):
+    """Two edges along one line, in contact without rounding or off by `parameter`."""
+    along = coarse(directions(rng, 1)[0, :2] + [0.1, 0])
+    gap = float(rng.choice([0, 0, ULP, -ULP, 1e-12, -1e-12, -1e-6]))
+    bodies = []
+    for sign in (-1, 1):
+        foot = np.outer([-rng.integers(1, 4) / 4, rng.integers(1, 4) / 4], along)
+        crown = standing(rng, "vertex")[1:] * [1, 1, sign]
+        bodies.append(np.vstack([np.column_stack([foot, np.zeros(2)]), crown]))
+    bodies[1] += [0, 0, gap]
+    way, bodies = somewhere(rng, bodies, ("straight", "sheared"))
+    return Case(way, gap, bodies)
+
+
+def nearly_touching(rng):
+    """Two features in contact but for `parameter`: an ulp to 1e-6, apart or sunk; or for the rounding of a turn."""
+    low, high = two_features(rng)
+    gap = float(rng.choice([0, ULP, 2 * ULP, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-9, 1e-6]) * rng.choice([-1, 1]))
+    way, bodies = somewhere(rng, stacked(rng, low, high, gap))
+    return Case(f"{low}-{high} {way}", gap, bodies)
+
+
+def identical(rng):
+    """A body with itself, or with its copy grown or turned by `parameter`."""
+    points = hull_points(rng, int(rng.integers(4, 17))) if rng.random() < 0.5 else CORNERS * rng.uniform(0.5, 2, 3)
+    change = float(rng.choice([0, 0, ULP, 1e-14, 1e-12, 1e-9, 1e-6]))
+    if rng.random() < 0.5:
+        way, bodies = somewhere(rng, (points, points * (1 + change)))
+        return Case(f"grown {way}", change, bodies)
+    copy = points if change == 0 else mapped(points, rotation(turn(change * directions(rng, 1)[0])))
+    way, bodies = somewhere(rng, (points, copy))
+    return Case(f"turned {way}", change, bodies)
+
+
+def shared_planes(rng):
+    """Boxes with `parameter` of their six face planes in common."""
+    shared = int(rng.integers(1, 6))
+    lower, upper = -rng.integers(2, 9, 3) / 4, rng.integers(2, 9, 3) / 4
+    other = np.concatenate([lower, upper])
+    for i in rng.permutation(6)[shared:]:
+        other[i] += rng.choice([-0.375, -0.125, 0.125, 0.5])
+    way, bodies = somewhere(rng, (box_of(lower, upper), box_of(other[:3], other[3:])))
+    return Case(way, shared, bodies)
+
+
+def shared_facets(rng):
+    """Hulls of which `parameter` triangles are the same, both bodies on one side of each."""
+    shared = int(rng.integers(1, 6))
+    points = hull_points(rng, 14)
+    triangles = rng.permutation(ConvexHull(points).simplices)
+    common = points[np.unique(triangles[:shared])]
+    clouds = [np.vstack([common, rng.dirichlet(np.full(14, 0.5), 6) @ points]) for _ in range(2)]
+    way, bodies = somewhere(rng, clouds)
+    return Case(way, shared, bodies)
+
+
+def nested_flush(rng):
+    """A hull in another one, with `parameter` of the other's vertices."""
+    points = coarse(hull_points(rng, int(rng.integers(8, 17))))
+    kept = int(rng.integers(3, 8))
+    inner = np.vstack([points[:kept], coarse(0.25 * hull_points(rng, 4))])
+    way, bodies = somewhere(rng, (points, inner))
+    return Case(way, kept, bodies)
+
+
+def needles_and_plates(rng):
+    """Bodies stretched by up to `parameter`, a power of ten up to 1e6, in one or two directions each."""
+    bodies, aspect = [], 1.0
+    for points in overlapping_points(rng):
+        thin = 10.0 ** -rng.integers(0, 7, 3).astype(float)
+        thin[int(rng.integers(3))] = 1
+        aspect = max(aspect, 1 / thin.min())
+        bodies.append(turned(rng, points * thin))
+    return Case("crossing", aspect, tuple(bodies))
+
+
+def stacked_plates(rng):
+    """Plates of thickness `parameter` sunk into each other by a part of it."""
+    thin = power(rng, -6, -1)
+    low, high = stacked(rng, "face", "face", 0.0)
+    way, bodies = somewhere(rng, (low * [1, 1, thin], high * [1, 1, thin] - [0, 0, thin * power(rng, -6, -1)]))
+    return Case(way, thin, bodies)
+
+
+def any_pair(rng):
+    choose = [general, slivers, tilted_slivers, touching, nearly_touching, identical, shared_planes, nested_flush]
+    return choose[int(rng.integers(len(choose)))](rng)
+
+
+def scaled(rng):
+    """A pair of any other family, `parameter` times as large: 1e-9 to 1e6."""
+    case, scale = any_pair(rng), power(rng, -9, 6)
+    return Case(case.detail, scale, tuple(points * scale for points in case.bodies))
+
+
+def tiny_in_huge(rng):
+    """A body at the origin and one `parameter` times as large, with a vertex, an edge, a face or its inside there."""
+    scale, corners = power(rng, 1, 15), int(rng.integers(1, 5))
+    small = hull_points(rng, int(rng.integers(4, 13)), 1e6 / scale)
+    large = hull_points(rng, int(rng.integers(4, 13)), 1e6)
+    at = rng.dirichlet(np.ones(corners)) @ large[:corners]
+    return Case(f"{corners} corners", scale, (small, large - at))
+
+
+def far_away(rng):
+    """A pair of any other family, `parameter` metres from the origin."""
+    case, distance = any_pair(rng), power(rng, 2, 8)
+    shift = np.round(distance * directions(rng, 1)[0])
+    return Case(case.detail, distance, tuple(points + shift for points in case.bodies))
+
+
+def round_hulls(rng):
+    """Icospheres of 20 to 320 facets, centres apart by nearly their diameter or less: `parameter` is the depth."""
+    depth = float(rng.choice([1.5, 1.0, 0.1, 1e-2, 1e-4, 1e-8]))
+    a, b = (turned(rng, icosphere(int(rng.integers(0, 3)))) for _ in range(2))
+    return Case("icospheres", depth, (a, b + (2 - depth) * directions(rng, 1)[0]))
+
+
+def fine_round_hulls(rng):
+    """Icospheres of 1280 facets against themselves moved by `parameter`, and against boxes."""
+    ball = icosphere(3)
+    depth = float(rng.choice([1.0, 0.05, 1e-3]))
+    if rng.random() < 0.5:
+        return Case("icospheres", depth, (ball, turned(rng, ball) + [2 - depth, 0, 0]))
+    return Case("box", depth, (ball, turned(rng, CORNERS) + [2 - depth, 0, 0]))
+
+
+def prisms(rng):
+    """Prisms of up to 256 sides: one in another, crossed, and stacked on a common flat; `parameter` is the number."""
+    sides = int(rng.choice([16, 64, 256]))
+    a = prism(sides)
+    way = str(rng.choice(["coaxial", "stacked", "crossed", "boxed"]))
+    if way == "coaxial":
+        b = prism(int(rng.choice([16, sides])), 2.0)
+    elif way == "stacked":
+        b = prism(16) + [0.25, 0.25, 1.0 - float(rng.choice([0, 0, ULP, 1e-9, 1e-3]))]
+    elif way == "crossed":
+        b = turned(rng, prism(32, 4.0))
+    else:
+        b = mapped(CORNERS + [rng.uniform(0, 1.9), 0, 0], rotation(turn([0, 0, rng.uniform(0, 1)])))
+    way_out, bodies = somewhere(rng, (a, b), ("straight", "turned"))
+    return Case(f"{way} {way_out}", sides, bodies)
+
+
+def cut_at_edges(rng):
+    """A cube and a body with a plane through some of its vertices or edges without rounding, or `parameter` beside."""
+    beside = float(rng.choice([0, 0, ULP, -ULP, 1e-12, -1e-12, 1e-6]))
+    foot = np.array([float(rng.choice([-3, -1, 1, 3, 3])) + beside, 0, 0])
+    plane = foot + 8.0 * np.array([[1, -1, 0], [0, 1, -1], [-1, 0, 1]])
+    apex = foot + rng.choice([-8.0, 8.0])
+    way, bodies = somewhere(rng, (CORNERS, np.vstack([plane, apex])))
+    return Case(way, beside, bodies)
+
+
+def dual_pairs(rng):
+    """Tetrahedron and its mirror image, cube and octahedron, icosahedron and dodecahedron, the second of the pair as
+    large as `parameter`: vertices touch faces or edges, or edges cross."""
+    choices = [
+        (TETRA, -TETRA, (1.0, 3.0, 1 / 3)),
+        (CORNERS, OCTAHEDRON, (1.0, 1.5, 2.0, 3.0)),
+        (icosphere(0), DODECAHEDRON, (1.0, 0.5, 1.5)),
+    ]
+    a, b, ratios = choices[int(rng.integers(3))]
+    ratio = float(rng.choice(ratios))
+    way, bodies = somewhere(rng, (a, b * ratio))
+    return Case(way, ratio, bodies)
+
+
+# Families of several bodies
+
+
+def compounds(rng):
+    """`parameter` copies of one body about one centre: turned evenly about a diagonal, or at random."""
+    count = int(rng.integers(3, 7))
+    points = [CORNERS, OCTAHEDRON, TETRA][int(rng.integers(3))]
+    if rng.random() < 0.5:
+        axis = np.array([1, 1, 1]) / np.sqrt(3)
+        return Case(
+            "diagonal", count, tuple(mapped(points, rotation(turn(2 * np.pi * k / count * axis))) for k in range(count))
+        )
+    return Case("random", count, tuple(turned(rng, points) for _ in range(count)))
+
+
+def many_bodies(rng):
+    """`parameter` bodies, 3 to 16, about a common point; or with one moved away so that none or little is common."""
+    count = int(rng.integers(3, 17))
+    bodies = overlapping_points(rng, count, 4, 12)
+    way = str(rng.choice(["common", "little", "none"]))
+    if way != "common":
+        u = directions(rng, 1)[0]
+        level = min((p @ u).max() for p in bodies[:-1])
+        share = power(rng, -9, -2) * (1 if way == "none" else -1)
+        bodies[-1] = bodies[-1] + u * (level - (bodies[-1] @ u).min() + share)
+    return Case(way, count, tuple(bodies))
+
+
+def empty_triples(rng):
+    """Three or four bodies around a hole, any of them but one in common; `parameter` is the size of the hole, and of
+    the common part where it is negative."""
+    hole = float(rng.choice([0, 0, 1e-1, 1e-3, 1e-6, 1e-9, 1e-12, ULP]) * rng.choice([-1, 1]))
+    x, y, z = np.eye(3)
+    if rng.random() < 0.5:
+        slabs = [(x, y, z), (y, x, z), (-x - y, x - y, z)]  # the normals sum to zero
+    else:
+        slabs = [(x, y, z), (y, x, z), (z, x, y), (-x - y - z, x - y, y - z)]
+    bodies = []
+    for normal, u, v in slabs:
+        first = int(np.flatnonzero(normal)[0])
+        up = np.eye(3)[first] * normal[first]
+        corners = product((hole, hole + 2), (-4, 4), (-4, 4))
+        bodies.append(np.array([level * up + i * u + j * v for level, i, j in corners]))
+    way, bodies = somewhere(rng, bodies)
+    return Case(f"{len(slabs)} bodies {way}", hole, bodies)
+
+
+def half_spaces(rng):
+    """A hull and one to four half-spaces through its vertices, or `parameter` beside them."""
+    points = coarse(hull_points(rng, int(rng.integers(4, 17))), 6)
+    beside = float(rng.choice([0, 1e-12, -1e-12, 1e-9, 1e-3, -1e-3, 0.3]))
+    planes = []
+    for _ in range(int(rng.integers(1, 5))):
+        normal = rng.integers(-3, 4, 3).astype(float) if rng.random() < 0.6 else rng.normal(size=3)
+        if not normal.any():
+            normal[0] = 1
+        levels = np.sort(points @ normal)
+        planes.append(Below(tuple(normal.tolist()), float(levels[int(rng.choice([0, 0, 1, 2, -1]))] + beside)))
+    return Case(f"{len(planes)}", beside, (points, *planes))
+
+
+def half_spaces_alone(rng):
+    """Half-spaces around the origin that bound their common set, `parameter` of them."""
+    normals = np.vstack([turned(rng, TETRA), rng.normal(size=(int(rng.integers(0, 13)), 3))])
+    offsets = rng.uniform(0.2, 1, len(normals)) * power(rng, -6, 3)
+    bodies = [Below(tuple(n.tolist()), float(d)) for n, d in zip(normals, offsets)]
+    return Case("bounded", len(bodies), tuple(bodies))
+
+
+# Round bodies with a closed form
+
+
+def lenses(rng):
+    """Two balls, or a ball, capsule or cylinder and a half-space, that overlap by `parameter` of a radius."""
+    depth = float(rng.choice([1.0, 0.5, 1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12]))
+    way = str(rng.choice(["balls", "ball", "capsule", "cylinder"]))
+    r, s = rng.integers(4, 17, 2) / 8
+    if way == "balls":
+        step = coarse((r + s - depth * min(r, s)) / 7, 45)
+        centre = step * np.array([2.0, 3.0, 6.0])  # as far as 7 steps, without rounding
+        volume = lens(Fraction(r), Fraction(s), 7 * Fraction(float(step)))
+        return Case(way, depth, (Placed(Sphere(r)), Placed(Sphere(s), centre)), volume)
+    level = -r + depth * r
+    h = Fraction(level) + Fraction(r)
+    floor = Placed(HalfSpace((0, 0, 1), level))
+    if way == "cylinder":
+        return Case(way, depth, (Placed(Cylinder(s, 2 * r)), floor), float(h * Fraction(s) ** 2) * pi)
+    ball = Placed(Sphere(r)) if way == "ball" else Placed(Capsule(r, 2.0), (0, 0, 1.0))
+    return Case(way, depth, (ball, floor), float(h * h * (3 * Fraction(r) - h) / 3) * pi)
+
+
+def lens(r, s, d):
+    """The volume of two balls' common part, their centres d apart, each outside of the other."""
+    return float((r + s - d) ** 2 * (d * d + 2 * d * (r + s) - 3 * (r - s) ** 2) / (12 * d)) * pi
+
+
+FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
+    family.__name__: family
+    for family in (
+        general, posed, slivers, tilted_slivers, touching, parallel_edges, nearly_touching, identical, shared_planes,
+        shared_facets, nested_flush, needles_and_plates, stacked_plates, scaled, tiny_in_huge, far_away, round_hulls,
+        fine_round_hulls, prisms, cut_at_edges, dual_pairs, compounds, many_bodies, empty_triples, half_spaces,
+        half_spaces_alone, lenses,
+    )
+}  # fmt: skip
+
+
+def make(family: str, seed: int) -> Case:
+    case = FAMILIES[family](np.random.default_rng([seed, crc32(family.encode())]))
+    case.family, case.seed = family, seed
+    return case
+
+
+def cases(seed: int, count: int) -> Iterator[Case]:
+    """So many cases, the families in turn."""
+    names = list(FAMILIES)
+    for i in range(count):
+        yield make(names[i % len(names)], seed + i // len(names))
