@@ -332,6 +332,13 @@ class Overlap:
         """
 
     @property
+    def widened(self) -> bool:
+        """
+        True if double arithmetic could not place the volume within 1e-12 of itself, and it was computed again in wider
+        arithmetic from the shapes' own numbers, as were centroid, area, inertia and gradient.
+        """
+
+    @property
     def area(self) -> float:
         """m², of the surface of the common polytope; 0 unless overlapping."""
 
