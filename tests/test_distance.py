@@ -13,6 +13,7 @@ from strategies import (
     moved,
     overlapping_points,
     placed,
+    placed_points,
     polyhedra,
     quaternion,
     reach,
@@ -257,6 +258,20 @@ def test_depth_has_the_scale_of_the_pair(a, b):
     depth = penetration_depth(a, b)
     for size in (2.0**-10, 2.0**10):
         assert penetration_depth(scaled(a, size), scaled(b, size)) == pytest.approx(depth * size, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_depth_of_equally_turned_boxes_is_the_exact_one(seed):
+    rng = np.random.default_rng(seed)
+    q, shape = (
+        rng.integers(1, 3, 4) * rng.choice([-1.0, 1.0], 4),
+        Box(rng.choice([0.2, 0.5, 1, 1.5, 1.4746420954724861], 3)),
+    )
+    for _ in range(20):
+        a, b = (Placed(shape, rng.integers(-1, 2, 3) * shape.half_extents, q) for _ in range(2))
+        truth = float(exact.depth_squared(*(exact.hull(placed_points(body)) for body in (a, b)))) ** 0.5
+        assert penetration_depth(a, b) == pytest.approx(truth, abs=1e-14)
+        assert penetration_depth(b, a) == pytest.approx(truth, abs=1e-14)
 
 
 # Touching

@@ -644,3 +644,50 @@ def test_same_question_has_the_same_bits():
     assert first.volume == second.volume
     assert_array_equal(first.vertices, second.vertices)
     assert_array_equal(first.gradient, second.gradient)
+
+
+# Coordinates that are tiny but not zero would make products that underflow, were they not taken for rounding.
+TINY = [0.0, 1e-20, 6.847828877979682e-28, 1e-45, 3.9066743815899546e-97, 1e-150, 1e-244, 1e-300]
+
+
+@pytest.mark.parametrize("tiny", TINY)
+@pytest.mark.parametrize("size", [1.0, 1e3])
+def test_noise_far_below_rounding_changes_nothing(tiny, size):
+    shape = Box(size * np.array([0.5, 1, 0.5]))
+    a = Placed(shape, (0, 0, size))
+    b = Placed(shape, (0, size, size), (0, -0.031234752377721213, 0.9995120760870788, tiny))
+    truth = exact.common(exact.hull(placed_points(a)), exact.hull(placed_points(b)))
+    assert overlap(a, b).volume == pytest.approx(float(truth.volume), rel=1e-14)
+
+
+@pytest.mark.parametrize("tiny", TINY)
+def test_ball_with_itself_turned_by_noise_is_the_ball(tiny):
+    ball = Sphere(0.5454022162416995)
+    turned = Placed(ball, (0, 0, 0), (-0.8970927660887382, 0, tiny, -0.44184224450730886))
+    answer = overlap(Placed(ball, (0, 0, 0), (1, 0, 0, 1)), turned, tolerance=1e-2)
+    assert abs(answer.volume - ball.volume) <= answer.volume_error
+
+
+@pytest.mark.parametrize("power", range(1, 13))
+@pytest.mark.parametrize("kind", ["turned", "vertex first", "wedge", "far away"])
+def test_thin_overlaps_are_right_to_twelve_digits(kind, power):
+    """Where doubles cannot place the volume, it is computed in wider arithmetic from the corners as given."""
+    rng = np.random.default_rng(power)
+    turned = rotation(quaternion(rng))
+    p, q = CORNERS @ turned.T, (CORNERS * 0.75 + (1.75 - 10.0**-power, 0.3, 0.2)) @ turned.T
+    if kind == "wedge":
+        q = q @ rotation([0, 0, 0.3 * 10.0**-power, 1]).T
+    if kind == "vertex first":
+        p, q = hull_points(rng, 8), hull_points(rng, 8)
+        deep = overlap(p, q)
+        p = p + deep.normal * deep.depth * (1 - 10.0**-power)
+    if kind == "far away":
+        p, q = p + [3e5, -2e6, 7e4], q + [3e5, -2e6, 7e4]
+    truth = exact.common(exact.hull(p), exact.hull(q))
+    answer = overlap(p, q)
+    if truth.volume:
+        assert answer.volume == pytest.approx(float(truth.volume), rel=1e-12)
+        assert abs(answer.volume - float(truth.volume)) <= answer.volume_error <= 1e-12 * answer.volume
+        assert answer.widened or power < 4
+    else:
+        assert answer.status == "separated"

@@ -442,3 +442,13 @@ def test_repr_says_what_the_shape_is(shape, parts):
     text = repr(shape)
     assert all(part in text for part in parts), text
     assert "\n" not in text
+
+
+@pytest.mark.parametrize("tiny", [0.0, 1e-20, 1e-45, 3.9066743815899546e-97, 1e-150, 1e-244, 1e-300])
+def test_hull_of_a_cube_with_noise_is_a_cube(tiny):
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        cube = Hull(corners + rng.normal(size=(8, 3)) * tiny)
+        assert cube.volume == pytest.approx(1, rel=1e-14)
+        assert np.isfinite(cube.halfspaces).all()

@@ -42,24 +42,24 @@ Row4 solve(std::array<Row4, 4> m, Row4 b) {
 /// Four planes at which the linear programme's optimum over the planes seen so far lies.
 class Basis {
  public:
-  explicit Basis(std::array<Plane, 4> planes) : planes_(planes) {}
+  explicit Basis(const std::array<OwnedPlane, 4>& planes) : planes_(planes) {}
 
   /// The ball that touches all four planes: centre and radius.
   std::pair<Vec3, double> ball() const {
     std::array<Row4, 4> m;
     Row4 offsets;
-    for (int i = 0; i < 4; ++i) m[i] = row_of(planes_[i]), offsets[i] = planes_[i].offset;
+    for (int i = 0; i < 4; ++i) m[i] = row_of(planes_[i].plane), offsets[i] = planes_[i].plane.offset;
     const Row4 z = solve(m, offsets);
     return {{z[0], z[1], z[2]}, z[3]};
   }
 
   /// Exchanges one plane for `entering` so that the weights stay non-negative. False if rounding leaves no choice.
-  bool exchange(const Plane& entering) {
+  bool exchange(const OwnedPlane& entering) {
     std::array<Row4, 4> transposed_rows;
     for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) transposed_rows[j][i] = row_of(planes_[i])[j];
+      for (int j = 0; j < 4; ++j) transposed_rows[j][i] = row_of(planes_[i].plane)[j];
     const Row4 weight = solve(transposed_rows, {0, 0, 0, 1});
-    const Row4 share = solve(transposed_rows, row_of(entering));
+    const Row4 share = solve(transposed_rows, row_of(entering.plane));
     int leaving = -1;
     double least = kInfinity;
     for (int i = 0; i < 4; ++i) {
@@ -72,14 +72,16 @@ class Basis {
     return true;
   }
 
-  double magnitude() const {
+  /// The largest of the numbers that the four planes were made from.
+  double magnitude(std::span<const double> reach) const {
     double largest = 0;
-    for (const Plane& p : planes_) largest = std::max(largest, std::abs(p.offset));
+    for (const OwnedPlane& p : planes_)
+      largest = std::max(largest, p.owner >= 0 ? reach[p.owner] : std::abs(p.plane.offset));
     return largest;
   }
 
  private:
-  std::array<Plane, 4> planes_;
+  std::array<OwnedPlane, 4> planes_;
 };
 
 /// The plane of the listed ones and of the smooth bodies that `point` violates most.
@@ -123,31 +125,32 @@ std::array<OwnedPlane, 4> surrounding_simplex(std::span<const Placed> bodies, st
 
 }  // namespace
 
-DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const OwnedPlane> planes,
-                         std::span<const OwnedPlane> hints) {
+DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double> reach,
+                         std::span<const OwnedPlane> planes, std::span<const OwnedPlane> hints) {
   DeepestBall best{{}, -kInfinity, kInfinity, 0, false, {}};
   const std::array<OwnedPlane, 4> simplex = surrounding_simplex(bodies, planes);
   best.cuts.assign(simplex.begin(), simplex.end());
-  Basis basis({simplex[0].plane, simplex[1].plane, simplex[2].plane, simplex[3].plane});
+  Basis basis(simplex);
   for (const OwnedPlane& hint : hints) {
     best.cuts.push_back(hint);
-    basis.exchange(hint.plane);
+    basis.exchange(hint);
   }
   // Every exchange lowers the optimum or, at a degenerate corner, keeps it; smooth bodies add planes without end.
   constexpr int kMaxRounds = 256;
   for (int round = 0; round < kMaxRounds; ++round) {
     const auto [centre, radius] = basis.ball();
     // At a nearly singular corner the centre runs away, and both figures with it.
-    const double rounding_here = rounding(basis.magnitude() + norm(centre));
+    const OwnedPlane worst = tightest(bodies, planes, centre);
+    const double made_from = std::max(basis.magnitude(reach), worst.owner >= 0 ? reach[worst.owner] : 0);
+    const double rounding_here = rounding(std::max(made_from, norm(centre)));
     best.upper = std::min(best.upper, radius + rounding_here);
     best.apart = radius < -rounding_here;
-    const OwnedPlane worst = tightest(bodies, planes, centre);
     const double slack = -signed_distance(worst.plane, centre);
     if (slack > best.lower) best.lower = slack, best.centre = centre, best.rounding = rounding_here;
     // Newton's method starts from any inner point; a share of the depth is enough.
     const bool deep = best.lower > best.rounding && best.lower >= best.upper / 4;
     const bool optimal = best.upper - best.lower <= 2 * best.rounding;
-    if (deep || best.apart || optimal || !basis.exchange(worst.plane)) break;
+    if (deep || best.apart || optimal || !basis.exchange(worst)) break;
     best.cuts.push_back(worst);
   }
   return best;

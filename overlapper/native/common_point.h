@@ -29,9 +29,10 @@ struct DeepestBall {
 };
 
 /// `planes` holds all facets of the polytopes among the bodies and some tangent planes of the rest. `hints` are further
-/// planes to begin with. Owner -1 marks planes of the simplex around a set that no body bounds.
-DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const OwnedPlane> planes,
-                         std::span<const OwnedPlane> hints);
+/// planes to begin with. `reach` says how large the numbers are that each body's planes are made from. Owner -1 marks
+/// planes of the simplex around a set that no body bounds.
+DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double> reach,
+                         std::span<const OwnedPlane> planes, std::span<const OwnedPlane> hints);
 
 /// An affine frame, x = origin + axes * y, in which the common set is round: it holds the ball of radius 1 /
 /// kEccentricity and no dual point is longer than kEccentricity, be it a sliver of any thickness. The origin is the

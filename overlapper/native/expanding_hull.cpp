@@ -19,6 +19,11 @@ int farthest(std::span<const Vec3> points, Measure measure) {
   return best;
 }
 
+Vec3 flushed(Vec3 p, double negligible) {
+  const auto keep = [negligible](double value) { return std::abs(value) < negligible ? 0 : value; };
+  return {keep(p.x), keep(p.y), keep(p.z)};
+}
+
 /// Four points that span a solid, roughly as large as possible, counter-clockwise seen from the fourth's far side;
 /// false if none do.
 bool extreme_tetrahedron(std::span<const Vec3> points, std::array<int, 4>& corner) {
@@ -61,6 +66,10 @@ bool ExpandingHull::start() {
   facets.clear();
   visited_.clear();
   visit_ = 0;
+  double largest = 0;
+  for (Vec3 p : points) largest = std::max(largest, max_component(abs(p)));
+  negligible_coordinate_ = 0x1p-200 * largest;
+  for (Vec3& p : points) p = flushed(p, negligible_coordinate_);
   std::array<int, 4> corner;
   if (!extreme_tetrahedron(points, corner)) return false;
   const auto [a, b, c, d] = corner;
@@ -74,6 +83,11 @@ bool ExpandingHull::start() {
   facets[2].neighbour = {1, 3, 0};
   facets[3].neighbour = {2, 1, 0};
   return true;
+}
+
+int ExpandingHull::add(Vec3 point) {
+  points.push_back(flushed(point, negligible_coordinate_));
+  return static_cast<int>(points.size()) - 1;
 }
 
 bool ExpandingHull::sees(int facet, int p) const {

@@ -32,7 +32,12 @@ class ExpandingHull {
   std::vector<Facet> facets;  ///< with gaps: skip those that are removed()
 
   /// Starts from a tetrahedron among `points`, found at the extremes; false if all the points lie in one plane.
+  /// Coordinates below 2^-200 of the largest are set to zero first: products of three of them would underflow, and
+  /// signs with them.
   bool start();
+
+  /// Adds a point to be inserted later; its number. Coordinates are flushed as by start().
+  int add(Vec3 point);
 
   /// Starts, then inserts every point. Each point outside waits with one facet that it sees (its conflict), and the
   /// farthest of a facet's conflicts is inserted next: the paper's conflict graph, of which one edge per point is
@@ -75,6 +80,7 @@ class ExpandingHull {
   };
   std::vector<HorizonRidge> horizon_;
   int visit_ = 0, inserted_ = 0;
+  double negligible_coordinate_ = 0;
 };
 
 }  // namespace overlapper

@@ -206,8 +206,8 @@ class DepthSearch {
     for (int round = 0; round < kMaxRounds; ++round) {
       const int facet = least_facet();
       if (facet < 0) break;
-      const Vec3 normal = unit(accurate_normal(corner(facet, 0), corner(facet, 1), corner(facet, 2)));
-      const double before = hull_offset(facet, normal);
+      const Vec3 normal = normal_of(facet);
+      const double before = offset_[facet];
       const double reached = ask(normal);
       const int p = static_cast<int>(hull_.points.size()) - 1;
       // A smooth rim is never reached: stop when the facet's offset and the support agree to rounding.
@@ -227,30 +227,32 @@ class DepthSearch {
 
   Vec3 corner(int facet, int i) const { return hull_.points[hull_.facets[facet].vertex[i]]; }
 
-  double hull_offset(int facet, Vec3 normal) const { return dot(normal, corner(facet, 0)); }
-
   /// Adds the support point along `direction`; its offset is an upper bound of the depth.
   double ask(Vec3 direction) {
     direction = unit(direction);
     const Vec3 w = core_support(a_, b_, direction).difference();
     extent_ = std::max(extent_, max_component(abs(w)));
-    hull_.points.push_back(w);
+    hull_.add(w);
     const double offset = dot(direction, w);
     // `direction` pushes A - B away from the origin; a leaves b the opposite way.
     if (offset < best_.depth) best_ = {offset, -direction};
     return offset;
   }
 
-  /// The facet nearest to the origin that is not final yet.
-  int least_facet() const {
+  Vec3 normal_of(int facet) const {
+    return unit(accurate_normal(corner(facet, 0), corner(facet, 1), corner(facet, 2)));
+  }
+
+  /// The facet nearest to the origin that is not final yet. Equally turned boxes make needles of collinear corners,
+  /// whose plain normals are noise: ranked by those, the nearest facet may come last.
+  int least_facet() {
     int best = -1;
     double least = std::numeric_limits<double>::infinity();
     for (int f = 0; f < static_cast<int>(hull_.facets.size()); ++f) {
-      const ExpandingHull::Facet& facet = hull_.facets[f];
-      if (facet.removed() || (f < static_cast<int>(final_.size()) && final_[f])) continue;
-      const double length = std::sqrt(norm2(facet.normal));
-      const double offset = length > 0 ? dot(facet.normal, corner(f, 0)) / length : 0;
-      if (offset < least) least = offset, best = f;
+      if (f == static_cast<int>(offset_.size()))
+        offset_.push_back(hull_.facets[f].removed() ? 0 : dot(normal_of(f), corner(f, 0)));
+      if (hull_.facets[f].removed() || (f < static_cast<int>(final_.size()) && final_[f])) continue;
+      if (offset_[f] < least) least = offset_[f], best = f;
     }
     return best;
   }
@@ -274,6 +276,7 @@ class DepthSearch {
   const Placed &a_, &b_;
   ExpandingHull hull_;
   std::vector<char> final_;
+  std::vector<double> offset_;  ///< per facet: of its plane, along its outward unit normal
   double extent_ = 0;
   Penetration best_{std::numeric_limits<double>::infinity(), {}};
 };

@@ -75,16 +75,15 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
     return;
   }
 
-  double reach = 0;
-  for (const Placed& body : relative_) reach = std::max(reach, magnitude(body));
+  for (const Placed& body : relative_) reach_.push_back(magnitude(body));
   std::vector<OwnedPlane> hints;
   if (pair() && (bounded(bodies_[0].shape) || bounded(bodies_[1].shape))) {
     const Distance d = overlapper::distance(relative_[0], relative_[1]);
-    if (d.gap > rounding(reach)) return;
+    if (d.gap > rounding(std::max(reach_[0], reach_[1]))) return;
     hints = facing_planes(relative_, d);
   }
   std::vector<OwnedPlane> planes = gather_planes(relative_);
-  ball_ = deepest_ball(relative_, planes, hints);
+  ball_ = deepest_ball(relative_, reach_, planes, hints);
   if (ball_.lower > ball_.rounding) {
     status_ = Status::kOverlapping;
     lazy_->planes = std::move(planes);
@@ -134,12 +133,11 @@ const Region& Overlap::region() const {
   assert(status_ == Status::kOverlapping);
   const std::scoped_lock lock(lazy_->mutex);
   if (!lazy_->region) {
-    double reach = 0;
-    for (const Placed& body : relative_) reach = std::max(reach, magnitude(body));
     std::vector<OwnedPlane> planes = std::move(lazy_->planes);
     if (std::none_of(bodies_.begin(), bodies_.end(), [](const Placed& b) { return bounded(b.shape); }))
       planes.insert(planes.end(), ball_.cuts.begin(), ball_.cuts.begin() + 4);
-    lazy_->region = grow(relative_, planes, ball_, tolerance_, rounding(reach), reference_);
+    lazy_->region = grow(relative_, planes, ball_, tolerance_,
+                         rounding(*std::max_element(reach_.begin(), reach_.end())), reference_);
   }
   return *lazy_->region;
 }

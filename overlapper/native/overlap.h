@@ -62,6 +62,7 @@ class Overlap {
   double tolerance_;
   Method method_;
   Vec3 reference_;
+  std::vector<double> reach_;  ///< per body: how large the numbers are that describe it
   Status status_ = Status::kSeparated;
   DeepestBall ball_;
 

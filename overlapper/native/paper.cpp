@@ -4,6 +4,7 @@
 #include <future>
 #include <limits>
 #include <stdexcept>
+#include <unordered_set>
 
 #include "expanding_hull.h"
 #include "minkowski.h"
@@ -90,18 +91,18 @@ bool shift_inside(const Part& a, const Part& b, double on_boundary, Vec3& point)
 /// point, those of the faces around it that have the same dual.
 std::vector<int> planes_through(const ExpandingHull& dual, int face, std::span<const Vec3> vertex_of_face,
                                 double same) {
-  std::vector<int> planes, stack{face}, seen{face};
+  std::vector<int> planes, stack{face};
+  std::unordered_set<int> seen{face};
   while (!stack.empty()) {
     const ExpandingHull::Facet& facet = dual.facets[stack.back()];
     stack.pop_back();
     planes.insert(planes.end(), facet.vertex.begin(), facet.vertex.end());
-    for (int other : facet.neighbour) {
-      if (norm(vertex_of_face[other] - vertex_of_face[face]) > same) continue;
-      if (std::find(seen.begin(), seen.end(), other) != seen.end()) continue;
-      seen.push_back(other);
-      stack.push_back(other);
-    }
+    for (int other : facet.neighbour)
+      if (norm(vertex_of_face[other] - vertex_of_face[face]) <= same && seen.insert(other).second)
+        stack.push_back(other);
   }
+  std::sort(planes.begin(), planes.end());
+  planes.erase(std::unique(planes.begin(), planes.end()), planes.end());
   return planes;
 }
 
@@ -152,7 +153,8 @@ Intersection intersect_about(const Part& a, const Part& b, Vec3 origin) {
   const auto hull = hull_of(vertices, &source);
   if (!hull) return {Status::kTouching, {}};
   std::vector<std::vector<int>> planes_at;
-  for (int s : source) planes_at.push_back(planes_through(dual, face_of[s], vertex_of_face, 1e-9 * extent_of_vertices));
+  for (int s : source)
+    planes_at.push_back(planes_through(dual, face_of[s], vertex_of_face, 64 * rounding(extent_of_vertices)));
   Part part = placed_part({hull}, {{}, hull->origin}, -1);
   for (int f = 0; f < static_cast<int>(part.owner.size()); ++f)
     part.owner[f] = owner[plane_of_facet(*hull, f, planes_at, planes)];

@@ -59,9 +59,8 @@ int exact_orientation(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
 }
 
 Vec3 wide_polar_vertex(Vec3 a, Vec3 b, Vec3 c) {
-  const WideVector normal = wide_cross(wide_difference(b, a), wide_difference(c, a));
-  const DoubleDouble height =
-      normal.x * DoubleDouble{a.x} + normal.y * DoubleDouble{a.y} + normal.z * DoubleDouble{a.z};
+  const WideVector normal = wide_normal(a, b, c);
+  const DoubleDouble height = dot(normal, wide(a));
   return {normal.x.head / height.head, normal.y.head / height.head, normal.z.head / height.head};
 }
 
@@ -81,10 +80,7 @@ int orientation(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   return exact_orientation(a, b, c, d);
 }
 
-Vec3 accurate_normal(Vec3 a, Vec3 b, Vec3 c) {
-  const WideVector normal = wide_cross(wide_difference(b, a), wide_difference(c, a));
-  return {normal.x.head, normal.y.head, normal.z.head};
-}
+Vec3 accurate_normal(Vec3 a, Vec3 b, Vec3 c) { return rounded(wide_normal(a, b, c)); }
 
 Vec3 polar_vertex(Vec3 a, Vec3 b, Vec3 c) {
   const Vec3 u = b - a, v = c - a;

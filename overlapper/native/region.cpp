@@ -22,7 +22,7 @@ struct Growth {
   std::vector<double> inner;       ///< per hull facet, parallel to hull.facets
 
   void add(const OwnedPlane& plane) {
-    hull.points.push_back(dual_in_frame(frame, plane.plane));
+    hull.add(dual_in_frame(frame, plane.plane));
     planes.push_back(plane);
   }
 
@@ -98,7 +98,9 @@ Region grow(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, 
 }
 
 std::optional<Region> widened(std::span<const Placed> bodies, const Region& region) {
-  const std::vector<WideDual> duals = wide_duals(bodies, region.reference, region.frame);
+  double reach = 0;
+  for (Vec3 y : region.polytope.vertices) reach = std::max(reach, norm(y));
+  const std::vector<WideDual> duals = wide_duals(bodies, region.reference, region.frame, reach);
   ExpandingHull hull;
   std::vector<double> negligible;
   for (const WideDual& dual : duals) {
@@ -113,11 +115,11 @@ std::optional<Region> widened(std::span<const Placed> bodies, const Region& regi
   wide.frame = region.frame;
   wide.polytope = polar_dual(hull);
   wide.facets_touched = region.facets_touched + hull.inserted();
-  double reach = 0;
-  for (Vec3 y : wide.polytope.vertices) reach = std::max(reach, norm(y));
+  double farthest = 0;
+  for (Vec3 y : wide.polytope.vertices) farthest = std::max(farthest, norm(y));
   for (int p : wide.polytope.plane) {
     // A dual point rounded once moves its plane, as seen from the origin, by an ulp at the distance of the vertices.
-    const double rounding = duals[p].slack * kWideRounding * std::max(1.0, norm(duals[p].point) * reach);
+    const double rounding = duals[p].slack * kWideRounding * std::max(1.0, norm(duals[p].point) * farthest);
     wide.facets.push_back({duals[p].normal, duals[p].slack, rounding, duals[p].owner});
   }
   wide.inner.assign(wide.polytope.vertices.size(), 1);

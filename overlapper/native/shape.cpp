@@ -16,6 +16,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// Products of a few coordinates, and of their reciprocals, must neither overflow nor underflow.
+constexpr double kSmallest = 1e-100, kLargest = 1e100;
+
 void require(bool condition, const std::string& message) {
   if (!condition) throw std::invalid_argument(message);
 }
@@ -23,6 +26,7 @@ void require(bool condition, const std::string& message) {
 void require_size(double value, const char* name) {
   require(std::isfinite(value), std::string(name) + " must be finite");
   require(value > 0, std::string(name) + " must be greater than 0, not " + std::to_string(value));
+  require(value > kSmallest && value < kLargest, std::string(name) + " must be between 1e-100 and 1e100 m");
 }
 
 double radial(Vec3 v) { return std::hypot(v.x, v.y); }
@@ -244,6 +248,7 @@ double core_radius(const Shape& shape) {
 
 Placed make_placed(Shape shape, Vec3 position, Quaternion q) {
   require(finite(position), "position must be finite");
+  require(max_component(abs(position)) < kLargest, "position must be closer to the origin than 1e100 m");
   require(std::isfinite(q.x) && std::isfinite(q.y) && std::isfinite(q.z) && std::isfinite(q.w),
           "orientation must be finite");
   const double length = std::hypot(std::hypot(q.x, q.y), std::hypot(q.z, q.w));
@@ -476,8 +481,9 @@ std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>
 Hull make_hull(std::span<const Vec3> points) {
   require(points.size() >= 4, "vertices must hold at least four points, not " + std::to_string(points.size()));
   for (Vec3 p : points) require(finite(p), "vertices must be finite");
-  // Squares and products of coordinates must stay finite.
-  for (Vec3 p : points) require(max_component(abs(p)) < 1e100, "vertices must be closer to the origin than 1e100");
+  double largest = 0;
+  for (Vec3 p : points) largest = std::max(largest, max_component(abs(p)));
+  require(largest < kLargest, "vertices must be closer to the origin than 1e100 m");
   auto data = hull_of(points);
   require(data != nullptr, "vertices are flat: they all lie in one plane");
   return {std::move(data)};

@@ -77,8 +77,11 @@ std::vector<int> merge_vertices(const Region& region, int& groups) {
   const Polytope& p = region.polytope;
   std::vector<double> blur(p.vertices.size(), 0);
   for (int f = 0; f < p.facets(); ++f) {
-    const double relative = region.facets[f].rounding / region.facets[f].slack;
-    for (int v : p.facet(f)) blur[v] = std::max(blur[v], std::min(1e-3, 64 * relative));
+    // The plane's rounding in the frame's coordinates, in which its distance from the origin is one over its dual's
+    // length.
+    const double moved = region.facets[f].rounding / region.facets[f].slack / norm(p.dual[f]);
+    // Planes that meet at a small angle move their common vertex by a multiple of that.
+    for (int v : p.facet(f)) blur[v] = std::max(blur[v], std::min(1e-3, 512 * moved));
   }
   std::vector<int> parent(p.vertices.size());
   std::iota(parent.begin(), parent.end(), 0);
@@ -90,7 +93,7 @@ std::vector<int> merge_vertices(const Region& region, int& groups) {
     const auto ring = p.facet(f);
     for (size_t i = 0; i < ring.size(); ++i) {
       const int u = ring[i], v = ring[(i + 1) % ring.size()];
-      if (norm(p.vertices[u] - p.vertices[v]) <= std::max(blur[u], blur[v]) * std::max(1.0, norm(p.vertices[u])))
+      if (norm(p.vertices[u] - p.vertices[v]) <= std::max(blur[u], blur[v]))
         parent[std::max(root(u), root(v))] = std::min(root(u), root(v));
     }
   }

@@ -55,6 +55,15 @@ inline WideVector wide_cross(const WideVector& u, const WideVector& v) {
   return {u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
 }
 
+/// cross(b - a, c - a), from the two shorter edges: on a needle the longer two are nearly parallel, and most of their
+/// product cancels.
+inline WideVector wide_normal(Vec3 a, Vec3 b, Vec3 c) {
+  const double ab = norm2(b - a), bc = norm2(c - b), ca = norm2(a - c);
+  if (ab >= bc && ab >= ca) return wide_cross(wide_difference(a, c), wide_difference(b, c));
+  if (bc >= ca) return wide_cross(wide_difference(b, a), wide_difference(c, a));
+  return wide_cross(wide_difference(c, b), wide_difference(a, b));
+}
+
 inline WideVector wide(Vec3 v) { return {{v.x}, {v.y}, {v.z}}; }
 inline WideVector operator+(const WideVector& a, const WideVector& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline WideVector operator-(const WideVector& a, const WideVector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }

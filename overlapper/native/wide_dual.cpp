@@ -46,6 +46,16 @@ class BodyDuals {
              apply_transposed(rotation_, wide(columns.row2))};
   }
 
+  /// True if the plane of a triangle certainly keeps farther from the origin than `reach` in the frame. In doubles, and
+  /// with their rounding taken for granted: most planes of a large mesh need no more.
+  bool far(Vec3 a, Vec3 b, Vec3 c, double reach) const {
+    const Vec3 normal = cross(b - a, c - a), away = a - rounded(origin_);
+    const double slack = dot(normal, away) - 0x1p-46 * norm(b - a) * norm(c - a) * (norm(a) + norm(away));
+    const Vec3 along{dot(rounded(axis_.row0), normal), dot(rounded(axis_.row1), normal),
+                     dot(rounded(axis_.row2), normal)};
+    return slack > 2 * reach * norm(along);
+  }
+
   /// Of the plane with that normal, of any length, through a point or at a height along the normal.
   WideDual through(const WideVector& normal, Vec3 point) const {
     return make(normal, dot(normal, wide(point) - origin_));
@@ -70,16 +80,15 @@ class BodyDuals {
 
 }  // namespace
 
-std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference, const Frame& frame) {
+std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference, const Frame& frame, double reach) {
   std::vector<WideDual> duals;
   for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
     const BodyDuals body(bodies[i], i, reference, frame);
     if (const Hull* hull = std::get_if<Hull>(&bodies[i].shape)) {
       for (const auto& [a, b, c] : hull->data->triangles) {
         const std::vector<Vec3>& corner = hull->data->corners;
-        const WideVector normal =
-            wide_cross(wide_difference(corner[b], corner[a]), wide_difference(corner[c], corner[a]));
-        duals.push_back(body.through(normal, corner[a]));
+        if (body.far(corner[a], corner[b], corner[c], reach)) continue;
+        duals.push_back(body.through(wide_normal(corner[a], corner[b], corner[c]), corner[a]));
       }
       continue;
     }

@@ -23,6 +23,6 @@ struct WideDual {
 /// The dual points of all planes of polytopes and half-spaces, from the numbers that define them: corners, half
 /// extents, positions, and orientations taken as the exact rotations that their quaternions stand for at any length.
 /// The frame is about `reference`.
-std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference, const Frame& frame);
+std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference, const Frame& frame, double reach);
 
 }  // namespace overlapper
