@@ -2,15 +2,27 @@
 
 VENV := .venv
 SCENE := franka_grasp
-NATIVE := $(shell find overlapper/native -type f)
+FUZZ_SECONDS := 60
+NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
 
-.PHONY: run test lint format clean
+.PHONY: run test fuzz lint format clean
 
 run: $(VENV)/all
 	@$(VENV)/bin/overlapper run $(SCENE) --out out/$(SCENE).csv --html out/$(SCENE).html
 
 test: $(VENV)/dev
 	@$(VENV)/bin/pytest
+
+# Inputs that reach something new stay in build/fuzz/corpus; one that breaks something is left beside it, by name.
+fuzz: build/fuzz/fuzz_overlap
+	@mkdir -p build/fuzz/corpus
+	@build/fuzz/fuzz_overlap -max_total_time=$(FUZZ_SECONDS) -timeout=20 -max_len=600 -len_control=0 -print_final_stats=1 \
+	  -verbosity=0 -artifact_prefix=build/fuzz/ build/fuzz/corpus overlapper/native/fuzz/corpus
+
+build/fuzz/fuzz_overlap: $(NATIVE)
+	@cmake -S overlapper/native -B build/fuzz -DCMAKE_CXX_COMPILER=clang++ -DOVERLAPPER_FUZZ=ON \
+	  -DOVERLAPPER_WERROR=ON --log-level=WARNING
+	@cmake --build build/fuzz
 
 lint: $(VENV)/dev
 	@$(VENV)/bin/ruff check
