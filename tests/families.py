@@ -21,7 +21,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 from strategies import directions, hull_points, overlapping_points, quaternion, rotation, turn
 
-from overlapper import Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
 
 CORNERS = np.array(list(product((-1, 1), repeat=3)), float)
 OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
@@ -49,11 +49,17 @@ class Posed(NamedTuple):
     orientation: np.ndarray
 
 
+class PosedBox(NamedTuple):
+    half_extents: np.ndarray
+    position: np.ndarray
+    orientation: np.ndarray
+
+
 @dataclass
 class Case:
     detail: str
     parameter: float
-    bodies: tuple[np.ndarray | Below | Posed | Placed, ...]
+    bodies: tuple[np.ndarray | Below | Posed | PosedBox | Placed, ...]
     closed_form: float | None = None  # the volume, of cases with round bodies
     family: str = ""
     seed: int = 0
@@ -102,10 +108,15 @@ class Case:
 def placed(body):
     if isinstance(body, Below):
         return HalfSpace(*body)
-    return Placed(Hull(body.points), body.position, body.orientation) if isinstance(body, Posed) else body
+    if isinstance(body, (Posed, PosedBox)):
+        shape, *pose = body
+        return Placed(Hull(shape) if isinstance(body, Posed) else Box(shape), *pose)
+    return body
 
 
 def points_of(body):
+    if isinstance(body, PosedBox):
+        return exact.placed(CORNERS * body.half_extents, body.position, body.orientation)
     return exact.placed(*body) if isinstance(body, Posed) else body
 
 
@@ -221,6 +232,22 @@ def posed(rng):
     centre = reach * rng.normal(size=3)
     clouds = overlapping_points(rng)
     return Case("quaternion", reach, tuple(Posed(p, centre, quaternion(rng) * rng.uniform(0.1, 10)) for p in clouds))
+
+
+def posed_boxes(rng):
+    """Boxes under quaternions, `parameter` metres from the origin."""
+    reach = power(rng, -1, 3)
+    centre = reach * rng.normal(size=3)
+    boxes = [PosedBox(rng.uniform(0.5, 1.5, 3), centre + rng.uniform(-0.5, 0.5, 3), quaternion(rng)) for _ in range(2)]
+    return Case("quaternion", reach, tuple(boxes))
+
+
+def posed_slivers(rng):
+    """A feature sunk into another by `parameter`, both bodies under one quaternion that nobody normalised."""
+    low, high = two_features(rng)
+    depth = float(rng.choice([0, 1e-3, 1e-6, 1e-9, 1e-10, 1e-11, 1e-12]))
+    pose = (rng.normal(size=3), quaternion(rng) * rng.uniform(0.1, 10))
+    return Case(f"{low}-{high}", depth, tuple(Posed(p, *pose) for p in stacked(rng, low, high, -depth)))
 
 
 def slivers(rng):
@@ -355,6 +382,16 @@ def far_away(rng):
     case, distance = any_pair(rng), power(rng, 2, 8)
     shift = np.round(distance * directions(rng, 1)[0])
     return Case(case.detail, distance, tuple(points + shift for points in case.bodies))
+
+
+def combined(rng):
+    """A pair of any other family, stretched by up to `parameter` in one or two directions, turned, moved and scaled."""
+    case, scale, distance = any_pair(rng), power(rng, -9, 6), power(rng, -3, 6)
+    thin = 10.0 ** -rng.integers(0, 7, 3).astype(float)
+    thin[int(rng.integers(3))] = 1
+    turn_all, shift = rotation(quaternion(rng)), np.round(distance * directions(rng, 1)[0], 3)
+    bodies = tuple((mapped(points * thin, turn_all) + shift) * scale for points in case.bodies)
+    return Case(f"{case.detail} at {distance:.0e} times {scale:.0e}", 1 / thin.min(), bodies)
 
 
 def round_hulls(rng):
@@ -513,10 +550,10 @@ def lens(r, s, d):
 FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
     family.__name__: family
     for family in (
-        general, posed, slivers, tilted_slivers, touching, parallel_edges, nearly_touching, identical, shared_planes,
-        shared_facets, nested_flush, needles_and_plates, stacked_plates, scaled, tiny_in_huge, far_away, round_hulls,
-        fine_round_hulls, prisms, cut_at_edges, dual_pairs, compounds, many_bodies, empty_triples, half_spaces,
-        half_spaces_alone, lenses,
+        general, posed, posed_boxes, posed_slivers, slivers, tilted_slivers, touching, parallel_edges,
+        nearly_touching, identical, shared_planes, shared_facets, nested_flush, needles_and_plates,
+        stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls, prisms, cut_at_edges,
+        dual_pairs, compounds, many_bodies, empty_triples, half_spaces, half_spaces_alone, lenses,
     )
 }  # fmt: skip
 
