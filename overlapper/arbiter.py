@@ -20,15 +20,14 @@ from collections import Counter
 from collections.abc import Iterable
 from fractions import Fraction
 from itertools import combinations_with_replacement, product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Shape, Sphere
+from overlapper.rational import Exact, RationalBody, cross, exact
 
 Floats = NDArray[np.float64]
-Exact = NDArray[np.object_]  # of Fraction
 
 # Three exact divisions and roots, each rounded correctly, and their product.
 OUTWARDS = 4 * 2.0**-52
@@ -38,8 +37,6 @@ STEPS = 100
 
 # The directions to the 26 neighbours of a cell.
 NEIGHBOURS = np.array([direction for direction in product((-1.0, 0.0, 1.0), repeat=3) if any(direction)])
-
-exact: Any = np.frompyfunc(Fraction, 1, 1)
 
 
 def signed_distance_bounds(
@@ -51,10 +48,11 @@ def signed_distance_bounds(
     search stops when the bounds are `resolution` m apart, or as near as they get.
     """
     # Only across its plane has a half-space an end, so that direction sees the signed distance itself.
-    for body, sign in ((a, 1), (b, -1)):
+    bodies = RationalBody(a), RationalBody(b)
+    for body, sign in zip(bodies, (1, -1)):
         if isinstance(body.shape, HalfSpace):
-            return _gap(a, b, sign * (_rotation(body.orientation) @ exact(body.shape.normal)))
-    difference = Difference(a, b)
+            return _gap(*bodies, sign * (body.axes @ exact(body.shape.normal)))
+    difference = Difference(*bodies)
     for direction in directions:
         difference.extend(np.asarray(direction, float))
     for _ in range(STEPS):
@@ -68,11 +66,10 @@ def signed_distance_bounds(
 class Difference:
     """A polytope inside the Minkowski difference A - B, round parts left out, with exact vertices."""
 
-    def __init__(self, a: Placed, b: Placed) -> None:
+    def __init__(self, a: RationalBody, b: RationalBody) -> None:
         self.bodies = (a, b)
         self.radius = sum(body.shape.radius for body in (a, b) if isinstance(body.shape, Sphere | Capsule))
-        self.frames = (_rotation(a.orientation), _rotation(b.orientation))
-        self.offset: Exact = exact(a.position) - exact(b.position)
+        self.offset = a.position - b.position
         self.points: dict[tuple[float, ...], Exact] = {}
         self.lower = -math.inf
         self.outward = NEIGHBOURS[0]
@@ -88,9 +85,9 @@ class Difference:
     def extend(self, outward: Floats) -> bool:
         """Adds a farthest point of A - B along `outward`; False if it is there already."""
         point = self.offset
-        for body, frame, sign in zip(self.bodies, self.frames, (1.0, -1.0)):
-            local = _support(body.shape, (frame.T @ exact(sign * outward)).astype(float))
-            point = point + exact(sign) * (frame @ exact(local))
+        for body, sign in zip(self.bodies, (1.0, -1.0)):
+            local = _support(body.shape, (body.axes.T @ exact(sign * outward)).astype(float))
+            point = point + exact(sign) * (body.axes @ exact(local))
         rounded = point.astype(float)
         gap = -float(rounded @ outward) / float(np.linalg.norm(outward))
         if gap > self.lower:
@@ -145,36 +142,23 @@ class Difference:
         angle, radius = 0.0, math.inf
         for triangle, point in zip(triangles, nearest):
             corners = np.array([self.points[tuple(corner)] for corner in triangle])
-            normal = _cross(corners[1] - corners[0], corners[2] - corners[0])
+            normal = cross(corners[1] - corners[0], corners[2] - corners[0])
             angle += _solid_angle(triangle, normal @ corners[0])
             # The triangle is beyond each of these planes; the second serves where it has next to no area.
             radius = min(radius, max(_least(corners, normal), _least(corners, exact(point))))
         return radius if abs(angle - 4.0 * math.pi) < 1.0 and radius > 0.0 else None
 
 
-def _gap(a: Placed, b: Placed, outward: Exact) -> tuple[float, float]:
+def _gap(a: RationalBody, b: RationalBody, outward: Exact) -> tuple[float, float]:
     """What the direction from A to B sees of the signed distance: the exact value, rounded down and up."""
-    flat, curved = outward @ (exact(b.position) - exact(a.position)), 0.0
+    flat, curved = Fraction(0), 0.0
     for body, direction in ((a, outward), (b, -outward)):
-        polytope, ball = _extent(body.shape, _rotation(body.orientation).T @ direction)
-        flat, curved = flat - polytope, curved + ball
+        support = body.support(direction)
+        assert support is not None, "a half-space must be asked along its normal"
+        flat, curved = flat - support[0], curved + math.sqrt(support[1])
     norm = math.sqrt(outward @ outward)
     value, rounding = (float(flat) - curved) / norm, OUTWARDS * (abs(float(flat)) + curved) / norm
     return value - rounding, value + rounding
-
-
-def _rotation(quaternion: Floats) -> Exact:
-    """The rotation of a quaternion xyzw of any length: exactly orthogonal, as it is divided by the squared length."""
-    x, y, z, w = exact(quaternion)
-    s = 2 / (x * x + y * y + z * z + w * w)
-    return np.array(
-        [
-            [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-            [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
-            [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
-        ],
-        dtype=object,
-    )
 
 
 def _support(shape: Shape, direction: Floats) -> Floats:
@@ -196,31 +180,6 @@ def _support(shape: Shape, direction: Floats) -> Floats:
         case _:
             raise TypeError(f"shape must be bounded, not {shape!r}")
     return farthest
-
-
-def _extent(shape: Shape, direction: Exact) -> tuple[Fraction, float]:
-    """The support value of a shape, in its own frame: its polyhedral part, exact, and its round part.
-
-    Of a half-space only along its normal, elsewhere it has none.
-    """
-    x, y, z = direction
-    match shape:
-        case Box():
-            return exact(shape.half_extents) @ abs(direction), 0.0
-        case Hull():
-            return max(exact(shape.vertices) @ direction), 0.0
-        case Sphere():
-            return Fraction(0), shape.radius * math.sqrt(direction @ direction)
-        case Capsule():
-            return Fraction(shape.length) / 2 * abs(z), shape.radius * math.sqrt(direction @ direction)
-        case Cylinder():
-            return Fraction(shape.length) / 2 * abs(z), shape.radius * math.sqrt(x * x + y * y)
-        case HalfSpace():
-            return Fraction(shape.offset), 0.0
-
-
-def _cross(u: Exact, v: Exact) -> Exact:
-    return np.array([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]], dtype=object)
 
 
 def _solid_angle(triangle: Floats, volume: Fraction) -> float:
