@@ -218,6 +218,16 @@ def prism(sides, height=1.0):
     return np.vstack([np.column_stack([ring, np.full(sides, z)]) for z in (-height / 2, height / 2)])
 
 
+def slender(rng, case, most):
+    """The bodies of a case stretched by up to 10 to the power of `most`, turned, moved and scaled together."""
+    scale, distance = power(rng, -9, 6), power(rng, -3, 6)
+    thin = 10.0 ** -rng.integers(0, most + 1, 3).astype(float)
+    thin[int(rng.integers(3))] = 1
+    matrix, shift = rotation(quaternion(rng)), np.round(distance * directions(rng, 1)[0], 3)
+    bodies = tuple((mapped(points * thin, matrix) + shift) * scale for points in case.bodies)
+    return Case(f"{case.detail} at {distance:.0e} times {scale:.0e}", 1 / thin.min(), bodies)
+
+
 # Families of pairs
 
 
@@ -386,12 +396,7 @@ def far_away(rng):
 
 def combined(rng):
     """A pair of any other family, stretched by up to `parameter` in one or two directions, turned, moved and scaled."""
-    case, scale, distance = any_pair(rng), power(rng, -9, 6), power(rng, -3, 6)
-    thin = 10.0 ** -rng.integers(0, 7, 3).astype(float)
-    thin[int(rng.integers(3))] = 1
-    turn_all, shift = rotation(quaternion(rng)), np.round(distance * directions(rng, 1)[0], 3)
-    bodies = tuple((mapped(points * thin, turn_all) + shift) * scale for points in case.bodies)
-    return Case(f"{case.detail} at {distance:.0e} times {scale:.0e}", 1 / thin.min(), bodies)
+    return slender(rng, any_pair(rng), 6)
 
 
 def round_hulls(rng):
@@ -498,6 +503,11 @@ def empty_triples(rng):
     return Case(f"{len(slabs)} bodies {way}", hole, bodies)
 
 
+def slender_groups(rng):
+    """Compounds and groups around a hole, stretched by up to `parameter`, turned, moved and scaled."""
+    return slender(rng, [compounds, empty_triples][int(rng.integers(2))](rng), 4)
+
+
 def half_spaces(rng):
     """A hull and one to four half-spaces through its vertices, or `parameter` beside them."""
     points = coarse(hull_points(rng, int(rng.integers(4, 17))), 6)
@@ -553,7 +563,8 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         general, posed, posed_boxes, posed_slivers, slivers, tilted_slivers, touching, parallel_edges,
         nearly_touching, identical, shared_planes, shared_facets, nested_flush, needles_and_plates,
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls, prisms, cut_at_edges,
-        dual_pairs, compounds, many_bodies, empty_triples, half_spaces, half_spaces_alone, lenses,
+        dual_pairs, compounds, many_bodies, empty_triples, slender_groups, half_spaces,
+        half_spaces_alone, lenses,
     )
 }  # fmt: skip
 
