@@ -1,10 +1,11 @@
-"""The command line: `overlapper run SCENE` and `overlapper scenes`."""
+"""The command line: `overlapper run SCENE`, `overlapper scenes` and `overlapper stability`."""
 
 from __future__ import annotations
 
 import ctypes
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import warnings
@@ -129,6 +130,24 @@ def run(
         _show(summary, finished, files)
     if not finished:
         raise typer.Exit(130)
+
+
+@app.command()
+def stability(
+    seed: Annotated[int, typer.Option(min=0, help="Of the first case of each family.")] = 0,
+    count: Annotated[int, typer.Option(min=1, help="About so many cases.")] = 2000,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for results, page and pictures; by default where the checkout has its own."),
+    ] = None,
+) -> None:
+    """Put hard cases to this package and to others, and chart who fails where: for a checkout, some minutes."""
+    script = Path(__file__).parents[1] / "benchmarks" / "stability.py"
+    if not script.is_file():
+        raise Refused("stability needs a checkout of overlapper, as its cases and peers are not installed")
+    folder = [f"--out={out}"] if out else []
+    command = [sys.executable, str(script), f"--seed={seed}", f"--count={count}", *folder]
+    raise typer.Exit(subprocess.run(command).returncode)
 
 
 def _measure(

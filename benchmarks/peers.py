@@ -1,0 +1,184 @@
+"""Who is asked what bodies have in common: each peer is one function of vertex arrays, and its answer its type.
+
+A peer takes the vertices (n,3) of two bodies, or of any number if it is declared with `*bodies`, and returns the volume
+of what the hulls have in common (a float; 0.0 for nothing), or only whether they overlap (a bool). It imports its
+package itself, so that one that is not installed is known by its ImportError. To add a peer, write its function and
+name it in PEERS.
+
+Peers that must be given faces get those of `overlapper.Hull`, coplanar triangles merged, so that a failure is their
+own; those that take points build the hull themselves, as their users would.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import reduce
+
+import numpy as np
+
+from overlapper import Hull, overlap
+
+Ring = list[int]
+
+
+def auto(*bodies: np.ndarray) -> float:
+    return overlap(*bodies).volume
+
+
+def paper(*bodies: np.ndarray) -> float:
+    """The article's method, as this package has it."""
+    return overlap(*bodies, method="paper").volume
+
+
+def clipping(*bodies: np.ndarray) -> float:
+    """The first body cut by the planes of the others in plain doubles, as r3d does it: the signs of the vertices decide
+    what is kept, so that the mesh stays closed whatever the rounding."""
+    first, *others = (Hull(body) for body in bodies)
+    vertices, rings = list(first.vertices), [ring.tolist() for ring in first.facets]
+    for plane in np.vstack([other.halfspaces for other in others]):
+        rings = clipped(vertices, rings, plane)
+    return enclosed_volume(np.array(vertices), rings)
+
+
+def clipped(vertices: list[np.ndarray], rings: list[Ring], plane: np.ndarray) -> list[Ring]:
+    """The facets left on the inner side of a plane, and those that close the cut. New vertices are appended."""
+    level = np.array(vertices) @ plane[:3] + plane[3]
+    old, crossings = len(vertices), {}
+
+    def crossing(u: int, v: int) -> int:
+        edge = (min(u, v), max(u, v))
+        if edge not in crossings:
+            crossings[edge] = len(vertices)
+            vertices.append(vertices[u] + level[u] / (level[u] - level[v]) * (vertices[v] - vertices[u]))
+        return crossings[edge]
+
+    kept, following = [], {}
+    for ring in rings:
+        part = []
+        for u, v in edges(ring):
+            if level[u] <= 0:
+                part.append(u)
+            if (level[u] <= 0) != (level[v] <= 0):
+                part.append(crossing(u, v))
+        if part:
+            kept.append(part)
+            # Two new vertices in a row are a way out and the next way in; the cut runs along them the other way.
+            following.update({v: u for u, v in edges(part) if min(u, v) >= old})
+    return kept + list(cycles(following))
+
+
+def edges(ring: Ring) -> Iterable[tuple[int, int]]:
+    return zip(ring, ring[1:] + ring[:1])
+
+
+def cycles(following: dict[int, int]) -> Iterator[Ring]:
+    while following:
+        ring = [next(iter(following))]
+        while (v := following.pop(ring[-1])) != ring[0]:
+            ring.append(v)
+        yield ring
+
+
+def enclosed_volume(vertices: np.ndarray, rings: list[Ring]) -> float:
+    if not rings:
+        return 0.0
+    vertices = vertices - vertices[rings[0][0]]
+    return sum(
+        float(np.cross(vertices[ring[1:-1]], vertices[ring[2:]]).sum(0) @ vertices[ring[0]]) / 6
+        for ring in rings
+        if len(ring) > 2
+    )
+
+
+def scipy_halfspaces(*bodies: np.ndarray) -> float:
+    """The usual recipe: the centre of the largest ball by linear programming, then qhull's dual hull about it."""
+    from scipy.optimize import linprog
+    from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+    planes = np.vstack([ConvexHull(body).equations for body in bodies])
+    slack = np.linalg.norm(planes[:, :3], axis=1)
+    ball = linprog([0, 0, 0, -1], np.column_stack([planes[:, :3], slack]), -planes[:, 3], bounds=(None, None))
+    if ball.status == 2 or (ball.status == 0 and ball.x[3] <= 0):  # 2: infeasible
+        return 0.0
+    if ball.status != 0:
+        raise RuntimeError(f"linprog: {ball.message}")
+    return float(ConvexHull(HalfspaceIntersection(planes, ball.x[:3]).intersections).volume)
+
+
+def manifold(*bodies: np.ndarray) -> float:
+    from manifold3d import Error, Manifold
+
+    common = reduce(Manifold.__xor__, map(Manifold.hull_points, bodies))
+    if common.status() != Error.NoError:
+        raise RuntimeError(f"manifold3d: {common.status()}")
+    return float(common.volume())
+
+
+def trimesh_boolean(*bodies: np.ndarray) -> float:
+    import manifold3d  # noqa: F401, the engine
+    from trimesh import PointCloud
+    from trimesh.boolean import intersection
+
+    common = intersection([PointCloud(body).convex_hull for body in bodies], engine="manifold")
+    return float(common.volume) if len(common.faces) else 0.0
+
+
+def fcl_collide(a: np.ndarray, b: np.ndarray) -> bool:
+    import fcl
+
+    return fcl.collide(*map(fcl_object, (a, b)), fcl.CollisionRequest(), fcl.CollisionResult()) > 0
+
+
+def fcl_distance(a: np.ndarray, b: np.ndarray) -> bool:
+    import fcl
+
+    return fcl.distance(*map(fcl_object, (a, b)), fcl.DistanceRequest(enable_signed_distance=True)) < 0
+
+
+def fcl_object(points: np.ndarray):
+    import fcl
+
+    hull = Hull(points)
+    faces = np.concatenate([[len(ring), *ring] for ring in hull.facets])
+    return fcl.CollisionObject(fcl.Convex(hull.vertices, len(hull.facets), faces))
+
+
+def coal_collide(a: np.ndarray, b: np.ndarray) -> bool:
+    import coal
+
+    shapes = []
+    for body in (a, b):
+        points = coal.StdVec_Vec3s()
+        points.extend(list(body))
+        shapes.append(coal.ConvexBase.convexHull(points, True, "Qt"))
+    at_rest = coal.Transform3s.Identity()
+    result = coal.CollisionResult()
+    return coal.collide(shapes[0], at_rest, shapes[1], at_rest, coal.CollisionRequest(), result) > 0
+
+
+def pybullet_closest(a: np.ndarray, b: np.ndarray) -> bool:
+    """Overlapping is what remains below zero once both hulls' margins are taken off."""
+    import pybullet
+
+    margin = 0.001  # m; pybullet grows every hull by it, so that two of them are reported too near by two of it
+    if not pybullet.isConnected():
+        pybullet.connect(pybullet.DIRECT)
+    pybullet.resetSimulation()
+    hulls = [pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=body.tolist()) for body in (a, b)]
+    first, second = (pybullet.createMultiBody(0, hull) for hull in hulls)
+    points = pybullet.getClosestPoints(first, second, 0.0)
+    return min((point[8] for point in points), default=0.0) + 2 * margin < 0
+
+
+PEERS: dict[str, Callable[..., float | bool]] = {
+    "auto": auto,
+    "paper": paper,
+    "clipping": clipping,
+    "scipy": scipy_halfspaces,
+    "manifold3d": manifold,
+    "trimesh": trimesh_boolean,
+    "fcl collide": fcl_collide,
+    "fcl distance": fcl_distance,
+    "coal": coal_collide,
+    "pybullet": pybullet_closest,
+}

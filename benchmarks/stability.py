@@ -1,0 +1,355 @@
+"""Who fails where: hard cases with exact answers, put to each peer in a process of its own.
+
+    python benchmarks/stability.py                   all cases again, then the page and its pictures
+    python benchmarks/stability.py --page            only the page and its pictures, from the results there are
+
+Writes DIR/results/stability.csv (a case a line) and what benchmarks/stability_page.py makes of it. The cases are those
+of tests/families.py made of vertices alone, so that every peer can be given them. The truth is exact: rational
+arithmetic on the doubles that the peers get.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import inspect
+import multiprocessing
+import os
+import resource
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from importlib.metadata import version
+from math import isfinite, isqrt
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+sys.path[:0] = [str(HERE), str(ROOT / "tests")]
+
+try:
+    import exact
+    import families
+    import numpy as np
+    from paper_steps import lost_at, lost_given_a_point, volume_without_exact_signs
+    from peers import PEERS
+
+    from overlapper import Placed
+except ImportError as error:
+    print(f"overlapper: the stability chart needs {error.name}: pip install 'overlapper[bench]'", file=sys.stderr)
+    sys.exit(2)
+
+RESULTS = HERE / "results" / "stability.csv"
+
+# A volume further off than this, relative to the true one, is a failure.
+ACCURACY = 1e-6
+
+# Fraction of the smaller body's size within which bodies may as well be said to overlap as not to.
+MARGIN = Fraction(1, 10**12)
+
+START_LIMIT = 120.0  # s, for a peer to be imported and to answer the first question on a busy machine
+TIME_LIMIT = 10.0  # s, for every other question
+
+# Vertices of one body, so that the exact truth stays a matter of seconds.
+LARGEST = 170
+
+# Families whose parameter runs over many decades get more cases, so that each decade has some.
+DECADES = ("slivers", "tilted_slivers", "nearly_touching", "needles_and_plates", "far_away", "scaled")
+SHARE = dict.fromkeys(DECADES, 3)
+
+# What stands in the table for a peer that was not asked, and for a right yes or no.
+NOT_ASKED, RIGHT = "-", "ok"
+
+
+@dataclass(frozen=True)
+class Question:
+    """A case as the peers get it, and what is exactly true of it."""
+
+    case: families.Case
+    bodies: tuple[np.ndarray, ...]
+
+    @cached_property
+    def solids(self) -> list[exact.Polytope]:
+        return [exact.hull(body) for body in self.bodies]
+
+    @cached_property
+    def common(self) -> exact.Polytope:
+        return exact.common(*self.solids)
+
+    @property
+    def volume(self) -> Fraction:
+        return self.common.volume
+
+    @cached_property
+    def size(self) -> Fraction:
+        """The diagonal of the smallest body's box."""
+        return Fraction(min(float(np.linalg.norm(np.ptp(body, axis=0))) for body in self.bodies))
+
+    @cached_property
+    def clear(self) -> bool:
+        """Whether yes or no can be wrong: what is common holds a ball of MARGIN times the size, or the bodies stay
+        apart although every face is moved outwards by as much."""
+        if self.common.dimension == 3:
+            # A convex body of volume V and surface A holds a ball of radius V / A at least.
+            return self.volume > MARGIN * self.size * Fraction(self.common.area) or self.shrunk(MARGIN * self.size)
+        return self.common.dimension < 0 and not self.shrunk(-MARGIN * self.size)
+
+    def shrunk(self, by: Fraction) -> bool:
+        """Whether anything is left in common once every face has been moved inwards."""
+        reach = 4 * int(max(float(np.abs(body).max()) for body in self.bodies) + 1)
+        part = exact.hull([[x, y, z] for x in (-reach, reach) for y in (-reach, reach) for z in (-reach, reach)])
+        for a, b, c, d in (plane for solid in self.solids for plane in solid.planes):
+            length = isqrt(a * a + b * b + c * c) + 1
+            moved = [x * by.denominator for x in (a, b, c, d)]
+            moved[3] += length * by.numerator
+            part = exact.clipped(part, exact.primitive(moved), 1)
+        return part.dimension >= 0
+
+
+def questions(seed: int, count: int) -> list[Question]:
+    """About so many, from every family that is made of vertices."""
+    asked = [name for name in families.FAMILIES if families_of_vertices(name)]
+    unit = count / sum(SHARE.get(name, 1) for name in asked)
+    found = []
+    for name in asked:
+        for i in range(max(1, round(unit * SHARE.get(name, 1)))):
+            case = families.make(name, seed + i)
+            bodies = tuple(np.array(families.points_of(body), float) for body in case.bodies)
+            if max(map(len, bodies)) <= LARGEST:
+                found.append(Question(case, bodies))
+    return found
+
+
+def families_of_vertices(name: str) -> bool:
+    return not any(isinstance(body, (families.Below, Placed)) for body in families.make(name, 0).bodies)
+
+
+# A peer in a process of its own
+
+
+class Ended(Exception):
+    """The peer says no more; the text tells how it ended."""
+
+
+class Peer:
+    """A context manager: asks one function of PEERS, in a process that is started again whenever it ends."""
+
+    def __init__(self, answer: Callable[..., float | bool], time_limit: float = TIME_LIMIT) -> None:
+        self.answer, self.time_limit = answer, time_limit
+        self.process: Any = None
+
+    def __enter__(self) -> Peer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def takes(self, count: int) -> bool:
+        parameters = inspect.signature(self.answer).parameters.values()
+        return count == len(parameters) or any(p.kind is p.VAR_POSITIONAL for p in parameters)
+
+    def ask(self, bodies: tuple[np.ndarray, ...]) -> float | bool | str:
+        """Its answer, or how it failed in a few words. ImportError if its package is missing."""
+        try:
+            if self.process is None:
+                self.start()
+            self.pipe.send(bodies)
+            reply = self.receive(self.time_limit)
+        except Ended as ended:
+            self.close()
+            return str(ended)
+        return reply
+
+    def start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipe, other = context.Pipe()
+        self.process = context.Process(target=serve, args=(other, self.answer), daemon=True)
+        self.process.start()
+        other.close()
+        self.pipe.send((families.CORNERS, families.CORNERS + 1.0))
+        first = self.receive(START_LIMIT)
+        if isinstance(first, ImportError):
+            raise first
+
+    def receive(self, limit: float) -> Any:
+        try:
+            if not self.pipe.poll(limit):
+                raise Ended("hang")
+            return self.pipe.recv()
+        except (EOFError, ConnectionResetError):
+            self.process.join()
+            code = self.process.exitcode
+            raise Ended(f"crash {signal.Signals(-code).name if code < 0 else code}") from None
+
+    def close(self) -> None:
+        if self.process is not None:
+            self.process.kill()
+            self.process.join()
+            self.pipe.close()
+            self.process = None
+
+
+def serve(pipe: Connection, answer: Callable[..., float | bool]) -> None:
+    """The peer's process: bodies in, an answer or the name of an exception out."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.dup2(nowhere, 2)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    warnings.simplefilter("ignore")
+    while True:
+        try:
+            bodies = pipe.recv()
+        except EOFError:
+            return
+        try:
+            pipe.send(answer(*bodies))
+        except ImportError as error:
+            pipe.send(error)
+        except Exception as error:
+            pipe.send(f"raises {type(error).__name__}")
+
+
+# What an answer is worth
+
+
+def verdict(question: Question, answer: float | bool | str) -> str:
+    """`ok`, or the relative error of the volume, or how the peer failed. `failed` tells them apart."""
+    if isinstance(answer, str):
+        return answer
+    if isinstance(answer, bool):
+        solid = question.common.dimension == 3
+        return RIGHT if answer == solid or not question.clear else "missed" if solid else "phantom"
+    if not isfinite(answer):
+        return "not finite"
+    off = abs(Fraction(answer) - question.volume)
+    if question.clear and question.common.dimension == 3:
+        return "missed" if answer == 0 else f"{float(off / question.volume):.1e}"
+    if question.clear:
+        return RIGHT if answer == 0 else "phantom"
+    # As much as a sheet of that thickness and of the smaller body's size.
+    return RIGHT if off <= 2 * MARGIN * question.size**3 else "phantom"
+
+
+def failed(cell: str) -> bool:
+    return cell not in (RIGHT, NOT_ASKED) and not error_of(cell) <= ACCURACY
+
+
+def error_of(cell: str) -> float:
+    """The relative error of a volume; 1 where it is lost, nan where there is none."""
+    try:
+        return 1.0 if cell == "missed" else float(cell)
+    except ValueError:
+        return float("nan")
+
+
+# The run
+
+
+def run(seed: int, count: int, path: Path) -> None:
+    asked = questions(seed, count)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = [described(question) for question in asked]
+    missing = []
+    for name, answer in PEERS.items():
+        column = []
+        with Peer(answer) as peer:
+            try:
+                for question in tracked(asked, name):
+                    takes = peer.takes(len(question.bodies))
+                    column.append(verdict(question, peer.ask(question.bodies)) if takes else NOT_ASKED)
+            except ImportError as error:
+                missing.append(f"{name} ({error.name} is not installed)")
+                column = [NOT_ASKED] * len(asked)
+        for row, cell in zip(rows, column):
+            row[name] = cell
+    for row, question in zip(rows, tracked(asked, "steps")):
+        row["paper lost at"] = lost_at(*question.bodies) if failed(row["paper"]) else NOT_ASKED
+        solid = question.clear and question.common.dimension == 3
+        row["given a point"] = lost_given_a_point(question.bodies, question.common) or RIGHT if solid else NOT_ASKED
+        row["and by qhull"] = by_qhull(question) if solid else NOT_ASKED
+    with path.open("w", newline="", encoding="utf-8") as file:
+        file.write(f"# seed {seed}; {packages()}\n")
+        for line in missing:
+            file.write(f"# missing: {line}\n")
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    print(f"Written: {path}", *(f"Missing: {line}" for line in missing), sep="\n")
+
+
+def by_qhull(question: Question) -> str:
+    try:
+        return verdict(question, volume_without_exact_signs(question.bodies, question.common))
+    except Exception as error:
+        return f"raises {type(error).__name__}"
+
+
+def described(question: Question) -> dict[str, str]:
+    case = question.case
+    return {
+        "family": case.family,
+        "seed": str(case.seed),
+        "detail": case.detail,
+        "parameter": f"{case.parameter:.3g}",
+        "bodies": str(len(question.bodies)),
+        "common": exact.NAMES[question.common.dimension],
+        "clear": "yes" if question.clear else "no",
+        "volume": f"{float(question.volume):.6g}",
+    }
+
+
+def packages() -> str:
+    names = ["overlapper", "numpy", "scipy", "manifold3d", "trimesh", "python-fcl", "coal", "pybullet"]
+    found = []
+    for name in names:
+        try:
+            found.append(f"{name} {version(name)}")
+        except ModuleNotFoundError:
+            found.append(f"{name} missing")
+    return ", ".join(found)
+
+
+def tracked(items: list[Any], name: str) -> Iterator[Any]:
+    """The items, counted on stderr if that is a terminal."""
+    for i, item in enumerate(items):
+        if sys.stderr.isatty() and i % 20 == 0:
+            print(f"\r{name}: {i} of {len(items)}   ", end="", file=sys.stderr, flush=True)
+        yield item
+    if sys.stderr.isatty():
+        print("\r" + " " * 40 + "\r", end="", file=sys.stderr)
+
+
+def read(path: Path) -> tuple[list[str], list[dict[str, str]]]:
+    """The comments and the rows of a results file."""
+    with path.open(newline="", encoding="utf-8") as file:
+        lines = file.readlines()
+    notes = [line[2:].strip() for line in lines if line.startswith("# ")]
+    return notes, list(csv.DictReader(line for line in lines if not line.startswith("# ")))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Who fails where: hard cases with exact answers, put to each peer.")
+    parser.add_argument("--seed", type=int, default=0, help="of the first case of each family")
+    parser.add_argument("--count", type=int, default=2000, help="about so many cases")
+    parser.add_argument("--out", type=Path, help="folder for results and page, by default those of the checkout")
+    parser.add_argument("--page", action="store_true", help="only draw the page, from the results there are")
+    chosen = parser.parse_args()
+    results = chosen.out / "stability.csv" if chosen.out else RESULTS
+    if not chosen.page:
+        run(chosen.seed, chosen.count, results)
+    try:
+        from stability_page import write_page
+    except ImportError as error:
+        print(f"overlapper: the pictures need {error.name}: pip install 'overlapper[bench]'", file=sys.stderr)
+        sys.exit(2)
+    print(f"Written: {write_page(results, chosen.out or ROOT / 'docs')}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,295 @@
+"""The stability page and its pictures, from a results file and nothing else but the failing cases it names."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from math import ceil, log10
+from pathlib import Path
+from string import Template
+
+import exact
+import families
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Colormap, LinearSegmentedColormap
+from paper_pictures import PICTURES, save, steps_in_thicknesses
+from paper_steps import STEPS
+from peers import PEERS
+from stability import NOT_ASKED, RIGHT, error_of, failed, read
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+Row = dict[str, str]
+
+GROUPS = {
+    "general position": ("general", "posed", "posed_boxes"),
+    "slivers": ("slivers", "posed_slivers"),
+    "tilted slivers": ("tilted_slivers",),
+    "touching": ("touching", "parallel_edges", "nearly_touching"),
+    "shared planes": ("identical", "shared_planes", "shared_facets", "nested_flush", "cut_at_edges", "dual_pairs"),
+    "needles, plates": ("needles_and_plates", "stacked_plates"),
+    "tiny, huge": ("scaled", "tiny_in_huge"),
+    "far from the origin": ("far_away",),
+    "round hulls": ("round_hulls", "prisms"),
+    "several bodies": ("compounds", "many_bodies", "empty_triples"),
+}
+
+# What the parameter of a family means, for those whose cases run over many decades of it.
+DEGENERACIES = {
+    "slivers": "depth of the overlap, in sizes",
+    "tilted_slivers": "tilt of one body, in radians",
+    "nearly_touching": "gap or depth, in sizes",
+    "needles_and_plates": "aspect ratio",
+    "far_away": "distance from the origin, in sizes",
+    "scaled": "size, in m",
+}
+
+VOLUMES = ["auto", "paper", "clipping", "scipy", "manifold3d", "trimesh"]
+
+# One hue from pale to dark: told apart without colours, too, and the figures stand in the cells.
+FAILURES = LinearSegmentedColormap.from_list("failures", ["#fdebd3", "#f4a259", "#c8553d", "#5b1a18"])
+ERRORS = LinearSegmentedColormap.from_list("errors", ["#eef3f8", "#a9c6de", "#4f83b5", "#16365c"])
+CLEAN, EMPTY, INK = "#ffffff", "#f0f0f0", "#222222"
+
+
+def write_page(results: Path, folder: Path) -> Path:
+    notes, rows = read(results)
+    folder.mkdir(parents=True, exist_ok=True)
+    plt.rcParams.update({"font.size": 8, "font.family": "DejaVu Sans", "axes.linewidth": 0.0})
+    overview(rows, folder / "stability.png")
+    by_degeneracy(rows, folder / "stability_degeneracy.png")
+    shown = shown_cases(rows)
+    for step, row in shown.items():
+        PICTURES[CAUSES[step]](*case_of(row), folder / f"stability_{CAUSES[step]}.png")
+    page = folder / "stability.md"
+    page.write_text(text(notes, rows, shown), encoding="utf-8")
+    return page
+
+
+# Figures
+
+
+def asked(rows: Iterable[Row], peer: str) -> list[str]:
+    return [row[peer] for row in rows if row[peer] != NOT_ASKED]
+
+
+def failure_share(rows: Iterable[Row], peer: str) -> float:
+    """In percent; nan if the peer was not asked."""
+    cells = asked(rows, peer)
+    return 100 * sum(map(failed, cells)) / len(cells) if cells else np.nan
+
+
+def worst_error(rows: Iterable[Row], peer: str) -> float:
+    """Relative, of the volumes that were wanted and given; nan if there are none."""
+    errors = [error for cell in asked(rows, peer) if not np.isnan(error := error_of(cell))]
+    return max(errors, default=np.nan)
+
+
+def grouped(rows: list[Row]) -> dict[str, list[Row]]:
+    """The rows by group, a family that is in no group by its own name."""
+    name_of = {family: group for group, members in GROUPS.items() for family in members}
+    groups: dict[str, list[Row]] = {group: [] for group in GROUPS}
+    for row in rows:
+        groups.setdefault(name_of.get(row["family"], row["family"].replace("_", " ")), []).append(row)
+    return {name: members for name, members in groups.items() if members}
+
+
+def decade(row: Row) -> float:
+    """The power of ten of the parameter's size; minus infinity for zero."""
+    size = abs(float(row["parameter"]))
+    return round(log10(size)) if size else -np.inf
+
+
+# Charts
+
+
+def percent(value: float) -> str:
+    return "" if np.isnan(value) else "0" if value == 0 else "<1" if value < 1 else f"{value:.0f}"
+
+
+def exponent(value: float) -> str:
+    """Its power of ten, rounded up: 3e-9 as −8. A cross where the error is as large as the volume."""
+    return "" if np.isnan(value) else "×" if value > 0.5 else f"{ceil(log10(max(value, 1e-17)))}".replace("-", "−")
+
+
+def heat_map(ax: Axes, values: np.ndarray, shade: Callable, label: Callable[[float], str], colours: Colormap) -> None:
+    """Cells with their figures. `shade` maps a value to 0 ... 1, or to None where it is as good as can be."""
+    for (i, j), value in np.ndenumerate(values):
+        strength = None if np.isnan(value) else shade(value)
+        colour = EMPTY if np.isnan(value) else CLEAN if strength is None else colours(strength)
+        ax.add_patch(plt.Rectangle((j - 0.47, i - 0.45), 0.94, 0.9, facecolor=colour, edgecolor="#dddddd", lw=0.5))
+        ink = "white" if strength is not None and strength > 0.6 else "#999999" if strength is None else INK
+        ax.text(j, i, label(value), ha="center", va="center", color=ink, fontsize=7)
+    ax.set_xlim(-0.5, values.shape[1] - 0.5)
+    ax.set_ylim(values.shape[0] - 0.5, -0.5)
+    ax.tick_params(length=0)
+
+
+def failure_shade(value: float) -> float | None:
+    return None if value == 0 else min(1.0, (value / 60) ** 0.5)
+
+
+def error_shade(value: float) -> float | None:
+    return None if value < 1e-12 else min(1.0, (log10(value) + 12) / 12)
+
+
+def overview(rows: list[Row], path: Path) -> None:
+    groups = grouped(rows)
+    shares = np.array([[failure_share(group, peer) for peer in PEERS] for group in groups.values()])
+    errors = np.array([[worst_error(group, peer) for peer in VOLUMES] for group in groups.values()])
+    widths = [len(PEERS), len(VOLUMES)]
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 0.36 * len(groups) + 1.75), width_ratios=widths)
+    heat_map(left, shares, failure_shade, percent, FAILURES)
+    heat_map(right, errors, error_shade, exponent, ERRORS)
+    left.set_yticks(range(len(groups)), [f"{name}  ({len(group)})" for name, group in groups.items()])
+    right.set_yticks([])
+    for ax, names in ((left, list(PEERS)), (right, VOLUMES)):
+        ax.xaxis.tick_top()
+        ax.set_xticks(range(len(names)), names, rotation=40, ha="left", rotation_mode="anchor")
+        ax.get_xticklabels()[0].set_fontweight("bold")
+    left.axvline(1.5, color=INK, lw=0.8)
+    left.axvline(5.5, color=INK, lw=0.8)
+    right.axvline(1.5, color=INK, lw=0.8)
+    left.set_xlabel("failures, % of the cases (number in brackets)", labelpad=6)
+    right.set_xlabel("worst error of a volume, power of ten (× lost)", labelpad=6)
+    figure.tight_layout(w_pad=1.5)
+    save(figure, path)
+
+
+def by_degeneracy(rows: list[Row], path: Path) -> None:
+    panels = {family: [r for r in rows if r["family"] == family] for family in DEGENERACIES}
+    panels = {family: members for family, members in panels.items() if members}
+    figure, axes = plt.subplots(len(panels), 2, figsize=(9, 2.3 * len(panels)), squeeze=False)
+    for (left, right), (family, members) in zip(axes, panels.items()):
+        decades = sorted({decade(row) for row in members})
+        columns = [[row for row in members if decade(row) == d] for d in decades]
+        peers = [peer for peer in PEERS if asked(members, peer)]
+        volumes = [peer for peer in VOLUMES if peer in peers]
+        shares = np.array([[failure_share(column, peer) for column in columns] for peer in peers])
+        errors = np.array([[worst_error(column, peer) for column in columns] for peer in volumes])
+        heat_map(left, shares, failure_shade, percent, FAILURES)
+        heat_map(right, errors, error_shade, exponent, ERRORS)
+        for ax, names in ((left, peers), (right, volumes)):
+            ax.set_yticks(range(len(names)), names)
+            ax.get_yticklabels()[0].set_fontweight("bold")
+            ax.set_xticks(range(len(decades)), ["0" if np.isinf(d) else f"1e{d:.0f}" for d in decades])
+            ax.tick_params(axis="x", labelsize=6 if len(decades) > 10 else 7.5)
+            ax.set_xlabel(DEGENERACIES[family])
+        name = family.replace("_", " ")
+        left.set_title(f"{name}: failures, %", loc="left", fontsize=8.5, fontweight="bold")
+        right.set_title("worst error of a volume, power of ten (× lost)", loc="left", fontsize=8.5)
+    figure.tight_layout(h_pad=1.2, w_pad=1.5)
+    save(figure, path)
+
+
+# Pictures of the causes
+
+
+CAUSES = {"2 shifts": "shifts", "3 planes": "planes", "4 coplanar duals": "coplanar"}
+
+
+def shown_cases(rows: list[Row]) -> dict[str, Row]:
+    """For each cause that occurs, the failing case that shows it best."""
+    pairs = [row for row in rows if row["bodies"] == "2" and row["clear"] == "yes"]
+    shown = {}
+    for step in CAUSES:
+        column = "paper lost at" if step == "2 shifts" else "given a point"
+        found = [row for row in pairs if row[column] == step]
+        if found:
+            shown[step] = max(found, key=lambda row: vividness(step, row))
+    return shown
+
+
+def vividness(step: str, row: Row) -> float:
+    if step == "2 shifts":
+        # Shifts of a few thicknesses: all of them and the body can be seen at one scale.
+        return -abs(log10(steps_in_thicknesses(*case_of(row)) / 2.5))
+    if step == "3 planes":
+        error = error_of(row["and by qhull"])
+        return 0.0 if np.isnan(error) else error
+    return -len(case_of(row)[1].facets)
+
+
+def case_of(row: Row) -> tuple[list[np.ndarray], exact.Polytope]:
+    case = families.make(row["family"], int(row["seed"]))
+    bodies = [np.array(families.points_of(body), float) for body in case.bodies]
+    return bodies, exact.common(*map(exact.hull, bodies))
+
+
+# Words
+
+KINDS = ("wrong volume", "missed", "phantom", "raised", "crashed", "hung")
+
+
+def kind(cell: str) -> str:
+    words = {"raises": "raised", "crash": "crashed", "hang": "hung", "missed": "missed", "phantom": "phantom"}
+    return words.get(cell.split()[0], "wrong volume")
+
+
+def text(notes: list[str], rows: list[Row], shown: dict[str, Row]) -> str:
+    template = (Path(__file__).parent / "stability_page.md").read_text(encoding="utf-8")
+    solids = [row for row in rows if row["given a point"] != NOT_ASKED]
+    paper = Counter(row["paper lost at"] for row in rows if row["paper lost at"] != NOT_ASKED)
+    parts = {
+        "cases": f"{len(rows):,}",
+        "solids": f"{len(solids):,}",
+        "notes": "\n".join(f"    {line}" for line in notes),
+        "totals": totals(rows),
+        "steps": steps(rows, solids, paper),
+        "auto": about_auto(rows),
+        "paper_failures": str(sum(paper.values())),
+        "shift_failures": str(paper["2 shifts"]),
+    }
+    for peer in PEERS:
+        key = peer.replace(" ", "_")
+        kinds = Counter(kind(cell) for cell in asked(rows, peer) if failed(cell))
+        parts |= {f"{key}_{name.replace(' ', '_')}": str(kinds[name]) for name in KINDS}
+        parts |= {f"{key}_share": percent(failure_share(rows, peer))}
+        parts |= {f"{key}_worst_at": worst_places(rows, peer)}
+    for step, name in CAUSES.items():
+        row = shown.get(step)
+        at = f"`{row['family']}` {row['seed']} ({row['detail']})" if row else ""
+        picture = f"![{STEPS[step]}](stability_{name}.png)\n\nThe case is {at}."
+        parts[f"picture_{name}"] = picture if row else "In these cases that never happened."
+    return Template(template).substitute(parts)
+
+
+def worst_places(rows: list[Row], peer: str) -> str:
+    """The three groups in which a peer fails most, with the share."""
+    shares = {name: failure_share(group, peer) for name, group in grouped(rows).items()}
+    worst = sorted((name for name in shares if shares[name] > 0), key=lambda name: -shares[name])[:3]
+    return ", ".join(f"{name} {percent(shares[name])} %" for name in worst) or "none"
+
+
+def about_auto(rows: list[Row]) -> str:
+    failures = [f"`{row['family']}` {row['seed']} ({row['auto']})" for row in rows if failed(row["auto"])]
+    return "It failed in none of them." if not failures else f"It failed in {', '.join(failures)}."
+
+
+def totals(rows: list[Row]) -> str:
+    lines = [f"| | cases | failures | {' | '.join(KINDS)} | worst error |", "|---|" + "--:|" * (len(KINDS) + 3)]
+    for peer in PEERS:
+        cells = asked(rows, peer)
+        kinds = Counter(kind(cell) for cell in cells if failed(cell))
+        error = worst_error(rows, peer)
+        worst = f"{error:.0e}" if peer in VOLUMES and not np.isnan(error) else ""
+        counts = " | ".join(str(kinds[name] or "") for name in KINDS)
+        share = f"{percent(failure_share(rows, peer))} %" if cells else "not installed"
+        lines.append(f"| {peer} | {len(cells)} | {share} | {counts} | {worst} |")
+    return "\n".join(lines)
+
+
+def steps(rows: list[Row], solids: list[Row], paper: Counter[str]) -> str:
+    given = Counter(row["given a point"] for row in solids)
+    lines = ["| first step that loses it | as written | the centroid given |", "|---|--:|--:|"]
+    for step, words in STEPS.items():
+        late = step in ("1 common point", "2 shifts", "not reproduced")
+        lines.append(f"| {step}: {words} | {paper[step]} | {'' if late else given[step]} |")
+    by_qhull = sum(failed(row["and by qhull"]) for row in solids)
+    lost = sum(given.values()) - given[RIGHT]
+    lines.append(f"| **all** | **{sum(paper.values())}** of {len(rows)} | **{lost}** of {len(solids)} |")
+    lines.append(f"| the same with qhull in place of exact signs | | {by_qhull} of {len(solids)} |")
+    return "\n".join(lines)
