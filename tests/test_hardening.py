@@ -1,0 +1,278 @@
+"""The same bits from many threads, no hang after fork or spawn, Ctrl-C heard, memory flat, copies that are the same."""
+
+import copy
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from strategies import hull_points, overlapping_points, quaternion
+
+import overlapper
+from overlapper import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Hull,
+    Overlap,
+    Placed,
+    Sphere,
+    _core,
+    distance,
+    iou,
+    overlap,
+    penetration_depth,
+)
+
+HANG = 120  # s after which something hangs; nothing here takes a tenth of it
+TOLERANCE = 0.03
+
+
+def random_shape(rng):
+    radius, length = rng.uniform(0.2, 0.8, 2)
+    solids = (
+        lambda: Box(rng.uniform(0.2, 0.8, 3)),
+        lambda: Sphere(radius),
+        lambda: Capsule(radius, length),
+        lambda: Cylinder(radius, length),
+        lambda: Hull(hull_points(rng, int(rng.integers(6, 16)))),
+        lambda: HalfSpace(rng.normal(size=3), rng.uniform(-0.5, 0.5)),
+    )
+    return solids[rng.integers(len(solids))]()
+
+
+def random_bodies(rng, count):
+    """Placed shapes of all kinds; some pairs are apart, most overlap. The first is bounded."""
+    bodies = [Placed(Box(rng.uniform(0.2, 0.8, 3)), rng.uniform(-0.6, 0.6, 3), quaternion(rng))]
+    while len(bodies) < count:
+        bodies.append(Placed(random_shape(rng), rng.uniform(-0.6, 0.6, 3), quaternion(rng)))
+    return bodies
+
+
+def bits(value):
+    """Anything that the package hands out, down to the last bit."""
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, (list, tuple)):
+        return tuple(bits(part) for part in value)
+    if isinstance(value, float):
+        return value.hex()
+    if type(value).__module__.startswith("overlapper"):
+        return type(value).__name__, tuple((name, bits(getattr(value, name))) for name in properties(value))
+    return value
+
+
+def properties(value):
+    names = (name for name in dir(type(value)) if not name.startswith("_"))
+    return [name for name in names if not callable(getattr(type(value), name))]
+
+
+def answers(seed):
+    """Every public function and class at work, as bits."""
+    rng = np.random.default_rng(seed)
+    a, b, c = random_bodies(rng, 3)
+    points = overlapping_points(rng, 9)
+    found = {
+        "Placed": [a, b, c],
+        "overlap": [overlap(a, b, tolerance=TOLERANCE), overlap(a, b, c, tolerance=TOLERANCE), overlap(*points)],
+        "paper": overlap(*points, method="paper"),
+        "distance": distance(a, b),
+        "penetration_depth": penetration_depth(a, b),
+        "iou": iou(a, b, TOLERANCE),
+    }
+    shapes, positions, orientations = zip(*((body.shape, body.position, body.orientation) for body in (a, b, c)))
+    pairs = _core.candidate_pairs(list(shapes), positions, orientations)
+    found["candidate_pairs"] = pairs
+    found["overlap_pairs"] = _core.overlap_pairs(list(shapes), positions, orientations, pairs, TOLERANCE)
+    return {name: bits(value) for name, value in found.items()}
+
+
+# Threads
+
+
+def test_answers_cover_every_public_name():
+    used = set(answers.__code__.co_names) | set(random_shape.__code__.co_names)
+    used |= {name for part in random_shape.__code__.co_consts if hasattr(part, "co_names") for name in part.co_names}
+    used |= set(random_bodies.__code__.co_names)
+    assert set(overlapper.__all__) - used == {"Overlap", "Shape"}  # a class that functions return, and a typing alias
+    assert {name for name, value in vars(_core).items() if not isinstance(value, type) and name[0] != "_"} <= used
+
+
+def test_eight_threads_at_once_get_the_bits_of_one():
+    alone = [answers(seed) for seed in range(12)]
+    together = threading.Barrier(8)
+
+    def all_answers(_):
+        together.wait(HANG)
+        return [answers(seed) for seed in range(12)]
+
+    with ThreadPoolExecutor(8) as pool:
+        for answer in pool.map(all_answers, range(8)):
+            assert answer == alone
+
+
+@pytest.mark.parametrize("method", ["auto", "paper"])
+def test_eight_threads_may_ask_one_overlap_for_everything(method):
+    for seed in range(20):
+        bodies = [*overlapping_points(np.random.default_rng(seed), 4), Sphere(1)]
+        alone = bits(overlap(*bodies, tolerance=TOLERANCE, method=method))
+        shared = overlap(*bodies, tolerance=TOLERANCE, method=method)
+        together = threading.Barrier(8)
+
+        def ask(first, shared=shared, together=together):
+            """Each thread starts with another property, so that each part of the lazy answer is built by some other."""
+            names = properties(shared)
+            together.wait(HANG)
+            for name in names[first:] + names[:first]:
+                getattr(shared, name)
+            return bits(shared)
+
+        with ThreadPoolExecutor(8) as pool:
+            assert set(pool.map(ask, range(0, 24, 3))) == {alone}
+
+
+# Processes
+
+
+def in_another_process(start, function, *arguments):
+    """What the function returns there. A process that hangs or dies fails the test."""
+    with multiprocessing.get_context(start).Pool(1) as pool:
+        return pool.apply_async(function, arguments).get(timeout=HANG)
+
+
+unasked: list[Overlap] = []
+
+
+def bits_of_unasked():
+    return bits(unasked)
+
+
+def test_a_forked_process_goes_on_with_what_it_inherits():
+    before = answers(0)  # method "paper" has started threads by now
+    bodies = overlapping_points(np.random.default_rng(1), 8)
+    methods = ("auto", "paper")
+    unasked[:] = [overlap(*bodies, method=method) for method in methods]
+    assert in_another_process("fork", bits_of_unasked) == bits([overlap(*bodies, method=method) for method in methods])
+    assert in_another_process("fork", answers, 0) == before == answers(0)
+
+
+def test_a_spawned_process_gives_the_same_bits():
+    assert in_another_process("spawn", answers, 2) == answers(2)
+
+
+@pytest.mark.parametrize("start", ["fork", "spawn"])
+def test_overlaps_travel_between_processes(start):
+    rng = np.random.default_rng(3)
+    there = [overlap(*random_bodies(rng, count), tolerance=TOLERANCE) for count in (2, 2, 3, 4)]
+    assert in_another_process(start, bits, there) == bits(there)
+    assert bits(in_another_process(start, copy.copy, there)) == bits(there)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_copies_and_pickles_of_overlaps_and_bodies_are_the_same(seed):
+    rng = np.random.default_rng(seed)
+    bodies = random_bodies(rng, 2 + seed % 3)
+    for method in ("auto", "paper"):
+        for original in (*bodies, overlap(*bodies, tolerance=TOLERANCE, method=method)):
+            for again in (copy.copy(original), copy.deepcopy(original), pickle.loads(pickle.dumps(original))):
+                assert bits(again) == bits(original)
+
+
+# Interruption
+
+
+def interrupted_batch():
+    """True if Ctrl-C ends a batch that would go on for minutes."""
+    balls, positions, orientations = [Sphere(1), Sphere(1)], [[0, 0, 0], [1, 0, 0]], [[0, 0, 0, 1]] * 2
+    pairs = np.broadcast_to(np.array([0, 1], np.int32), (1_000_000, 2))
+    press = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    press.start()  # it can only fire inside of the call, as nothing comes before it
+    try:
+        _core.overlap_pairs(balls, positions, orientations, pairs, 1e-2, "paper")
+    except KeyboardInterrupt:
+        return True
+    return False
+
+
+def test_ctrl_c_ends_a_long_batch():
+    assert in_another_process("spawn", interrupted_batch)
+
+
+# Memory
+
+
+def test_an_array_beyond_all_memory_is_a_memory_error():
+    assert in_another_process("spawn", refusals_of_huge_arrays) == ["MemoryError"] * 4
+
+
+def refusals_of_huge_arrays():
+    """The names of what is raised for petabytes of points, poses and pairs."""
+    huge = np.broadcast_to(0.0, (2**46, 3))
+    pairs = np.broadcast_to(np.array([0, 1], np.int32), (2**46, 2))
+    batch = ([Sphere(1)], [[0, 0, 0]], [[0, 0, 0, 1]])
+    calls = (
+        lambda: Hull(huge),
+        lambda: overlap(huge, Sphere(1)),
+        lambda: _core.overlap_pairs(*batch, pairs),
+        lambda: _core.candidate_pairs(batch[0], huge, batch[2]),
+    )
+    names = []
+    for call in calls:
+        try:
+            call()
+        except Exception as error:
+            names.append(next(c.__name__ for c in type(error).__mro__ if c.__module__ == "builtins"))
+    return names
+
+
+def resident():
+    """Bytes of this process in memory."""
+    with open("/proc/self/statm") as statm:
+        return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def growth_over(pairs):
+    """How much memory is left behind by that many pairs with a new hull each, of which every part is built."""
+    rng = np.random.default_rng(0)
+    bodies = random_bodies(rng, 97)
+    points = [hull_points(rng, 8) for _ in range(89)]
+
+    def soak(count):
+        for i in range(count):
+            method = "paper" if i % 20 == 0 else "auto"
+            common = overlap(bodies[i % 97], Hull(points[i % 89]), tolerance=0.3, method=method)
+            bits([common.volume, common.volume_error, common.gradient, common.vertices, common.patch, common.normal])
+
+    soak(2000)
+    before = resident()
+    soak(pairs)
+    return resident() - before
+
+
+def test_memory_is_flat_over_many_pairs(monkeypatch):
+    # The sanitizer would keep what is freed, to recognise its use.
+    monkeypatch.setenv("ASAN_OPTIONS", os.environ.get("ASAN_OPTIONS", "") + ":quarantine_size_mb=1")
+    pairs = 20_000
+    assert in_another_process("spawn", growth_over, pairs) < 200 * pairs  # an overlap alone has more bytes than that
+
+
+# Found by the fuzzer
+
+THIN_CAPSULES = {
+    "through a box": (Placed(Box((2, 3, 3)), (0.28292285252742166, 1, 0)), Placed(Capsule(2.0**-27, 1), (0, 0, -2))),
+    "inside of a ball": (Placed(Sphere(3), (0, -0.86, 0.14)), Placed(Capsule(2.0**-31, 1), (-0.417, 0.0059, 0.0059))),
+}
+
+
+@pytest.mark.parametrize("bodies", THIN_CAPSULES.values(), ids=THIN_CAPSULES)
+@pytest.mark.parametrize("method", ["auto", "paper"])
+def test_the_surface_of_a_needle_is_closed(bodies, method):
+    """Merging corners that only rounding parts must leave one closed surface; the paper's method once took minutes."""
+    common = overlap(*bodies, tolerance=0.003125, method=method)
+    edges = sum(len(facet) for facet in common.facets) / 2
+    assert len(common.vertices) - edges + len(common.facets) == (2 if common else 0)

@@ -1,0 +1,38 @@
+"""When memory runs out in the middle of an answer, that is a MemoryError, and the answer can be had later."""
+
+import multiprocessing
+import resource
+
+from overlapper import Overlap, Placed, Sphere, overlap
+
+TOLERANCE = 1e-7  # of two balls: hundreds of megabytes
+
+
+def two_balls() -> Overlap:
+    return overlap(Sphere(1), Placed(Sphere(1), (1, 0, 0)), tolerance=TOLERANCE)
+
+
+def limit_memory(further: int) -> None:
+    """So many bytes may still be asked for; all there are, if negative."""
+    with open("/proc/self/statm") as statm:
+        used = int(statm.read().split()[0]) * resource.getpagesize()
+    limit = used + further if further >= 0 else resource.RLIM_INFINITY
+    resource.setrlimit(resource.RLIMIT_AS, (limit, resource.RLIM_INFINITY))
+
+
+def volume_in_little_memory_and_then_in_enough() -> list[object]:
+    common = two_balls()
+    said: list[object] = []
+    for further in (60_000_000, 60_000_000, -1):
+        limit_memory(further)
+        try:
+            said.append(common.volume)
+        except MemoryError:
+            said.append(MemoryError)
+    return said
+
+
+def test_an_overlap_that_ran_out_of_memory_can_be_asked_again() -> None:
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        said = pool.apply_async(volume_in_little_memory_and_then_in_enough).get(timeout=120)
+    assert said == [MemoryError, MemoryError, two_balls().volume]
