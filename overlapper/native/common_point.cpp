@@ -72,6 +72,24 @@ class Basis {
     return true;
   }
 
+  /// An upper bound of the radius that holds whatever rounding did to the basis: a sum of the four inequalities with
+  /// non-negative weights that add up to one, about `centre`, for balls whose centre is within `reach` of it.
+  double certified_radius(Vec3 centre, double reach) const {
+    std::array<Row4, 4> transposed_rows;
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) transposed_rows[j][i] = row_of(planes_[i].plane)[j];
+    Row4 weight = solve(transposed_rows, {0, 0, 0, 1});
+    double total = 0, bound = 0;
+    Vec3 left_over;
+    for (double& w : weight) total += (w = std::max(0.0, w));
+    if (!(total > 0)) return kInfinity;
+    for (int i = 0; i < 4; ++i) {
+      bound -= weight[i] / total * signed_distance(planes_[i].plane, centre);
+      left_over += weight[i] / total * planes_[i].plane.normal;
+    }
+    return bound + norm(left_over) * reach;
+  }
+
   /// The largest of the numbers that the four planes were made from.
   double magnitude(std::span<const double> reach) const {
     double largest = 0;
@@ -137,6 +155,7 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double>
   }
   // Every exchange lowers the optimum or, at a degenerate corner, keeps it; smooth bodies add planes without end.
   constexpr int kMaxRounds = 256;
+  const double largest_reach = *std::max_element(reach.begin(), reach.end());
   for (int round = 0; round < kMaxRounds; ++round) {
     const auto [centre, radius] = basis.ball();
     // At a nearly singular corner the centre runs away, and both figures with it.
@@ -144,7 +163,8 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double>
     const double made_from = std::max(basis.magnitude(reach), worst.owner >= 0 ? reach[worst.owner] : 0);
     const double rounding_here = rounding(std::max(made_from, norm(centre)));
     best.upper = std::min(best.upper, radius + rounding_here);
-    best.apart = radius < -rounding_here;
+    best.apart =
+        radius < -rounding_here && basis.certified_radius(centre, largest_reach + norm(centre)) < -rounding_here;
     const double slack = -signed_distance(worst.plane, centre);
     if (slack > best.lower) best.lower = slack, best.centre = centre, best.rounding = rounding_here;
     // Newton's method starts from any inner point; a share of the depth is enough.

@@ -5,8 +5,10 @@
 #include <limits>
 #include <stdexcept>
 
+#include "expanding_hull.h"
 #include "minkowski.h"
 #include "paper.h"
+#include "predicates.h"
 
 namespace overlapper {
 namespace {
@@ -30,6 +32,24 @@ double magnitude(const Placed& relative) {
 constexpr double kEnough = 1e-12;
 
 bool smooth_body(const Placed& body) { return smooth(body.shape); }
+
+/// True if one of the bodies is bounded, or the half-spaces close up: the origin is strictly inside the hull of their
+/// normals.
+bool bounds_space(std::span<const Placed> bodies) {
+  ExpandingHull normals;
+  for (const Placed& body : bodies) {
+    const HalfSpace* half = std::get_if<HalfSpace>(&body.shape);
+    if (!half) return true;
+    normals.points.push_back(body.pose.rotation * half->plane.normal);
+  }
+  if (!normals.build()) return false;
+  for (const ExpandingHull::Facet& facet : normals.facets) {
+    if (facet.removed()) continue;
+    const auto [a, b, c] = facet.vertex;
+    if (orientation(normals.points[a], normals.points[b], normals.points[c], {}) >= 0) return false;
+  }
+  return true;
+}
 
 std::vector<OwnedPlane> gather_planes(std::span<const Placed> bodies) {
   std::vector<OwnedPlane> planes;
@@ -87,16 +107,11 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
   if (ball_.lower > ball_.rounding) {
     status_ = Status::kOverlapping;
     lazy_->planes = std::move(planes);
-    const bool none_bounded =
-        std::none_of(bodies_.begin(), bodies_.end(), [](const Placed& b) { return bounded(b.shape); });
-    if (none_bounded) {
-      for (const Region::Facet& facet : region().facets)
-        if (facet.owner < 0)
-          throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
-    }
   } else if (!ball_.apart) {
     status_ = Status::kTouching;
   }
+  if (status_ != Status::kSeparated && !bounds_space(bodies_))
+    throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
 }
 
 double Overlap::volume() const { return status_ == Status::kOverlapping ? quantities().volume : 0; }
@@ -133,11 +148,9 @@ const Region& Overlap::region() const {
   assert(status_ == Status::kOverlapping);
   const std::scoped_lock lock(lazy_->mutex);
   if (!lazy_->region) {
-    std::vector<OwnedPlane> planes = std::move(lazy_->planes);
-    if (std::none_of(bodies_.begin(), bodies_.end(), [](const Placed& b) { return bounded(b.shape); }))
-      planes.insert(planes.end(), ball_.cuts.begin(), ball_.cuts.begin() + 4);
-    lazy_->region = grow(relative_, planes, ball_, tolerance_,
+    lazy_->region = grow(relative_, lazy_->planes, ball_, tolerance_,
                          rounding(*std::max_element(reach_.begin(), reach_.end())), reference_);
+    lazy_->planes.clear();
   }
   return *lazy_->region;
 }

@@ -191,8 +191,8 @@ HalfSpace make_half_space(Vec3 normal, double offset) {
   const double length = norm(normal);
   require(length > 0, "normal must not be zero");
   // A normal that is unit but for its last bits stays as given, so that planes read back and built anew are the same.
-  if (std::abs(length - 1) <= 2 * DBL_EPSILON) return {{normal, offset}};
-  return {{normal / length, offset / length}};
+  if (std::abs(length - 1) <= 2 * DBL_EPSILON) return {{normal, offset}, normal, offset};
+  return {{normal / length, offset / length}, normal, offset};
 }
 
 double volume(const Shape& shape) {
@@ -291,7 +291,6 @@ Placed Placed::seen_from(Vec3 reference) const {
 }
 
 Bounds bounds(const Placed& placed) {
-  Bounds box;
   if (const HalfSpace* half = std::get_if<HalfSpace>(&placed.shape)) {
     const Plane plane = placed.pose * half->plane;
     const Vec3 touch = plane.offset * plane.normal;
@@ -505,12 +504,15 @@ Hull tessellated(const Shape& shape, double tolerance) {
           points.push_back({x * box->half_extents.x, y * box->half_extents.y, z * box->half_extents.z});
   } else if (const Cylinder* cylinder = std::get_if<Cylinder>(&shape)) {
     // An inscribed n-gon lacks 2/3 (π/n)² of its disc.
+    require(tolerance >= 1e-11, "tolerance must be 1e-11 or more where method 'paper' tessellates a cylinder");
     const int n = std::max(8, static_cast<int>(std::ceil(std::numbers::pi * std::sqrt(2 / (3 * tolerance)))));
     circle(cylinder->radius, -cylinder->length / 2, n);
     circle(cylinder->radius, cylinder->length / 2, n);
   } else if (bounded(shape)) {
     // A grid of latitudes and longitudes with the same step s lacks at most about s²/2 of the ball.
     const double radius = core_radius(shape), half = shape.index() == 0 ? 0 : std::get<Capsule>(shape).length / 2;
+    // Two latitudes' worth of points per band: beyond a million or so their hull is out of reach.
+    require(tolerance >= 1e-5, "tolerance must be 1e-5 or more where method 'paper' tessellates a round shape");
     const int bands = std::max(4, static_cast<int>(std::ceil(std::numbers::pi / std::sqrt(2 * tolerance))));
     points.push_back({0, 0, radius + half});
     points.push_back({0, 0, -radius - half});

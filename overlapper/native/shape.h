@@ -59,6 +59,8 @@ struct Cylinder {
 /// { x : dot(plane.normal, x) <= plane.offset }. Unbounded: its support is at infinity in all directions but one.
 struct HalfSpace {
   Plane plane;
+  Vec3 given_normal;  ///< as it came, of any length: dividing by that rounds, and wider arithmetic need not
+  double given_offset;
 
   Vec3 support(Vec3 direction) const;
   Plane ray_exit(Vec3, Vec3) const { return plane; }

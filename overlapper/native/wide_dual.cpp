@@ -92,6 +92,10 @@ std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference,
       }
       continue;
     }
+    if (const HalfSpace* half = std::get_if<HalfSpace>(&bodies[i].shape)) {
+      duals.push_back(body.at(wide(half->given_normal), half->given_offset));
+      continue;
+    }
     std::vector<Plane> planes;
     append_planes(bodies[i].shape, planes);
     for (const Plane& plane : planes) duals.push_back(body.at(wide(plane.normal), plane.offset));

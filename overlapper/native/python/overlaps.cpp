@@ -232,15 +232,17 @@ polytope contains the common set and could shrink into it by the fraction `toler
   cls.def("__copy__", [](nb::handle self) { return nb::borrow(self); });
   cls.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
   cls.def(
-      "__reduce__",
-      [](nb::handle self) {
-        const nb::object again =
-            nb::module_::import_("functools")
-                .attr("partial")(nb::module_::import_("overlapper._core").attr("overlap"),
-                                 "tolerance"_a = self.attr("tolerance"), "method"_a = self.attr("method"));
-        return nb::make_tuple(again, self.attr("shapes"));
+      "__getstate__",
+      [](nb::handle self) { return nb::make_tuple(self.attr("shapes"), self.attr("tolerance"), self.attr("method")); },
+      nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+  cls.def(
+      "__setstate__",
+      [](Overlap& self, nb::tuple state) {
+        std::vector<Placed> bodies;
+        for (nb::handle shape : nb::tuple(state[0])) bodies.push_back(nb::cast<Placed>(shape));
+        new (&self) Overlap(std::move(bodies), nb::cast<double>(state[1]), to_method(nb::cast<std::string>(state[2])));
       },
-      nb::sig("def __reduce__(self) -> tuple[object, tuple[Placed, ...]]"));
+      nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
 std::pair<Placed, Placed> relative_pair(nb::handle a, nb::handle b) {

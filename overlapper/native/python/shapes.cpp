@@ -215,8 +215,8 @@ As in pybullet, `length` lies between the centres of the caps; it may be 0.)");
   half.def_prop_ro("offset", [](const HalfSpace& h) { return h.plane.offset; }, "m along the unit normal");
   define_common(half);
   define_pickle(half, [](const HalfSpace& h) {
-    const Vec3 n = h.plane.normal;
-    return nb::make_tuple(nb::make_tuple(n.x, n.y, n.z), h.plane.offset);
+    const Vec3 n = h.given_normal;
+    return nb::make_tuple(nb::make_tuple(n.x, n.y, n.z), h.given_offset);
   });
 
   nb::class_<Hull> hull(m, "Hull",
