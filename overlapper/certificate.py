@@ -233,7 +233,10 @@ class BodyPlanes:
             case Box() as box:
                 return np.vstack([AXES, -AXES]), exact(np.tile(box.half_extents, 2))
             case Hull():
-                return self.body.facets
+                normals, offsets = self.body.facets
+                # Integers of any size, brought to where doubles do not overflow.
+                scale = np.array([Fraction(1, 2 ** max(map(int.bit_length, normal))) for normal in normals])
+                return normals * scale[:, None], offsets * scale
             case HalfSpace() as half:
                 return exact(half.normal)[None], exact([half.offset])
             case _:

@@ -31,6 +31,12 @@ def require(claim: bool | np.bool_, sentence: str) -> None:
         raise CertificateError(sentence)
 
 
+def require_rational(*values: Exact | Fraction) -> None:
+    """Doubles would be rounded on the way, and NaN would pass for anything."""
+    for number in (x for value in values for x in np.asarray(value, object).flat):
+        require(isinstance(number, int | Fraction), f"numbers must be integers or fractions, not {number!r}")
+
+
 @dataclass(frozen=True, eq=False)
 class OwnedPlane:
     """Body number `owner` lies in { x : normal . x <= offset }; the normal (3,) is of any length."""
@@ -43,6 +49,7 @@ class OwnedPlane:
 def check_planes(shapes: tuple[Placed, ...], planes: tuple[OwnedPlane, ...]) -> None:
     bodies = [RationalBody(shape) for shape in shapes]
     for number, plane in enumerate(planes):
+        require_rational(plane.normal, plane.offset)
         require(0 <= plane.owner < len(bodies), f"plane {number} must belong to one of the bodies")
         below = bodies[plane.owner].is_below(plane.normal, plane.offset)
         require(below, f"plane {number} must have all of body {plane.owner} below it")
@@ -88,6 +95,7 @@ class Touching:
     def verify(self) -> Bounds:
         check_planes(self.shapes, self.planes)
         check_balance(self.planes)
+        require_rational(self.inradius, self.point, self.nearest, self.miss)
         lengths = sum(root(plane.normal @ plane.normal)[0] for plane in self.planes)
         room = sum(plane.offset for plane in self.planes)
         require(room <= self.inradius * lengths, "planes must leave no room for a ball larger than the inradius")
@@ -146,6 +154,7 @@ class Overlapping:
 
     def verify(self) -> Bounds:
         check_planes(self.shapes, self.planes)
+        require_rational(self.vertices, self.point, self.margin, self.pull)
         self._check_inside()
         triangles = fans(self.rings)
         arms = self.vertices - self.point

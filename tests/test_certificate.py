@@ -6,7 +6,7 @@ from fractions import Fraction
 import families
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from strategies import in_general_position, placed, polyhedra, quaternion, solids
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap
@@ -94,16 +94,19 @@ def test_the_bounds_of_a_lens_hold_its_closed_form():
     assert lower < 5 * np.pi / 12 < upper < lower * Fraction(11, 10)
 
 
+@settings(max_examples=15)
 @given(in_general_position(solids, 2, 2))
 def test_pairs_are_proved(bodies):
     proved(found(bodies))
 
 
+@settings(max_examples=15)
 @given(in_general_position(polyhedra, 3, 6))
 def test_several_polyhedra_are_proved(bodies):
     proved(found(bodies))
 
 
+@settings(max_examples=15)
 @given(placed(solids, 3.0), placed(solids, 3.0), placed(solids, 3.0))
 def test_three_bodies_somewhere_are_proved(a, b, c):
     proved(found((a, b, c)))
@@ -115,10 +118,24 @@ def test_hard_families_are_proved(name):
         proved(overlap(*families.make(name, seed).placed, tolerance=0.1))
 
 
+def test_what_the_paper_method_finds_is_bounded_by_the_certificate():
+    """That method may lose planes, never invent a common part."""
+    bodies = IN_COMMON["cubes"]
+    exactly, _ = certificate(overlap(*bodies)).verify()
+    lower, upper = certificate(overlap(*bodies, method="paper")).verify()
+    assert lower <= exactly * (1 + Fraction(1, 10**15)) and exactly <= upper * (1 + Fraction(1, 10**15))
+
+
 def test_bodies_far_from_the_origin_are_proved_as_well_as_near_it():
     far = np.array([1e8, -3e8, 2e8])
     pair = Placed(CUBE, far, TURN), Placed(CUBE, far + (0.75, 0.5, 0.25), TURN)
     lower, upper = proved(overlap(*pair))
+    assert upper - lower <= upper * Fraction(1, 10**15)
+
+
+def test_coordinates_of_any_exponent_are_proved():
+    points = np.array([[0, 0, 1e-90], [1, 1e-70, 0], [1e-80, 1, 0], [0.1, 0.2, 1]])
+    lower, upper = proved(overlap(Placed(Hull(points)), Placed(Hull(points[:, ::-1]), (0.05, 0.05, 0.05))))
     assert upper - lower <= upper * Fraction(1, 10**15)
 
 
@@ -214,6 +231,16 @@ def test_the_certificate_of_other_bodies_is_found():
     first = claim.shapes[0]
     rejected(claim, "ball about the point must lie in body 1", shapes=(first, Placed(CUBE, (1.5, 0.5, 0.25))))
     rejected(claim, "must have all of body 1 below", shapes=(first, Placed(CUBE, (0.625, 0.5, 0.25))))
+
+
+def test_numbers_that_arithmetic_would_round_are_found():
+    claim = certificate(found(IN_COMMON["balls"]))
+    rejected(claim, "must be integers or fractions", margin=float("nan"))
+    rejected(claim, "must be integers or fractions", vertices=claim.vertices.astype(float))
+    plane = replace(claim.planes[0], offset=float("inf"))
+    rejected(claim, "must be integers or fractions", planes=(plane, *claim.planes[1:]))
+    claim = certificate(found(IN_CONTACT["balls"]))
+    rejected(claim, "must be integers or fractions", miss=float("inf"))
 
 
 def test_a_half_space_is_below_no_plane_but_its_own():
