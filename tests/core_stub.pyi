@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 import numpy
 import numpy.typing
 from numpy.typing import NDArray
+import overlapper
 
 
 class Sphere:
@@ -434,6 +435,14 @@ class Overlap:
         """
 
     def __repr__(self) -> str: ...
+
+    def certificate(self) -> overlapper.claims.Certificate:
+        """
+        What proves the status, and bounds of the volume, to somebody who does not trust us.
+
+        `verify()` of it checks everything in rational arithmetic without the core, and returns (lower, upper) bounds of the common
+        volume in m³. Raises CertificateError where there is none.
+        """
 
     def __copy__(self) -> object: ...
 

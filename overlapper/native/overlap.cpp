@@ -165,6 +165,9 @@ const Quantities& Overlap::quantities() const {
       if (const auto wide = widened(bodies_, r)) {
         lazy_->quantities = measure(*wide);
         lazy_->quantities->widened = true;
+      } else {
+        // The point about which the region was grown is not inside after all: all that is sure is how much could be.
+        lazy_->quantities->volume_error += lazy_->quantities->volume + touching_volume();
       }
     }
   }

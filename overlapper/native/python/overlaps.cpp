@@ -229,6 +229,14 @@ polytope contains the common set and could shrink into it by the fraction `toler
   define_surface(cls);
   define_contact(cls);
   cls.def("__repr__", [](const Overlap& o) { return repr(o); });
+  cls.def(
+      "certificate",
+      [](nb::handle self) { return nb::module_::import_("overlapper.certificate").attr("certificate")(self); },
+      nb::sig("def certificate(self) -> overlapper.claims.Certificate"),
+      R"(What proves the status, and bounds of the volume, to somebody who does not trust us.
+
+`verify()` of it checks everything in rational arithmetic without the core, and returns (lower, upper) bounds of the common
+volume in m³. Raises CertificateError where there is none.)");
   cls.def("__copy__", [](nb::handle self) { return nb::borrow(self); });
   cls.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
   cls.def(
