@@ -23,6 +23,7 @@ STEPS = {
     "3 duals": "the dual points, rounded",
     "4 coplanar duals": "planes that meet in one vertex become several vertices, apart by rounding",
     "5 vertices": "the vertices of the intersection, rounded",
+    "5 second hull": "facets of the vertices' hull joined, as if they were coplanar but for rounding",
     "not reproduced": "the replay gets it right",
 }
 
@@ -79,9 +80,10 @@ def lost_after(planes: np.ndarray, point: np.ndarray, truth: Fraction) -> tuple[
     if wrong(volume_of_polar(duals), truth):
         return "3 duals", None
     vertices = point + np.array(polar_vertices(duals), float)
+    if wrong(exact.hull(vertices).volume, truth):
+        return "5 vertices", None
     if wrong(volume_of(vertices), truth):
-        step = "5 vertices" if wrong(volume_of(snapped(vertices)), truth) else "4 coplanar duals"
-        return step, None
+        return "5 second hull" if wrong(volume_of(snapped(vertices)), truth) else "4 coplanar duals", None
     return None, vertices
 
 

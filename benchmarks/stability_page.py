@@ -25,16 +25,17 @@ import matplotlib.pyplot as plt
 Row = dict[str, str]
 
 GROUPS = {
-    "general position": ("general", "posed", "posed_boxes"),
+    "general position": ("general",),
+    "posed to 1 km away": ("posed", "posed_boxes"),
     "slivers": ("slivers", "posed_slivers"),
     "tilted slivers": ("tilted_slivers",),
     "touching": ("touching", "parallel_edges", "nearly_touching"),
     "shared planes": ("identical", "shared_planes", "shared_facets", "nested_flush", "cut_at_edges", "dual_pairs"),
-    "needles, plates": ("needles_and_plates", "stacked_plates"),
-    "tiny, huge": ("scaled", "tiny_in_huge"),
+    "needles and plates": ("needles_and_plates", "stacked_plates"),
+    "tiny and huge": ("scaled", "tiny_in_huge"),
     "far from the origin": ("far_away",),
     "round hulls": ("round_hulls", "prisms"),
-    "several bodies": ("compounds", "many_bodies", "empty_triples"),
+    "several bodies": ("compounds", "many_bodies", "empty_triples", "slender_groups"),
 }
 
 # What the parameter of a family means, for those whose cases run over many decades of it.
