@@ -206,7 +206,13 @@ def test_ctrl_c_ends_a_long_batch():
 # Memory
 
 
-def test_an_array_beyond_all_memory_is_a_memory_error():
+def set_sanitizer(monkeypatch, option):
+    """For processes spawned from here on, where they run under AddressSanitizer."""
+    monkeypatch.setenv("ASAN_OPTIONS", os.environ.get("ASAN_OPTIONS", "") + ":" + option)
+
+
+def test_an_array_beyond_all_memory_is_a_memory_error(monkeypatch):
+    set_sanitizer(monkeypatch, "allocator_may_return_null=1")  # as malloc does by itself
     assert in_another_process("spawn", refusals_of_huge_arrays) == ["MemoryError"] * 4
 
 
@@ -255,8 +261,7 @@ def growth_over(pairs):
 
 
 def test_memory_is_flat_over_many_pairs(monkeypatch):
-    # The sanitizer would keep what is freed, to recognise its use.
-    monkeypatch.setenv("ASAN_OPTIONS", os.environ.get("ASAN_OPTIONS", "") + ":quarantine_size_mb=1")
+    set_sanitizer(monkeypatch, "quarantine_size_mb=1")  # it would keep what is freed, to recognise its use
     pairs = 20_000
     assert in_another_process("spawn", growth_over, pairs) < 200 * pairs  # an overlap alone has more bytes than that
 
