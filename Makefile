@@ -2,7 +2,7 @@
 
 VENV := .venv
 SCENE := franka_grasp
-FUZZ_SECONDS := 60
+FUZZ := -max_total_time=60
 NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
 
 .PHONY: run test fuzz lint format clean
@@ -16,7 +16,7 @@ test: $(VENV)/dev
 # Inputs that reach something new stay in build/fuzz/corpus; one that breaks something is left beside it, by name.
 fuzz: build/fuzz/fuzz_overlap
 	@mkdir -p build/fuzz/corpus
-	@build/fuzz/fuzz_overlap -max_total_time=$(FUZZ_SECONDS) -timeout=20 -max_len=600 -len_control=0 -print_final_stats=1 \
+	@build/fuzz/fuzz_overlap $(FUZZ) -timeout=20 -max_len=600 -len_control=0 -print_final_stats=1 \
 	  -verbosity=0 -artifact_prefix=build/fuzz/ build/fuzz/corpus overlapper/native/fuzz/corpus
 
 build/fuzz/fuzz_overlap: $(NATIVE)

@@ -1,11 +1,10 @@
 """Convex shapes and the polytopes they share."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy
 import numpy.typing
 from numpy.typing import NDArray
-import overlapper
 
 
 class Sphere:
@@ -436,9 +435,9 @@ class Overlap:
 
     def __repr__(self) -> str: ...
 
-    def certificate(self) -> overlapper.claims.Certificate:
+    def certificate(self) -> Any:
         """
-        What proves the status, and bounds of the volume, to somebody who does not trust us.
+        What proves the status, and bounds of the volume, to somebody who does not trust us: an overlapper.claims.Certificate.
 
         `verify()` of it checks everything in rational arithmetic without the core, and returns (lower, upper) bounds of the common
         volume in m³. Raises CertificateError where there is none.

@@ -152,6 +152,9 @@ Intersection intersect_about(const Part& a, const Part& b, Vec3 origin) {
   std::vector<int> source;
   const auto hull = hull_of(vertices, &source);
   if (!hull) return {Status::kTouching, {}};
+  // So thin that rounding has put its centre outside: there is no solid to speak of.
+  for (const Plane& plane : hull->planes)
+    if (!(signed_distance(plane, hull->centroid) < 0)) return {Status::kTouching, {}};
   std::vector<std::vector<int>> planes_at;
   for (int s : source)
     planes_at.push_back(planes_through(dual, face_of[s], vertex_of_face, 64 * rounding(extent_of_vertices)));

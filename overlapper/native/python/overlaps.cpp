@@ -232,8 +232,8 @@ polytope contains the common set and could shrink into it by the fraction `toler
   cls.def(
       "certificate",
       [](nb::handle self) { return nb::module_::import_("overlapper.certificate").attr("certificate")(self); },
-      nb::sig("def certificate(self) -> overlapper.claims.Certificate"),
-      R"(What proves the status, and bounds of the volume, to somebody who does not trust us.
+      nb::sig("def certificate(self) -> typing.Any"),
+      R"(What proves the status, and bounds of the volume, to somebody who does not trust us: an overlapper.claims.Certificate.
 
 `verify()` of it checks everything in rational arithmetic without the core, and returns (lower, upper) bounds of the common
 volume in m³. Raises CertificateError where there is none.)");
