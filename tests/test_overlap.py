@@ -691,3 +691,19 @@ def test_thin_overlaps_are_right_to_twelve_digits(kind, power):
         assert answer.widened or power < 4
     else:
         assert answer.status == "separated"
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"tolerance": "fine"}, "tolerance must be a number"),
+        ({"tolerance": None}, "tolerance must be a number"),
+        ({"tolerance": float("nan")}, "tolerance must be greater than 0 and less than 1"),
+        ({"method": 3}, "method must be 'auto' or 'paper'"),
+        ({"method": "best"}, "method must be 'auto' or 'paper', not 'best'"),
+    ],
+)
+def test_settings_that_make_no_sense_are_named_in_one_sentence(settings, message):
+    with pytest.raises((TypeError, ValueError)) as refused:
+        overlap(Sphere(1), Sphere(1), **settings)
+    assert str(refused.value) == message

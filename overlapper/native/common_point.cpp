@@ -55,11 +55,8 @@ class Basis {
 
   /// Exchanges one plane for `entering` so that the weights stay non-negative. False if rounding leaves no choice.
   bool exchange(const OwnedPlane& entering) {
-    std::array<Row4, 4> transposed_rows;
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) transposed_rows[j][i] = row_of(planes_[i].plane)[j];
-    const Row4 weight = solve(transposed_rows, {0, 0, 0, 1});
-    const Row4 share = solve(transposed_rows, row_of(entering.plane));
+    const Row4 weight = combination_of({0, 0, 0, 1});
+    const Row4 share = combination_of(row_of(entering.plane));
     int leaving = -1;
     double least = kInfinity;
     for (int i = 0; i < 4; ++i) {
@@ -75,13 +72,13 @@ class Basis {
   /// An upper bound of the radius that holds whatever rounding did to the basis: a sum of the four inequalities with
   /// non-negative weights that add up to one, about `centre`, for balls whose centre is within `reach` of it.
   double certified_radius(Vec3 centre, double reach) const {
-    std::array<Row4, 4> transposed_rows;
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) transposed_rows[j][i] = row_of(planes_[i].plane)[j];
-    Row4 weight = solve(transposed_rows, {0, 0, 0, 1});
+    Row4 weight = combination_of({0, 0, 0, 1});
     double total = 0, bound = 0;
     Vec3 left_over;
-    for (double& w : weight) total += (w = std::max(0.0, w));
+    for (double& w : weight) {
+      w = std::max(0.0, w);
+      total += w;
+    }
     if (!(total > 0)) return kInfinity;
     for (int i = 0; i < 4; ++i) {
       bound -= weight[i] / total * signed_distance(planes_[i].plane, centre);
@@ -99,6 +96,14 @@ class Basis {
   }
 
  private:
+  /// The shares of the four planes' rows that add up to `row`.
+  Row4 combination_of(const Row4& row) const {
+    std::array<Row4, 4> transposed_rows;
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) transposed_rows[j][i] = row_of(planes_[i].plane)[j];
+    return solve(transposed_rows, row);
+  }
+
   std::array<OwnedPlane, 4> planes_;
 };
 

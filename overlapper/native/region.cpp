@@ -93,7 +93,7 @@ Region grow(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, 
         {owned.plane.normal, -signed_distance(owned.plane, region.frame.origin), rounding, owned.owner});
   }
   for (int f = 0; f < static_cast<int>(growth.hull.facets.size()); ++f)
-    if (!growth.hull.facets[f].removed()) region.inner.push_back(growth.inner.empty() ? 1 : growth.inner[f]);
+    if (!growth.hull.facets[f].removed()) region.inner.push_back(growth.inner[f]);
   return region;
 }
 
@@ -114,7 +114,6 @@ std::optional<Region> widened(std::span<const Placed> bodies, const Region& regi
   wide.reference = region.reference;
   wide.frame = region.frame;
   wide.polytope = polar_dual(hull);
-  wide.facets_touched = region.facets_touched + hull.inserted();
   double farthest = 0;
   for (Vec3 y : wide.polytope.vertices) farthest = std::max(farthest, norm(y));
   for (int p : wide.polytope.plane) {

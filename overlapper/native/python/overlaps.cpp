@@ -12,7 +12,9 @@ const char* status_name(Status status) {
   return status == Status::kSeparated ? "separated" : status == Status::kTouching ? "touching" : "overlapping";
 }
 
-Method to_method(const std::string& name) {
+Method to_method(nb::handle value) {
+  if (!nb::isinstance<nb::str>(value)) throw nb::type_error("method must be 'auto' or 'paper'");
+  const std::string name = nb::cast<std::string>(value);
   if (name == "auto") return Method::kAuto;
   if (name == "paper") return Method::kPaper;
   fail("method", "must be 'auto' or 'paper', not '" + name + "'");
@@ -248,7 +250,7 @@ volume in m³. Raises CertificateError where there is none.)");
       [](Overlap& self, nb::tuple state) {
         std::vector<Placed> bodies;
         for (nb::handle shape : nb::tuple(state[0])) bodies.push_back(nb::cast<Placed>(shape));
-        new (&self) Overlap(std::move(bodies), nb::cast<double>(state[1]), to_method(nb::cast<std::string>(state[2])));
+        new (&self) Overlap(std::move(bodies), nb::cast<double>(state[1]), to_method(state[2]));
       },
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
@@ -270,10 +272,10 @@ double union_ratio(nb::handle a, nb::handle b, double tolerance) {
 void define_functions(nb::module_& m) {
   m.def(
       "overlap",
-      [](nb::args shapes, double tolerance, const std::string& method) {
-        return make_overlap(to_bodies(shapes), tolerance, to_method(method));
+      [](nb::args shapes, nb::handle tolerance, nb::handle method) {
+        return make_overlap(to_bodies(shapes), to_double(tolerance, "tolerance"), to_method(method));
       },
-      "shapes"_a, "tolerance"_a = 1e-3, "method"_a = "auto",
+      "shapes"_a, "tolerance"_a.none() = 1e-3, "method"_a.none() = "auto",
       nb::sig("def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | "
               "numpy.typing.ArrayLike, "
               "tolerance: float = 0.001, method: typing.Literal['auto', 'paper'] = 'auto') -> Overlap"),
@@ -296,7 +298,7 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
         const auto [p, q] = relative_pair(a, b);
         return std::max(0.0, distance(p, q).distance);
       },
-      "a"_a, "b"_a,
+      "a"_a.none(), "b"_a.none(),
       nb::sig("def distance(a: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike, "
               "b: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float"),
       "Distance (m) of the nearest points of two shapes; 0 if they touch or overlap.");
@@ -306,15 +308,18 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
         const auto [p, q] = relative_pair(a, b);
         return std::max(0.0, penetration(p, q).depth);
       },
-      "a"_a, "b"_a,
+      "a"_a.none(), "b"_a.none(),
       nb::sig("def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | "
               "numpy.typing.ArrayLike, "
               "b: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float"),
       R"(Length (m) of the least translation that separates two shapes; 0 if they do not overlap. Positive where pybullet's contact
 distance is negative. Raises ValueError for two half-spaces.)");
   m.def(
-      "iou", [](nb::handle a, nb::handle b, double tolerance) { return union_ratio(a, b, tolerance); }, "a"_a, "b"_a,
-      "tolerance"_a = 1e-3,
+      "iou",
+      [](nb::handle a, nb::handle b, nb::handle tolerance) {
+        return union_ratio(a, b, to_double(tolerance, "tolerance"));
+      },
+      "a"_a.none(), "b"_a.none(), "tolerance"_a.none() = 1e-3,
       nb::sig("def iou(a: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike, "
               "b: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: "
               "float = 0.001) -> float"),
@@ -351,9 +356,10 @@ void overlap_for_a_while(const std::vector<Placed>& placed, const int* pairs, si
 }
 
 nb::list overlap_pairs(nb::list shapes, nb::handle positions, nb::handle orientations, nb::handle pairs,
-                       double tolerance, const std::string& method_name) {
+                       nb::handle tolerance_given, nb::handle method_name) {
   const std::vector<Placed> placed = place_all(shapes, positions, orientations);
   const Method method = to_method(method_name);
+  const double tolerance = to_double(tolerance_given, "tolerance");
   const auto index = nb::cast<nb::ndarray<const int, nb::c_contig, nb::device::cpu>>(
       nb::module_::import_("numpy").attr("ascontiguousarray")(pairs, "dtype"_a = "int32"));
   if (index.ndim() != 2 || index.shape(1) != 2) fail("pairs", "must have the shape (p, 2)");
@@ -387,8 +393,8 @@ void define_batch(nb::module_& m) {
               "orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]"),
       R"((p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
 two half-spaces are no pair.)");
-  m.def("overlap_pairs", &overlap_pairs, "shapes"_a, "positions"_a, "orientations"_a, "pairs"_a, "tolerance"_a = 1e-3,
-        "method"_a = "auto",
+  m.def("overlap_pairs", &overlap_pairs, "shapes"_a, "positions"_a, "orientations"_a, "pairs"_a,
+        "tolerance"_a.none() = 1e-3, "method"_a.none() = "auto",
         nb::sig("def overlap_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: "
                 "numpy.typing.ArrayLike, "
                 "orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike, tolerance: float = 0.001, "
