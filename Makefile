@@ -11,7 +11,7 @@ run: $(VENV)/all
 	@$(VENV)/bin/overlapper run $(SCENE) --out out/$(SCENE).csv --html out/$(SCENE).html
 
 test: $(VENV)/dev
-	@$(VENV)/bin/pytest
+	@$(VENV)/bin/pytest --numprocesses=auto
 
 # Inputs that reach something new stay in build/fuzz/corpus; one that breaks something is left beside it, by name.
 fuzz: build/fuzz/fuzz_overlap
