@@ -260,6 +260,25 @@ def test_depth_has_the_scale_of_the_pair(a, b):
         assert penetration_depth(scaled(a, size), scaled(b, size)) == pytest.approx(depth * size, rel=1e-9)
 
 
+@pytest.mark.parametrize("tilt", [0, 1e-16, 1e-12, 1e-8, 1e-3, 1])
+def test_boxes_have_the_depth_and_normal_of_the_hulls_of_their_corners(tilt):
+    """Fifteen axes hold the way out of a box; the hulls are searched facet by facet."""
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        a, b = Box(10 ** rng.uniform(-3, 0, 3)), Box(10 ** rng.uniform(-3, 0, 3))
+        position = rng.uniform(-0.9, 0.9, 3) * (a.half_extents + b.half_extents)
+        orientation = (*(tilt * rng.normal(size=3)), 1.0)
+        boxes = overlap(a, Placed(b, position, orientation))
+        hulls = overlap(placed_points(Placed(a)), Placed(Hull(placed_points(Placed(b))), position, orientation))
+        assert boxes.status == hulls.status
+        if not boxes:
+            continue
+        assert boxes.depth == pytest.approx(hulls.depth, rel=1e-12, abs=32 * EPS)
+        # Either normal is right where two ways out are equally long to rounding.
+        for body, other in ((boxes, hulls), (hulls, boxes)):
+            assert -gap(*body.shapes, other.normal) == pytest.approx(body.depth, rel=1e-12, abs=64 * EPS)
+
+
 @pytest.mark.parametrize("seed", range(40))
 def test_depth_of_equally_turned_boxes_is_the_exact_one(seed):
     rng = np.random.default_rng(seed)

@@ -3,6 +3,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "box_axes.h"
 #include "expanding_hull.h"
 #include "predicates.h"
 
@@ -290,9 +291,16 @@ Penetration penetration(const Placed& a, const Placed& b) {
     const Distance height = distance(a, b);
     return {-height.distance, height.normal};
   }
+  Penetration of_boxes;
+  const Box *box_a = std::get_if<Box>(&a.shape), *box_b = std::get_if<Box>(&b.shape);
+  if (box_a && box_b) {
+    of_boxes = box_penetration(*box_a, a.pose, *box_b, b.pose, 0);
+    if (of_boxes.depth > 0) return of_boxes;
+  }
   const double radius = core_radius(a.shape) + core_radius(b.shape);
   const Separation cores = separate_cores(a, b);
   if (!cores.origin_inside && cores.gap > 0) return {radius - cores.distance, cores.normal};
+  if (box_a && box_b) return of_boxes;
   Penetration result = DepthSearch(a, b).run();
   result.depth += radius;
   return result;
