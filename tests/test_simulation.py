@@ -13,7 +13,7 @@ import pybullet_data
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Sphere, distance, simulation
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, distance, extraction
 from overlapper.bullet_file import Leaf
 from overlapper.simulation import Bodies, SkippedShapeWarning
 
@@ -129,7 +129,7 @@ def bullet_distance(client, id, link, point):
 
 def our_distance(bodies, id, link, point):
     near = [placed for key, placed in zip(bodies.keys, bodies.placed) if key[:2] == (id, link)]
-    ball = simulation.Placed(Sphere(PROBE), point)
+    ball = Placed(Sphere(PROBE), point)
     return min(distance(placed, ball) for placed in near) + PROBE
 
 
@@ -398,7 +398,7 @@ def test_the_rest_of_a_link_with_a_flat_hull_is_modelled(client, tmp_path):
 def test_the_hull_of_unequal_spheres_is_not_taken_for_a_capsule():
     spheres = np.array([[0, 0, 0, 0.1], [0, 0, 1, 0.2]])
     leaf = Leaf("multisphere", np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), spheres)
-    assert simulation._modelled(0, (leaf,)) == ([], ["the hull of unequal spheres is not modelled"])
+    assert extraction._modelled(0, (leaf,)) == ([], ["the hull of unequal spheres is not modelled"])
 
 
 def test_links_without_an_id_are_counted_as_skipped(client):

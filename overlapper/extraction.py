@@ -1,0 +1,292 @@
+"""The collision shapes of a pybullet client, read once: convex shapes in the frames of their links.
+
+A temporary .bullet file has all of them; pybullet's own report adds the digits that single precision cuts off.
+"""
+
+from __future__ import annotations
+
+import colorsys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Shape, Sphere
+from overlapper.bullet_file import BulletFile, Leaf, SavedBody
+from overlapper.quaternion import composed, rotated
+
+Array = NDArray[np.float64]
+Color = tuple[float, float, float, float]
+
+BASE = -1
+MULTIBODY, SOFT_BODY = 2, 3  # of getDynamicsInfo; 1 is a rigid body in maximal coordinates
+REPORTED = {  # by getCollisionShapeData
+    pybullet.GEOM_MESH: "hull",
+    pybullet.GEOM_BOX: "box",
+    pybullet.GEOM_SPHERE: "sphere",
+    pybullet.GEOM_CAPSULE: "capsule",
+    pybullet.GEOM_CYLINDER: "cylinder",
+    pybullet.GEOM_PLANE: "plane",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Skipped:
+    """Shapes of one link (-1 is the base) that are not modelled; `body` is -1 if pybullet gives them no id."""
+
+    body: int
+    link: int
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A modelled shape, placed in the frame of its collider: the inertial frame of the base or link."""
+
+    link: int
+    index: int
+    shape: Shape
+    position: Array
+    orientation: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    name: str
+    link_names: dict[int, str]
+    colors: dict[int, Color]
+    fixed_links: frozenset[int]  # the base, and what only fixed joints tie to it
+    shape_count: int
+    parts: tuple[Part, ...]
+    skipped: tuple[Skipped, ...]
+
+
+def body_ids(client: int) -> set[int]:
+    return {pybullet.getBodyUniqueId(i, client) for i in range(pybullet.getNumBodies(client))}
+
+
+def _body_type(client: int, id: int) -> int:
+    return int(pybullet.getDynamicsInfo(id, BASE, client)[10])
+
+
+def saved_bodies(client: int, ids: Sequence[int]) -> tuple[BulletFile, dict[int, SavedBody]]:
+    """The scene as a .bullet file, and the body of the file for each of `ids` but the soft ones.
+
+    The file has no ids. Position and number of links identify a body unless another shares them; then each
+    has a friction of its own while the file is written.
+    """
+    ids = [id for id in ids if _body_type(client, id) != SOFT_BODY]
+    file = _save(client)
+    saved = {(body.links, *body.position.tolist()): body for body in file.bodies}
+    wanted = {
+        id: (pybullet.getNumJoints(id, client), *pybullet.getBasePositionAndOrientation(id, client)[0]) for id in ids
+    }
+    if len(saved) == len(file.bodies) and len(set(wanted.values())) == len(ids) and saved.keys() >= {*wanted.values()}:
+        return file, {id: saved[key] for id, key in wanted.items()}
+
+    taken = {body.friction for body in file.bodies}
+    frictions = dict(zip(ids, (float(value) for value in count(1) if value not in taken)))
+    with _frictions(client, frictions):
+        file = _save(client)
+    by_friction = {body.friction: body for body in file.bodies}
+    return file, {id: by_friction[friction] for id, friction in frictions.items() if friction in by_friction}
+
+
+def _save(client: int) -> BulletFile:
+    with tempfile.TemporaryDirectory(prefix="overlapper-") as folder:
+        path = Path(folder) / "scene.bullet"
+        try:
+            pybullet.saveBullet(str(path), physicsClientId=client)
+            return BulletFile(path)
+        except (pybullet.error, OSError) as error:
+            raise RuntimeError(
+                f"the physics server of physicsClientId {client} could not hand over its shapes in {path}: "
+                "it must run on this machine and be allowed to write there"
+            ) from error
+
+
+@contextmanager
+def _frictions(client: int, frictions: Mapping[int, float]) -> Iterator[None]:
+    before = {id: pybullet.getDynamicsInfo(id, BASE, client)[1] for id in frictions}
+    try:
+        for id, friction in frictions.items():
+            pybullet.changeDynamics(id, BASE, lateralFriction=friction, physicsClientId=client)
+        yield
+    finally:
+        for id, friction in before.items():
+            pybullet.changeDynamics(id, BASE, lateralFriction=friction, physicsClientId=client)
+
+
+def read_body(client: int, id: int, file: BulletFile, saved: SavedBody | None) -> Body:
+    base, name = (text.decode(errors="replace") for text in pybullet.getBodyInfo(id, client))
+    name = name or f"body {id}"
+    joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
+    link_names = {BASE: base or "base"} | {joint[0]: joint[12].decode(errors="replace") for joint in joints}
+    welds = {joint[0]: joint[16] for joint in joints if joint[2] == pybullet.JOINT_FIXED}
+    fixed_links = frozenset(link for link in link_names if _is_tied_to_base(link, welds))
+    leaves = _leaves(client, id, file, saved) if saved else {}
+    parts: list[Part] = []
+    skipped: list[Skipped] = []
+    for link, each in leaves.items():
+        modelled, reasons = _modelled(link, each)
+        parts += modelled
+        if reasons:
+            skipped.append(Skipped(id, link, f"{name}/{link_names[link]}", _summary(reasons, len(each))))
+    if not saved:
+        soft = _body_type(client, id) == SOFT_BODY
+        skipped.append(Skipped(id, BASE, name, "a soft body is not modelled" if soft else "saveBullet leaves it out"))
+    shape_count = sum(map(len, leaves.values())) if saved else 1
+    colors = _colors(client, id, link_names)
+    return Body(name, link_names, colors, fixed_links, shape_count, tuple(parts), tuple(skipped))
+
+
+def _is_tied_to_base(link: int, welds: Mapping[int, int]) -> bool:
+    """Whether only fixed joints, given as child and parent, are between a link and the base."""
+    while link in welds:
+        link = welds[link]
+    return link == BASE
+
+
+def _colors(client: int, id: int, links: Mapping[int, str]) -> dict[int, Color]:
+    seen: dict[int, Color] = {}
+    for visual in pybullet.getVisualShapeData(id, physicsClientId=client):
+        seen.setdefault(visual[1], visual[7])
+    # Hues a golden ratio apart stay distinct however many bodies there are.
+    own = (*colorsys.hsv_to_rgb(id * 0.618034 % 1, 0.5, 0.9), 1.0)
+    fallback = next(iter(seen.values()), own)
+    return {link: seen.get(link, fallback) for link in links}
+
+
+def _leaves(client: int, id: int, file: BulletFile, saved: SavedBody) -> dict[int, tuple[Leaf, ...]]:
+    leaves = {link: file.leaves(address) for link, address in sorted(saved.shapes.items())}
+    kinds = {leaf.kind for each in leaves.values() for leaf in each}
+    # getCollisionShapeData refuses maximal coordinates, and kills the process on a multi-sphere.
+    if _body_type(client, id) != MULTIBODY or "multisphere" in kinds:
+        return leaves
+    return {link: _in_double_precision(client, id, link, each) for link, each in leaves.items()}
+
+
+def _in_double_precision(client: int, id: int, link: int, leaves: tuple[Leaf, ...]) -> tuple[Leaf, ...]:
+    """The leaves of a link with the frames and dimensions that pybullet reports in full precision.
+
+    As they came if pybullet does not report all of them, or would print complaints.
+    """
+    if not leaves or any(leaf.kind not in REPORTED.values() for leaf in leaves):
+        return leaves
+    reported = _reported(client, id, link)
+    frames = [leaf for leaf in reported if leaf.kind == "hull"]
+    primitives = (leaf for leaf in reported if leaf.kind != "hull")
+    exact: list[Leaf] = []
+    for leaf in leaves:
+        if leaf.kind == "hull":
+            # A mesh file of many hulls is reported once.
+            frame = min(frames, key=lambda other: sum(_gaps(leaf, other)), default=leaf)
+            other = replace(frame, figures=leaf.figures)
+        else:
+            other = next(primitives, leaf)
+        exact.append(other if _alike(leaf, other) else leaf)
+    return tuple(exact)
+
+
+def _reported(client: int, id: int, link: int) -> list[Leaf]:
+    """What getCollisionShapeData lists, in the order of the file; hulls without their points."""
+    leaves = []
+    for _, _, number, size, _, position, orientation in pybullet.getCollisionShapeData(id, link, client):
+        kind, dimensions = REPORTED[number], np.array(size)
+        figures = {
+            "box": dimensions / 2,
+            "sphere": dimensions[:1],
+            "capsule": dimensions[1::-1],
+            "cylinder": dimensions[1::-1],
+            "plane": np.append(dimensions, 0.0),
+            "hull": np.empty(0),
+        }
+        leaves.append(Leaf(kind, np.array(position), np.array(orientation), figures[kind]))
+    return leaves
+
+
+def _alike(saved: Leaf, reported: Leaf) -> bool:
+    """Whether two leaves are the same but for single precision."""
+    if saved.kind != reported.kind or saved.figures.shape != reported.figures.shape:
+        return False
+    shift, turn = _gaps(saved, reported)
+    size = max(np.abs(reported.figures).max(), np.abs(reported.position).max())
+    change = np.abs(saved.figures - reported.figures).max()
+    # Single precision is 6e-8; a few nested frames add up.
+    return bool(max(shift, change) <= 1e-5 * size and turn <= 1e-5)
+
+
+def _gaps(a: Leaf, b: Leaf) -> tuple[float, float]:
+    """How far apart the frames of two leaves are, in metres and as quaternions."""
+    shift = np.abs(a.position - b.position).max()
+    turn = min(np.abs(a.orientation - b.orientation).max(), np.abs(a.orientation + b.orientation).max())
+    return float(shift), float(turn)
+
+
+def _modelled(link: int, leaves: tuple[Leaf, ...]) -> tuple[list[Part], list[str]]:
+    """The leaves of a link as shapes, and a reason for each that has none."""
+    parts: list[Part] = []
+    reasons: list[str] = []
+    for index, saved in enumerate(leaves):
+        leaf = _capsule(saved) if saved.kind == "multisphere" else saved
+        try:
+            shape = _shape(leaf.kind, leaf.figures.tobytes())
+        except ValueError as error:
+            reasons.append(str(error))
+        else:
+            parts.append(Part(link, index, shape, leaf.position, leaf.orientation))
+    return parts, reasons
+
+
+def _capsule(leaf: Leaf) -> Leaf:
+    """The capsule that a multi-sphere of two equal spheres is; any other multi-sphere as it came."""
+    centres, radii = leaf.figures[:, :3], leaf.figures[:, 3]
+    if len(radii) != 2 or radii[0] != radii[1]:
+        return leaf
+    axis = centres[1] - centres[0]
+    length = float(np.linalg.norm(axis))
+    if axis[2] < 0:
+        axis = -axis
+    # The shortest turn of z into the axis is (z × axis, length + z·axis).
+    turn = np.array([-axis[1], axis[0], 0.0, length + axis[2]]) if length else np.array([0.0, 0.0, 0.0, 1.0])
+    position = leaf.position + rotated(leaf.orientation, centres.mean(axis=0))
+    orientation = composed(leaf.orientation, turn / np.linalg.norm(turn))
+    return Leaf("capsule", position, orientation, np.array([radii[0], length]))
+
+
+@lru_cache(maxsize=1024)
+def _shape(kind: str, data: bytes) -> Shape:
+    """The shape with these figures of a leaf; equal ones are one object. ValueError says why there is none."""
+    figures = np.frombuffer(data)
+    match kind:
+        case "box":
+            return Box(figures)
+        case "sphere":
+            return Sphere(*figures)
+        case "capsule":
+            return Capsule(*figures)
+        case "cylinder":
+            return Cylinder(*figures)
+        case "plane":
+            return HalfSpace(figures[:3], figures[3])
+        case "hull":
+            return Hull(figures.reshape(-1, 3))
+        case "multisphere":
+            raise ValueError("the hull of unequal spheres is not modelled")
+        case _:
+            raise ValueError(f"a {kind} is not modelled")
+
+
+def _summary(reasons: Sequence[str], shapes: int) -> str:
+    if shapes == 1:
+        return reasons[0]
+    return "; ".join(f"{number} of {shapes} shapes: {reason}" for reason, number in Counter(reasons).items())

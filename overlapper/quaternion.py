@@ -1,0 +1,22 @@
+"""Unit quaternions (x, y, z, w), many at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def rotated(quaternions: Array, vectors: Array) -> Array:
+    """Vectors (..., 3) turned by unit quaternions (..., 4) xyzw."""
+    axis, w = quaternions[..., :3], quaternions[..., 3:]
+    twice = 2 * np.cross(axis, vectors)
+    return np.asarray(vectors + w * twice + np.cross(axis, twice))
+
+
+def composed(first: Array, second: Array) -> Array:
+    """The products first * second of quaternions (..., 4) xyzw: turn by the second, then by the first."""
+    a, b, v, w = first[..., :3], second[..., :3], first[..., 3:], second[..., 3:]
+    vector = v * b + w * a + np.cross(a, b)
+    return np.concatenate([vector, v * w - (a * b).sum(axis=-1, keepdims=True)], axis=-1)
