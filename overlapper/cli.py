@@ -25,7 +25,8 @@ except ImportError:
 
 from overlapper import __version__
 from overlapper.scene import SceneError, headline, load_scene, scene_paths
-from overlapper.table import TABLES, rows
+from overlapper.table import rows
+from overlapper.table_file import TABLES, origin
 
 if TYPE_CHECKING:
     from overlapper.regression import Frame
@@ -92,7 +93,7 @@ def run(
     steps: Annotated[
         int | None, typer.Option(min=1, help="Steps to simulate; by default as many as the scene says.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Table of all pairs in all steps, .csv or .parquet.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Table of all pairs in all steps: .csv, .parquet, .sqlite.")] = None,
     html: Annotated[Path | None, typer.Option(help="Recording to look at in a browser, one file.")] = None,
     check: Annotated[
         Literal["fcl"] | None, typer.Option(help="Ask FCL about every pair, too, and explain what differs.")
@@ -121,7 +122,7 @@ def run(
     if not 0 < tolerance < 1:
         raise Refused(f"--tolerance must lie between 0 and 1, not {tolerance}")
     if out and out.suffix not in TABLES:
-        raise Refused(f"--out must end in {' or '.join(TABLES)}, not {out.name!r}")
+        raise Refused(f"--out must end in {', '.join(TABLES)}, not {out.name!r}")
     summary, finished = _measure(scene, steps, out, html, check is not None, method, tolerance)
     files = {name: str(path) for name, path in (("out", out), ("html", html)) if path}
     if as_json:
@@ -170,7 +171,13 @@ def _measure(
         fcl = stack.enter_context(Fcl()) if check else None
         for path in filter(None, (out, html)):
             path.parent.mkdir(parents=True, exist_ok=True)
-        table = stack.enter_context(closing(TABLES[out.suffix](out))) if out else None
+        settings = {
+            "scene": scene.name,
+            "steps": str(steps or scene.steps),
+            "tolerance": repr(tolerance),
+            "method": method,
+        }
+        table = stack.enter_context(closing(TABLES[out.suffix](out, origin() | settings))) if out else None
         record = stack.enter_context(_recorder(html)) if html else None
         frames = stack.enter_context(closing(frames_of(scene, steps, tolerance, method)))
         summary = Summary(scene.name)

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from overlapper import Shape, _core
 from overlapper.scene import Scene, SceneError, Step, broken, load_scene
 from overlapper.simulation import Bodies, Contact
-from overlapper.table import COLUMNS, POSE, CsvTable, Row, Value, key, placements, read_csv, rows
+from overlapper.table import COLUMNS, POSE, Row, Value, key, placements, rows
+from overlapper.table_file import CsvTable, read_csv
 
 try:
     import pybullet
@@ -148,22 +149,24 @@ class Expected:
     budgets: dict[str, Budget]
     rows: list[Row] = field(default_factory=list)
 
-    def heading(self) -> str:
+    def heading(self) -> dict[str, str]:
         """The first lines of the file, which are written by hand where the defaults do not do."""
-        lines = [" ".join(map(str, ["steps", *self.steps])), f"tolerance {self.tolerance!r}"]
-        lines += [
-            f"budget {name}: relative {each.relative!r} absolute {each.absolute!r}"
-            for name, each in self.budgets.items()
-        ]
-        return "".join(f"# {line}\n" for line in lines)
+        return {
+            "steps": " ".join(map(str, self.steps)),
+            "tolerance": repr(self.tolerance),
+            **{
+                f"budget {name}": f"relative {each.relative!r} absolute {each.absolute!r}"
+                for name, each in self.budgets.items()
+            },
+        }
 
 
 def read_expected(path: Path) -> Expected:
     """An expected file. FileNotFoundError if there is none."""
     heading = "".join(line for line in path.read_text(encoding="utf-8").splitlines(True) if line.startswith("#"))
     number = r"([-+.e\d]+)"
-    steps = re.search(r"steps ([\d ]+)", heading)
-    tolerance = re.search(rf"tolerance {number}", heading)
+    steps = re.search(r"steps:? ([\d ]+)", heading)
+    tolerance = re.search(rf"tolerance:? {number}", heading)
     if steps is None or tolerance is None:
         raise ValueError(f"{path} must say `# steps <numbers>` and `# tolerance <number>` in its first lines")
     budgets = re.findall(rf"budget (\w+): relative {number} absolute {number}", heading)
@@ -182,7 +185,7 @@ def record(scene: Scene) -> None:
     except FileNotFoundError:
         old = Expected([scene.steps * quarter // 4 for quarter in (1, 2, 3, 4)], 1e-3, ROUNDING)
     scene.expected.parent.mkdir(exist_ok=True)
-    table = CsvTable(scene.expected, EXPECTED_COLUMNS, old.heading())
+    table = CsvTable(scene.expected, old.heading(), EXPECTED_COLUMNS)
     try:
         for frame in run(scene, only=old.steps):
             bodies = frame.bodies

@@ -1,11 +1,9 @@
-"""A run as a table: one row per step and pair that overlaps or touches, written while the run goes on."""
+"""A run as a table: one row per step and pair that overlaps or touches."""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,70 +103,3 @@ def rows(
             }
         )
     return table
-
-
-class Table(Protocol):
-    """A file that grows by the rows of a step at a time and can be read after `close`, however the run ended."""
-
-    def write(self, rows: Iterable[Row]) -> None: ...
-    def close(self) -> None: ...
-
-
-class CsvTable:
-    """Comma-separated values; what a step wrote is on disk before the next begins."""
-
-    def __init__(self, path: Path, columns: Sequence[str] = tuple(COLUMNS), heading: str = "") -> None:
-        self._file = path.open("w", newline="", encoding="utf-8")
-        self._file.write(heading)
-        self._writer = csv.DictWriter(self._file, columns, extrasaction="ignore", lineterminator="\n")
-        self._writer.writeheader()
-        self._file.flush()
-
-    def write(self, rows: Iterable[Row]) -> None:
-        self._writer.writerows(rows)
-        self._file.flush()
-
-    def close(self) -> None:
-        self._file.close()
-
-
-class ParquetTable:
-    """Parquet by pyarrow; the footer that makes it readable is written by `close`."""
-
-    GROUP = 20_000  # rows; a row group of a few megabytes, as Parquet's readers expect
-
-    def __init__(self, path: Path) -> None:
-        try:
-            import pyarrow
-            import pyarrow.parquet
-        except ImportError as error:
-            raise ImportError("a .parquet table needs pyarrow: pip install 'overlapper[cli]'") from error
-        kinds = {int: pyarrow.int32(), float: pyarrow.float64(), str: pyarrow.string()}
-        self._schema = pyarrow.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()])
-        self._table: Any = pyarrow.Table
-        self._writer = pyarrow.parquet.ParquetWriter(path, self._schema)
-        self._waiting: list[Row] = []
-
-    def write(self, rows: Iterable[Row]) -> None:
-        self._waiting += rows
-        if len(self._waiting) >= self.GROUP:
-            self._flush()
-
-    def _flush(self) -> None:
-        self._writer.write_table(self._table.from_pylist(self._waiting, schema=self._schema))
-        self._waiting = []
-
-    def close(self) -> None:
-        self._flush()
-        self._writer.close()
-
-
-# The kinds of table, by the ending of the file's name.
-TABLES: dict[str, Callable[[Path], Table]] = {".csv": CsvTable, ".parquet": ParquetTable}
-
-
-def read_csv(path: Path) -> list[Row]:
-    """The rows of a CSV table; lines that begin with # are skipped, empty cells are None."""
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(line for line in file if not line.startswith("#"))
-        return [{name: COLUMNS[name](cell) if cell else None for name, cell in row.items()} for row in reader]

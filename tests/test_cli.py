@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from overlapper.table import read_csv
+from overlapper.table_file import read_csv, read_table
 
 TWO_CUBES = '''
 """A cube rests 2 cm deep in another."""
@@ -171,7 +171,7 @@ def test_a_broken_scene_is_refused_with_what_pybullet_said_of_it(tmp_path):
         (["--check", "gut"], "'fcl'"),
         (["--tolerance", "0"], "--tolerance must lie between 0 and 1, not 0.0"),
         (["--tolerance", "nan"], "--tolerance must lie between 0 and 1, not nan"),
-        (["--out", "two.txt"], "--out must end in .csv or .parquet, not 'two.txt'"),
+        (["--out", "two.txt"], "--out must end in .csv, .parquet, .sqlite, not 'two.txt'"),
         (["--out", "two_cubes.py/two.csv"], "cannot write two_cubes.py"),
         (["--html", "."], "cannot write ."),
         (["--colour"], "--colour"),
@@ -211,16 +211,16 @@ main()
     assert f"pip install 'overlapper[{extra}]'\n" in done.stderr
 
 
-@pytest.mark.parametrize("ending", ["csv", "parquet"])
+@pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
 def test_rows_before_a_failure_are_on_disk(tmp_path, ending):
     (tmp_path / "fails.py").write_text(FAILS_LATE)
     sentence = refusal("run", "fails.py", "--out", f"fails.{ending}", "--html", "fails.html")
     assert "fails before step 6 at line 16: AssertionError: no more" in sentence
-    assert steps_in(tmp_path / f"fails.{ending}") == [1, 2, 3, 4, 5]
+    assert [row["step"] for row in read_table(tmp_path / f"fails.{ending}")] == [1, 2, 3, 4, 5]
     assert (tmp_path / "fails.html").stat().st_size > 0
 
 
-@pytest.mark.parametrize("ending", ["csv", "parquet"])
+@pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
 def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
     (tmp_path / "long.py").write_text(TWO_CUBES.replace("STEPS = 8", "STEPS = 1_000_000"))
     command = [sys.executable, "-m", "overlapper", "run", "long.py", "--out", f"long.{ending}"]
@@ -231,19 +231,11 @@ def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
         process.send_signal(signal.SIGINT)
         output, _ = process.communicate(timeout=30)
     assert process.returncode == 130
-    steps = steps_in(tmp_path / f"long.{ending}")
+    steps = [row["step"] for row in read_table(tmp_path / f"long.{ending}")]
     assert steps == list(range(1, len(steps) + 1))
     said = re.search(r"Interrupted after step (\d+)", output)
     assert said is not None
     assert len(steps) - int(said[1]) in (0, 1)
-
-
-def steps_in(path):
-    if path.suffix == ".csv":
-        return [row["step"] for row in read_csv(path)]
-    import pyarrow.parquet
-
-    return pyarrow.parquet.read_table(path)["step"].to_pylist()
 
 
 def test_a_bar_is_drawn_on_a_terminal_only(tmp_path):

@@ -16,7 +16,7 @@ from overlapper.regression import (
     replay,
     run,
 )
-from overlapper.table import COLUMNS, TABLES, read_csv, rows
+from overlapper.table import COLUMNS
 
 TWO_CUBES = '''
 """Two unit cubes, the second of which slides over the first by a centimetre a step."""
@@ -201,29 +201,3 @@ def test_certified_errors_ten_times_smaller_are_reported():
     assert loose([pair()], [pair(volume_error_m3=1e-14)]) == [
         "the certified errors of the volumes are 0.01 of those recorded"
     ]
-
-
-@pytest.mark.parametrize("ending", [".csv", ".parquet"])
-def test_a_table_reads_back_as_it_was_written(scene_file, tmp_path, ending):
-    path = tmp_path / f"run{ending}"
-    table = TABLES[ending](path)
-    written = []
-    for frame in run(load_scene(scene_file)):
-        step = rows(frame.step, frame.time, frame.bodies, frame.contacts)
-        table.write(step)
-        written += step
-    table.close()
-    if ending == ".csv":
-        assert read_csv(path) == written
-    else:
-        parquet = pytest.importorskip("pyarrow.parquet")
-        assert parquet.read_table(path).to_pylist() == written
-
-
-def test_a_csv_has_every_step_on_disk_before_the_next(scene_file, tmp_path):
-    path = tmp_path / "run.csv"
-    table = TABLES[".csv"](path)
-    for frame in run(load_scene(scene_file)):
-        table.write(rows(frame.step, frame.time, frame.bodies, frame.contacts))
-        assert read_csv(path)[-1]["step"] == frame.step
-    table.close()
