@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "canonical_order.h"
 #include "expanding_hull.h"
 #include "minkowski.h"
 #include "paper.h"
@@ -83,13 +84,14 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
   if (bodies_.size() < 2) throw std::invalid_argument("shapes must be two or more");
   if (!(tolerance > 0 && tolerance < 1))
     throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
-  reference_ = bodies_[0].pose.translation;
-  for (const Placed& body : bodies_) relative_.push_back(body.seen_from(reference_));
+  order_ = canonical_order(bodies_);
+  reference_ = bodies_[order_[0]].pose.translation;
+  for (int body : order_) relative_.push_back(bodies_[body].seen_from(reference_));
   if (method == Method::kPaper) {
     PaperResult result = intersect_as_in_paper(relative_, tolerance);
     status_ = result.status;
     if (result.region) {
-      lazy_->region = std::move(result.region);
+      lazy_->region = owned_as_given(std::move(*result.region));
       lazy_->region->reference = reference_;
     }
     return;
@@ -97,7 +99,7 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
 
   for (const Placed& body : relative_) reach_.push_back(magnitude(body));
   std::vector<OwnedPlane> hints;
-  if (pair() && (bounded(bodies_[0].shape) || bounded(bodies_[1].shape))) {
+  if (pair() && (bounded(relative_[0].shape) || bounded(relative_[1].shape))) {
     const Distance d = overlapper::distance(relative_[0], relative_[1]);
     if (d.gap > rounding(std::max(reach_[0], reach_[1]))) return;
     hints = facing_planes(relative_, d);
@@ -144,12 +146,17 @@ double Overlap::touching_volume() const {
   return least;
 }
 
+Region Overlap::owned_as_given(Region region) const {
+  for (Region::Facet& facet : region.facets) facet.owner = order_[facet.owner];
+  return region;
+}
+
 const Region& Overlap::region() const {
   assert(status_ == Status::kOverlapping);
   const std::scoped_lock lock(lazy_->mutex);
   if (!lazy_->region) {
-    lazy_->region = grow(relative_, lazy_->planes, ball_, tolerance_,
-                         rounding(*std::max_element(reach_.begin(), reach_.end())), reference_);
+    lazy_->region = owned_as_given(grow(relative_, lazy_->planes, ball_, tolerance_,
+                                        rounding(*std::max_element(reach_.begin(), reach_.end())), reference_));
     lazy_->planes.clear();
   }
   return *lazy_->region;
@@ -162,8 +169,8 @@ const Quantities& Overlap::quantities() const {
     lazy_->quantities = measure(r);
     const bool enough = lazy_->quantities->volume_error <= kEnough * lazy_->quantities->volume;
     if (!enough && method_ == Method::kAuto && std::none_of(bodies_.begin(), bodies_.end(), smooth_body)) {
-      if (const auto wide = widened(bodies_, r)) {
-        lazy_->quantities = measure(*wide);
+      if (auto wide = widened(relative_, r)) {
+        lazy_->quantities = measure(owned_as_given(std::move(*wide)));
         lazy_->quantities->widened = true;
       } else {
         // The point about which the region was grown is not inside after all: all that is sure is how much could be.
@@ -216,6 +223,11 @@ const Overlap::Contact& Overlap::contact() const {
     const double level_b = dot(contact.normal, bounded(b.shape) ? b.support(contact.normal) : d.witness_b);
     const double level = level_a / 2 + level_b / 2;
     contact.separating = {contact.normal, level + dot(contact.normal, reference_)};
+  }
+  if (order_[0] == 1) {
+    contact.normal = Vec3{} - contact.normal;  // and not -normal, which would make negative zeros
+    contact.separating = {contact.normal, -contact.separating.offset};
+    std::swap(contact.witness_a, contact.witness_b);
   }
   lazy_->contact = contact;
   return *lazy_->contact;

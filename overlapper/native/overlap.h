@@ -57,12 +57,15 @@ class Overlap {
 
  private:
   double touching_volume() const;
+  Region owned_as_given(Region region) const;
 
-  std::vector<Placed> bodies_, relative_;
+  std::vector<Placed> bodies_;
+  std::vector<int> order_;        ///< in which the bodies are computed with
+  std::vector<Placed> relative_;  ///< in that order, about the reference
   double tolerance_;
   Method method_;
   Vec3 reference_;
-  std::vector<double> reach_;  ///< per body: how large the numbers are that describe it
+  std::vector<double> reach_;  ///< per relative body: how large the numbers are that describe it
   Status status_ = Status::kSeparated;
   DeepestBall ball_;
 

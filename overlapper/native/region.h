@@ -40,7 +40,7 @@ Region grow(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, 
 
 /// The region of polytopes and half-spaces once more in the same frame, from dual points that are right to the last
 /// bit: planes, poses and the distance from the origin are taken in double-double, and unmerged facets from their
-/// corners as given. `bodies` are those in the world. Nothing if the frame's origin turns out not to be inside.
+/// corners as given, whatever `bodies` are relative to. Nothing if the frame's origin turns out not to be inside.
 std::optional<Region> widened(std::span<const Placed> bodies, const Region& region);
 
 /// What is computed from the region, all in world coordinates.

@@ -1,6 +1,7 @@
 #include <chrono>
 
 #include "candidates.h"
+#include "canonical_order.h"
 #include "minkowski.h"
 #include "overlap.h"
 #include "python/arrays.h"
@@ -255,10 +256,12 @@ volume in m³. Raises CertificateError where there is none.)");
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
+/// In the order and from the reference of an Overlap, so that both say the same to the last bit.
 std::pair<Placed, Placed> relative_pair(nb::handle a, nb::handle b) {
-  const Placed placed_a = to_placed(a, "a"), placed_b = to_placed(b, "b");
-  const Vec3 reference = placed_a.pose.translation;
-  return {placed_a.seen_from(reference), placed_b.seen_from(reference)};
+  const std::array<Placed, 2> pair{to_placed(a, "a"), to_placed(b, "b")};
+  const std::vector<int> order = canonical_order(pair);
+  const Placed &first = pair[order[0]], &second = pair[order[1]];
+  return {first.seen_from(first.pose.translation), second.seen_from(first.pose.translation)};
 }
 
 double union_ratio(nb::handle a, nb::handle b, double tolerance) {

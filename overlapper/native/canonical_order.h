@@ -1,0 +1,14 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "shape.h"
+
+namespace overlapper {
+
+/// The numbers of the bodies in an order that depends on their shapes and poses alone: whoever computes in it gives the
+/// same bits however the caller orders them. Scaling everything by a power of two keeps it.
+std::vector<int> canonical_order(std::span<const Placed> bodies);
+
+}  // namespace overlapper
