@@ -102,18 +102,16 @@ class Polytope:
 
     @cached_property
     def volume(self) -> Fraction:
-        return sum((six for six, _ in self.tetrahedra), Fraction(0)) / 6
+        return total(six for six, _ in self.tetrahedra) / 6
 
     @cached_property
     def centroid(self) -> Vector:
         """Of a solid; the point itself of a point."""
         if self.dimension == 0:
             return coordinates(self.vertices[0])
-        moment = [Fraction(0)] * 3
-        for six, edges in self.tetrahedra:
-            for i in range(3):
-                moment[i] += six * (edges[0][i] + edges[1][i] + edges[2][i])
         origin = coordinates(self.vertices[0])
+        parts = list(self.tetrahedra)
+        moment = [total(six * (p[i] + q[i] + r[i]) for six, (p, q, r) in parts) for i in range(3)]
         x, y, z = (origin[i] + moment[i] / (24 * self.volume) for i in range(3))
         return x, y, z
 
@@ -152,6 +150,15 @@ class Polytope:
 def vector(xyz: Iterable[float | Fraction]) -> Vector:
     x, y, z = (Fraction(c) if isinstance(c, (int, Fraction)) else Fraction(float(c)) for c in xyz)
     return x, y, z
+
+
+def total(terms: Iterable[Fraction]) -> Fraction:
+    """Their sum. Added in pairs, pairs of pairs and so on: the denominators, whose common multiple grows with every
+    addition, stay short for all but the last few."""
+    row = list(terms) or [Fraction(0)]
+    while len(row) > 1:
+        row = [u + v for u, v in zip(row[::2], row[1::2])] + row[len(row) & ~1 :]
+    return row[0]
 
 
 def add(u: Vector, v: Vector) -> Vector:

@@ -229,3 +229,20 @@ def test_depth_is_the_least_extent_over_all_directions():
         u /= np.linalg.norm(u, axis=1, keepdims=True)
         p, q = (np.array([[float(c) for c in exact.coordinates(v)] for v in body.vertices]) for body in (a, b))
         assert np.all(depth <= (q @ u.T).max(0) - (p @ u.T).min(0) + 1e-12)
+
+
+def test_volume_by_facets_is_that_by_tetrahedra():
+    """A solid is made of pyramids, too: one over each facet, with the tip in the origin."""
+    for a, b in zip(random_hulls(51, 10), random_hulls(52, 10), strict=True):
+        for body in (a, exact.common(a, b)):
+            pyramids = [
+                exact.dot(exact.coordinates(facet.ring[0]), exact.area_vector(facet)) / 3 for facet in body.facets
+            ]
+            assert body.volume == sum(pyramids)
+
+
+def test_a_sum_is_the_same_in_whatever_order_it_is_taken():
+    rng = np.random.default_rng(9)
+    for count in (0, 1, 2, 3, 7, 64, 65):
+        terms = [Fraction(int(n), int(d)) for n, d in rng.integers(1, 1000, (count, 2))]
+        assert exact.total(terms) == sum(terms, Fraction(0)) == exact.total(terms[::-1])
