@@ -13,19 +13,13 @@ from __future__ import annotations
 import argparse
 import csv
 import inspect
-import multiprocessing
-import os
-import resource
-import signal
 import sys
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from importlib.metadata import version
 from math import isfinite, isqrt
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +33,7 @@ try:
     import numpy as np
     from paper_steps import lost_at, lost_given_a_point, volume_without_exact_signs
     from peers import PEERS
+    from watched import Watched
 
     from overlapper import Placed
 except ImportError as error:
@@ -53,8 +48,7 @@ ACCURACY = 1e-6
 # Fraction of the smaller body's size within which bodies may as well be said to overlap as not to.
 MARGIN = Fraction(1, 10**12)
 
-START_LIMIT = 120.0  # s, for a peer to be imported and to answer the first question on a busy machine
-TIME_LIMIT = 10.0  # s, for every other question
+TIME_LIMIT = 10.0  # s, for a question
 
 # Vertices of one body, so that the exact truth stays a matter of seconds.
 LARGEST = 170
@@ -62,6 +56,9 @@ LARGEST = 170
 # Families whose parameter runs over many decades get more cases, so that each decade has some.
 DECADES = ("slivers", "tilted_slivers", "nearly_touching", "needles_and_plates", "far_away", "scaled")
 SHARE = dict.fromkeys(DECADES, 3)
+
+# A question without difficulty, asked before time counts.
+FIRST = (families.CORNERS, families.CORNERS + 1.0)
 
 # What stands in the table for a peer that was not asked, and for a right yes or no.
 NOT_ASKED, RIGHT = "-", "ok"
@@ -130,89 +127,9 @@ def families_of_vertices(name: str) -> bool:
     return not any(isinstance(body, (families.Below, Placed)) for body in families.make(name, 0).bodies)
 
 
-# A peer in a process of its own
-
-
-class Ended(Exception):
-    """The peer says no more; the text tells how it ended."""
-
-
-class Peer:
-    """A context manager: asks one function of PEERS, in a process that is started again whenever it ends."""
-
-    def __init__(self, answer: Callable[..., float | bool], time_limit: float = TIME_LIMIT) -> None:
-        self.answer, self.time_limit = answer, time_limit
-        self.process: Any = None
-
-    def __enter__(self) -> Peer:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def takes(self, count: int) -> bool:
-        parameters = inspect.signature(self.answer).parameters.values()
-        return count == len(parameters) or any(p.kind is p.VAR_POSITIONAL for p in parameters)
-
-    def ask(self, bodies: tuple[np.ndarray, ...]) -> float | bool | str:
-        """Its answer, or how it failed in a few words. ImportError if its package is missing."""
-        try:
-            if self.process is None:
-                self.start()
-            self.pipe.send(bodies)
-            reply = self.receive(self.time_limit)
-        except Ended as ended:
-            self.close()
-            return str(ended)
-        return reply
-
-    def start(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.pipe, other = context.Pipe()
-        self.process = context.Process(target=serve, args=(other, self.answer), daemon=True)
-        self.process.start()
-        other.close()
-        self.pipe.send((families.CORNERS, families.CORNERS + 1.0))
-        first = self.receive(START_LIMIT)
-        if isinstance(first, ImportError):
-            raise first
-
-    def receive(self, limit: float) -> Any:
-        try:
-            if not self.pipe.poll(limit):
-                raise Ended("hang")
-            return self.pipe.recv()
-        except (EOFError, ConnectionResetError):
-            self.process.join()
-            code = self.process.exitcode
-            raise Ended(f"crash {signal.Signals(-code).name if code < 0 else code}") from None
-
-    def close(self) -> None:
-        if self.process is not None:
-            self.process.kill()
-            self.process.join()
-            self.pipe.close()
-            self.process = None
-
-
-def serve(pipe: Connection, answer: Callable[..., float | bool]) -> None:
-    """The peer's process: bodies in, an answer or the name of an exception out."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    os.dup2(nowhere, 2)
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    warnings.simplefilter("ignore")
-    while True:
-        try:
-            bodies = pipe.recv()
-        except EOFError:
-            return
-        try:
-            pipe.send(answer(*bodies))
-        except ImportError as error:
-            pipe.send(error)
-        except Exception as error:
-            pipe.send(f"raises {type(error).__name__}")
+def takes(answer: Callable[..., float | bool], count: int) -> bool:
+    parameters = inspect.signature(answer).parameters.values()
+    return count == len(parameters) or any(p.kind is p.VAR_POSITIONAL for p in parameters)
 
 
 # What an answer is worth
@@ -258,11 +175,11 @@ def run(seed: int, count: int, path: Path) -> None:
     missing = []
     for name, answer in PEERS.items():
         column = []
-        with Peer(answer) as peer:
+        with Watched(answer, TIME_LIMIT, FIRST) as peer:
             try:
                 for question in tracked(asked, name):
-                    takes = peer.takes(len(question.bodies))
-                    column.append(verdict(question, peer.ask(question.bodies)) if takes else NOT_ASKED)
+                    fits = takes(answer, len(question.bodies))
+                    column.append(verdict(question, peer.ask(*question.bodies)) if fits else NOT_ASKED)
             except ImportError as error:
                 missing.append(f"{name} ({error.name} is not installed)")
                 column = [NOT_ASKED] * len(asked)

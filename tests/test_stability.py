@@ -21,6 +21,7 @@ import paper_steps  # noqa: E402
 import stability  # noqa: E402
 import stability_page  # noqa: E402
 from peers import clipping, paper, scipy_halfspaces  # noqa: E402
+from watched import Watched  # noqa: E402
 
 CUBE = families.CORNERS
 
@@ -96,15 +97,16 @@ def test_yes_and_no_are_judged_beyond_a_margin_of_the_size(depth, clear):
 
 def test_a_crash_and_a_hang_are_answers_and_the_next_case_is_asked_again():
     for answer, end in ((aborts_when_apart, "crash SIGABRT"), (hangs_when_apart, "hang")):
-        with stability.Peer(answer, time_limit=2.0) as peer:
-            assert [peer.ask(asked.bodies) for asked in (DEEP, APART, TOUCHING)] == [True, end, True]
+        with Watched(answer, 2.0, stability.FIRST) as peer:
+            assert [peer.ask(*asked.bodies) for asked in (DEEP, APART, TOUCHING)] == [True, end, True]
 
 
 def test_an_exception_is_an_answer_and_a_missing_package_is_not():
-    with stability.Peer(raises) as peer:
-        assert peer.ask(DEEP.bodies) == "raises ZeroDivisionError"
-    with stability.Peer(is_not_installed) as peer, pytest.raises(ImportError, match="a_package_that_nobody_has"):
-        peer.ask(DEEP.bodies)
+    with Watched(raises, 2.0, stability.FIRST) as peer:
+        assert peer.ask(*DEEP.bodies) == "raises ZeroDivisionError"
+    missing = pytest.raises(ImportError, match="a_package_that_nobody_has")
+    with Watched(is_not_installed, 2.0, stability.FIRST) as peer, missing:
+        peer.ask(*DEEP.bodies)
 
 
 def test_clipping_and_halfspaces_find_the_volume_of_hulls_in_general_position():
