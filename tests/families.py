@@ -61,6 +61,7 @@ class Case:
     parameter: float
     bodies: tuple[np.ndarray | Below | Posed | PosedBox | Placed, ...]
     closed_form: float | None = None  # the volume, of cases with round bodies
+    moved: np.ndarray | None = None  # the vertices of the last body a moment later, in sequences
     family: str = ""
     seed: int = 0
 

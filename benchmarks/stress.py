@@ -1,0 +1,226 @@
+"""The rules of tests/rules.py on as many hard cases as wanted, and memory over a million of them.
+
+    python benchmarks/stress.py --count 20000                   the families in turn, from seed 0 on
+    python benchmarks/stress.py --first 500 --family slivers    other seeds, one family
+    python benchmarks/stress.py --soak 1000000                  only asked for everything, memory watched
+
+Cases are judged in processes that are watched, so that a crash or a hang of the core is a result. Rows are written as
+they come; a case again: `families.make(FAMILY, SEED)`. The table is printed at the end, and --record keeps it in
+benchmarks/results for the stability page. The command fails if a rule is broken.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from itertools import count as counting
+from itertools import islice
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any, TextIO
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+sys.path[:0] = [str(HERE), str(ROOT / "tests")]
+
+try:
+    import exact
+    import families
+    import numpy as np
+    import rules
+    from watched import Watched
+except ImportError as error:
+    print(f"overlapper: the stress run needs {error.name}: pip install 'overlapper[bench]'", file=sys.stderr)
+    sys.exit(2)
+
+ROWS, TABLE = ROOT / "out" / "stress.csv", HERE / "results" / "stress.csv"
+
+TIME_LIMIT = 120.0  # s, for a case with its exact truth and its proof
+
+# Only every so many seeds of a family whose exact truth takes seconds.
+EVERY = {
+    "fine_round_hulls": 40,
+    "finest_round_hulls": 100,
+    "prisms": 8,
+    "round_hulls": 4,
+    "many_bodies": 2,
+    "lenses": 4,
+}
+
+# The bounds that a proof gives for round bodies are as wide as the stated ones, and take seconds.
+UNPROVED = {"lenses": 10}
+
+COLUMNS = ("family", "seed", "detail", "parameter", "common", "status", "widened", "error", "share", "broken")
+
+Job = tuple[str, int]
+Row = dict[str, Any]
+
+
+def jobs(first: int, names: Iterable[str] = ()) -> Iterator[Job]:
+    """Without end: the families in turn, seed by seed."""
+    for seed in counting(first):
+        for name in names or families.FAMILIES:
+            if seed % EVERY.get(name, 1) == 0:
+                yield name, seed
+
+
+def judged(family: str, seed: int) -> Row:
+    """A row of the results."""
+    case = families.make(family, seed)
+    row: Row = {"detail": case.detail, "parameter": f"{case.parameter:.3g}"}
+    found = rules.answer(case.placed)
+    if case.closed_form is None:
+        row["common"] = exact.NAMES[case.truth.dimension]
+    row["status"], row["widened"] = found.status, "yes" if found.widened else "no"
+    if rules.measured(case, found):
+        off = rules.volume_off(case, found)
+        row["error"] = f"{float(off / case.truth.volume):.1e}"
+        row["share"] = f"{float(off / Fraction(found.volume_error)):.1e}"
+    asked = rules.RULES if seed % UNPROVED.get(family, 1) == 0 else rules.UNPROVED
+    row["broken"] = "; ".join(f"{name}: {complaint}" for name, complaint in rules.complaints(case, found, asked))
+    return row
+
+
+# Cases in watched processes
+
+
+def rows(wanted: Iterable[Job], workers: int) -> Iterator[Row]:
+    """In the order in which they are finished."""
+    waiting, finished = iter(wanted), SimpleQueue[Row | None]()
+    todo: SimpleQueue[Job | None] = SimpleQueue()
+
+    def work() -> None:
+        with Watched(judged, TIME_LIMIT, ("general", 0)) as watched:
+            while (job := todo.get()) is not None:
+                answer = watched.ask(*job)
+                row = answer if isinstance(answer, dict) else {"broken": answer}
+                finished.put({"family": job[0], "seed": job[1]} | row)
+        finished.put(None)
+
+    with ThreadPoolExecutor(workers) as pool:
+        for _ in range(workers):
+            pool.submit(work)
+            todo.put(next(waiting, None))
+        running = workers
+        while running:
+            row = finished.get()
+            if row is None:
+                running -= 1
+            else:
+                todo.put(next(waiting, None))
+                yield row
+
+
+def run(wanted: Iterable[Job], workers: int, file: TextIO) -> list[Row]:
+    writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
+    writer.writeheader()
+    done = []
+    for row in rows(wanted, workers):
+        writer.writerow(row)
+        file.flush()
+        done.append(row)
+        if row["broken"]:
+            print(f"{row['family']} {row['seed']}: {row['broken']}", flush=True)
+    return done
+
+
+# What came out
+
+
+def table(done: list[Row]) -> list[Row]:
+    """A row for each family, and one for all."""
+    groups: dict[str, list[Row]] = {}
+    for row in done:
+        groups.setdefault(row["family"], []).append(row)
+    lines = [summary(name, groups[name]) for name in families.FAMILIES if name in groups]
+    return [*lines, summary("all", done)]
+
+
+def summary(name: str, group: list[Row]) -> Row:
+    return {
+        "family": name,
+        "cases": len(group),
+        "overlapping": sum(row.get("status") == "overlapping" for row in group),
+        "widened": sum(row.get("widened") == "yes" for row in group),
+        "worst error": worst(group, "error"),
+        "of the stated": worst(group, "share"),
+        "failures": sum(bool(row["broken"]) for row in group),
+    }
+
+
+def worst(group: list[Row], column: str) -> str:
+    """The largest relative error of a volume, or its share of the stated error."""
+    return f"{max(float(row[column]) for row in group if column in row):.1e}" if any(column in r for r in group) else ""
+
+
+def print_table(lines: list[Row]) -> None:
+    widths = [max(len(str(line[name])) for line in [*lines, {name: name}]) for name in lines[0]]
+    for line in [dict(zip(lines[0], lines[0])), *lines]:
+        cells = [str(cell) for cell in line.values()]
+        print(cells[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(cells[1:], widths[1:])), sep="  ")
+
+
+def record(lines: list[Row], first: int, path: Path) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        file.write(f"# seeds from {first} on\n")
+        writer = csv.DictWriter(file, list(lines[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(lines)
+
+
+# Memory
+
+
+def soak(first: int, count: int, steps: int = 20) -> bool:
+    """Whether memory stays as it is while so many new cases are asked for everything."""
+    stream = jobs(first)
+    sizes = []
+    for step in range(steps):
+        for family, seed in islice(stream, count // steps):
+            found = rules.answer(families.make(family, seed).placed)
+            rules.figures_are_finite(families.Case("", 0.0, found.shapes), found)
+            found.faces, found.halfspaces, found.patch, found.owner  # noqa: B018
+        sizes.append(resident())
+        print(f"{count // steps * (step + 1)} cases: {sizes[-1] / 2**20:.1f} MiB", flush=True)
+    # The first steps meet the largest cases for the first time, and the allocator keeps what these needed.
+    growth = max(sizes[steps // 2 :]) - sizes[steps // 2 - 1]
+    print(f"growth over the second half: {growth / (count / 2):.1f} bytes a case")
+    return growth < count  # two bytes a case; what belongs to the smallest answer takes hundreds
+
+
+def resident() -> int:
+    """Bytes of this process in memory."""
+    with open("/proc/self/statm") as statm:
+        return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="The rules of tests/rules.py on as many hard cases as wanted.")
+    parser.add_argument("--first", type=int, default=0, help="the seed to begin with")
+    parser.add_argument("--count", type=int, default=1000, help="so many cases")
+    parser.add_argument("--family", action="append", choices=list(families.FAMILIES), help="only this one; repeatable")
+    parser.add_argument("--workers", type=int, default=2, help="processes at a time")
+    parser.add_argument("--out", type=Path, default=ROWS, help="file of the rows")
+    parser.add_argument("--record", action="store_true", help=f"keep the table as {TABLE.relative_to(ROOT)}")
+    parser.add_argument("--soak", type=int, metavar="COUNT", help="so many cases in one process, only memory watched")
+    chosen = parser.parse_args()
+    np.seterr(all="ignore")
+    if chosen.soak:
+        sys.exit(not soak(chosen.first, chosen.soak))
+    chosen.out.parent.mkdir(parents=True, exist_ok=True)
+    with chosen.out.open("w", newline="", encoding="utf-8") as file:
+        done = run(islice(jobs(chosen.first, chosen.family or ()), chosen.count), chosen.workers, file)
+    lines = table(done)
+    print_table(lines)
+    if chosen.record:
+        record(lines, chosen.first, TABLE)
+    sys.exit(any(row["broken"] for row in done))
+
+
+if __name__ == "__main__":
+    main()
