@@ -38,7 +38,7 @@ NUMBERS = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf:
-    """One shape of a collider, compounds resolved; lengths in metres, single precision but for the points of a hull.
+    """One shape of a collider, compounds resolved; lengths in metres, single precision but for the points of a mesh.
 
     `position` (3,) and `orientation` (4,) xyzw place it in the collider's frame, the inertial frame of its link.
     What `figures` holds depends on `kind`:
@@ -48,8 +48,9 @@ class Leaf:
         cylinder     (2,) radius, length along local z
         plane        (4,) unit normal n and constant c of the solid n·x <= c
         hull         (n, 3) points
+        concave mesh (t, 3, 3) corners of the triangles
         multisphere  (n, 4) centres and radii of the spheres whose convex hull it is
-    and is empty for every other kind ("concave mesh", "height field", "capsule along x", ...).
+    and is empty for every other kind ("height field", "capsule along x", ...).
     """
 
     kind: str
@@ -142,6 +143,8 @@ class BulletFile:
         shape = self._at(address)[0]
         if kind == "plane":
             return kind, np.append(shape["m_planeNormal"]["m_floats"][:3], shape["m_planeConstant"]).astype(float)
+        if kind == "concave mesh":
+            return kind, self._triangles(shape["m_meshInterface"])
         if kind not in ("box", "sphere", "capsule", "cylinder", "hull", "multisphere"):
             return kind, np.empty(0)
         convex = self._base(address, "btConvexInternalShapeData")
@@ -163,6 +166,17 @@ class BulletFile:
         if axis != 2:
             return f"{kind} along {'xyz'[axis]}", np.empty(0)
         return kind, np.array([size[0], 2 * size[2]])
+
+    def _triangles(self, mesh: Any) -> NDArray[np.float64]:
+        """The triangles (t, 3, 3) of a striding mesh, which pybullet indexes in 32 bits."""
+        scaling = mesh["m_scaling"]["m_floats"][:3].astype(float)
+        parts = self._at(int(mesh["m_meshPartsPtr"])) if mesh["m_meshPartsPtr"] else ()
+        corners = [
+            self._at(int(part["m_vertices3d"]))["m_floats"][self._at(int(part["m_indices32"]))["m_value"], :3]
+            for part in parts
+            if part["m_numTriangles"]
+        ]
+        return np.concatenate([np.empty((0, 3)), *corners]).reshape(-1, 3, 3) * scaling
 
     def _base(self, address: int, name: str) -> Any:
         """The shape at `address` as its C++ base class: every shape struct begins with that of its base."""

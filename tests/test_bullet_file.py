@@ -93,20 +93,32 @@ def test_every_object_of_an_obj_file_is_a_leaf(client, saved, tmp_path):
     assert_allclose(far.figures.mean(axis=0) - near.figures.mean(axis=0), [2, 0, 0], atol=1e-3)
 
 
-def test_what_is_not_convex_has_a_kind_and_no_figures(client, saved):
-    body(client, p.GEOM_MESH, vertices=CUBE.tolist(), indices=[0, 1, 2, 1, 2, 3, 4, 5, 6])
-    body(
-        client,
-        p.GEOM_HEIGHTFIELD,
-        heightfieldData=[0.0] * 63 + [1.0],
-        numHeightfieldRows=8,
-        numHeightfieldColumns=8,
-        meshScale=[1, 1, 1],
-    )
-    file = saved()
-    leaves = [base_leaves(file, index)[0] for index in (0, 1)]
-    assert [leaf.kind for leaf in leaves] == ["concave mesh", "height field"]
-    assert all(leaf.figures.size == 0 for leaf in leaves)
+def test_a_height_field_has_a_kind_and_no_figures(client, saved):
+    figures = {"heightfieldData": [0.0] * 63 + [1.0], "numHeightfieldRows": 8, "numHeightfieldColumns": 8}
+    body(client, p.GEOM_HEIGHTFIELD, meshScale=[1, 1, 1], **figures)
+    (leaf,) = base_leaves(saved())
+    assert leaf.kind == "height field" and leaf.figures.size == 0
+
+
+@pytest.mark.parametrize("scale", [[1, 2, 3], [-1, 0.1, 100]])
+def test_a_concave_mesh_keeps_its_triangles_to_the_bit(client, saved, scale):
+    indices = [0, 1, 2, 1, 2, 3, 4, 5, 6]
+    corners = CUBE + np.random.default_rng(1).normal(size=CUBE.shape)
+    frame = {"collisionFramePosition": POSITION, "collisionFrameOrientation": ORIENTATION}
+    body(client, p.GEOM_MESH, vertices=corners.tolist(), indices=indices, meshScale=scale, **frame)
+    (leaf,) = base_leaves(saved())
+    assert leaf.kind == "concave mesh"
+    assert_array_equal(leaf.figures, (corners * scale)[indices].reshape(-1, 3, 3))
+    assert_allclose(leaf.position, POSITION, atol=SINGLE)
+
+
+def test_a_mesh_file_may_be_forced_to_stay_concave(client, saved, tmp_path):
+    corners = "".join(f"v {x} {y} {z}\n" for x, y, z in CUBE)
+    (tmp_path / "bent.obj").write_text(f"{corners}f 1 2 3\nf 2 3 4\nf 5 6 7\n")
+    body(client, p.GEOM_MESH, fileName=str(tmp_path / "bent.obj"), flags=p.GEOM_FORCE_CONCAVE_TRIMESH)
+    (leaf,) = base_leaves(saved())
+    assert leaf.kind == "concave mesh"
+    assert {*map(tuple, leaf.figures.reshape(-1, 3))} == {*map(tuple, CUBE[:7])}
 
 
 def test_a_capsule_between_two_points_is_a_multisphere(client, saved, tmp_path):
