@@ -144,6 +144,7 @@ Vec3 HalfSpace::support(Vec3 direction) const {
 
 Vec3 Hull::support(Vec3 direction) const {
   const std::vector<Vec3>& vertices = data->vertices;
+  if (data->graph) return vertices[data->graph->farthest_vertex(*data, direction)];
   int best = 0;
   double largest = -kInfinity;
   for (int i = 0; i < static_cast<int>(vertices.size()); ++i) {
@@ -154,6 +155,8 @@ Vec3 Hull::support(Vec3 direction) const {
 }
 
 Plane Hull::ray_exit(Vec3 origin, Vec3 direction) const {
+  double rate;
+  if (data->graph) return data->planes[data->graph->ray_exit(*data, origin, direction, rate)];
   return best_plane(data->planes,
                     [&](const Plane& p) { return dot(p.normal, direction) / -signed_distance(p, origin); });
 }
@@ -485,6 +488,7 @@ Hull make_hull(std::span<const Vec3> points) {
   require(largest < kLargest, "vertices must be closer to the origin than 1e100 m");
   auto data = hull_of(points);
   require(data != nullptr, "vertices are flat: they all lie in one plane");
+  data->graph = graph_of(*data);
   return {std::move(data)};
 }
 

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "hull_graph.h"
 #include "vec.h"
 
 namespace overlapper {
@@ -81,6 +82,7 @@ struct HullData {
   std::vector<std::array<int, 3>> triangles;
   double volume = 0;
   Vec3 centroid;
+  std::shared_ptr<const HullGraph> graph;  ///< for climbing; null where rounding left no closed convex surface
 
   std::span<const int> facet(int f) const {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
