@@ -176,7 +176,8 @@ class BulletFile:
             for part in parts
             if part["m_numTriangles"]
         ]
-        return np.concatenate([np.empty((0, 3)), *corners]).reshape(-1, 3, 3) * scaling
+        triangles: NDArray[np.float64] = np.concatenate([np.empty((0, 3)), *corners]).reshape(-1, 3, 3) * scaling
+        return triangles
 
     def _base(self, address: int, name: str) -> Any:
         """The shape at `address` as its C++ base class: every shape struct begins with that of its base."""
