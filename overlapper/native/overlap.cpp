@@ -10,6 +10,8 @@
 #include "minkowski.h"
 #include "paper.h"
 #include "predicates.h"
+#include "wide_ball.h"
+#include "wide_gap.h"
 
 namespace overlapper {
 namespace {
@@ -111,9 +113,47 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
     lazy_->planes = std::move(planes);
   } else if (!ball_.apart) {
     status_ = Status::kTouching;
+    settle_in_wide_arithmetic();
+    if (status_ == Status::kOverlapping) lazy_->planes = std::move(planes);
   }
   if (status_ != Status::kSeparated && !bounds_space(bodies_))
     throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
+}
+
+/// Where doubles see neither a gap nor a common ball, of slender bodies and of bodies of very different size there may
+/// still be either.
+void Overlap::settle_in_wide_arithmetic() {
+  const double reach = *std::max_element(reach_.begin(), reach_.end());
+  double least_size = std::numeric_limits<double>::infinity();
+  std::vector<WideBody> bodies;
+  for (const Placed& body : relative_) {
+    bodies.emplace_back(body, wide(reference_));
+    if (!bounded(body.shape)) continue;
+    const Bounds box = bounds(body);
+    least_size = std::min(least_size, norm(box.upper - box.lower));
+  }
+  if (!std::isfinite(least_size)) return;
+  // Nearer or thinner than the rounding of their coordinates, bodies touch, but not by 1e-12 of the smaller one's size.
+  const double margin = std::min(rounding(reach), 0x1p-41 * least_size), noise = 0x1p-96 * reach;
+  WideVector apart;
+  if (pair()) {
+    const WideGap gap = wide_gap(bodies[0], bodies[1], noise);
+    if (gap.certified > margin) {
+      status_ = Status::kSeparated;
+      return;
+    }
+    apart = wide(gap.normal);
+  }
+  const WideBall found = wide_deepest_ball(bodies, apart, margin, reach, noise);
+  if (found.upper < -margin) status_ = Status::kSeparated;
+  // What is thinner cannot be put into a frame in doubles about this reference.
+  const double thick = 64 * rounding(reach);
+  if (found.lower <= thick) return;
+  status_ = Status::kOverlapping;
+  ball_.centre = rounded(found.centre);
+  ball_.lower = found.lower;
+  ball_.upper = found.upper;
+  ball_.rounding = rounding(reach);
 }
 
 double Overlap::volume() const { return status_ == Status::kOverlapping ? quantities().volume : 0; }

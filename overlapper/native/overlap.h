@@ -57,6 +57,7 @@ class Overlap {
 
  private:
   double touching_volume() const;
+  void settle_in_wide_arithmetic();
   Region owned_as_given(Region region) const;
 
   std::vector<Placed> bodies_;

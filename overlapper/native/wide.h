@@ -42,6 +42,19 @@ inline DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
   return normalised(first, rest.head / b.head);
 }
 
+inline bool operator<(DoubleDouble a, DoubleDouble b) {
+  return a.head < b.head || (a.head == b.head && a.tail < b.tail);
+}
+inline bool operator>(DoubleDouble a, DoubleDouble b) { return b < a; }
+inline DoubleDouble abs(DoubleDouble a) { return a.head < 0 ? -a : a; }
+
+/// Of a number that is not negative.
+inline DoubleDouble sqrt(DoubleDouble a) {
+  if (!(a.head > 0)) return {};
+  const double first = std::sqrt(a.head);
+  return normalised(first, (a - two_product(first, first)).head / (2 * first));
+}
+
 struct WideVector {
   DoubleDouble x, y, z;
 };
@@ -68,6 +81,49 @@ inline WideVector wide(Vec3 v) { return {{v.x}, {v.y}, {v.z}}; }
 inline WideVector operator+(const WideVector& a, const WideVector& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline WideVector operator-(const WideVector& a, const WideVector& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline DoubleDouble dot(const WideVector& a, const WideVector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline WideVector operator-(const WideVector& v) { return {-v.x, -v.y, -v.z}; }
+inline WideVector operator*(DoubleDouble s, const WideVector& v) { return {s * v.x, s * v.y, s * v.z}; }
 inline Vec3 rounded(const WideVector& v) { return {v.x.head, v.y.head, v.z.head}; }
+
+/// Its length; scaled by a power of two first, which keeps the squares in range.
+inline DoubleDouble norm(const WideVector& v) {
+  const double largest = max_component(abs(rounded(v)));
+  if (!(largest > 0)) return {};
+  const int exponent = std::ilogb(largest);
+  const DoubleDouble down{std::scalbn(1.0, -exponent)}, up{std::scalbn(1.0, exponent)};
+  const WideVector scaled = down * v;
+  return up * sqrt(dot(scaled, scaled));
+}
+
+/// Scaled to length one; {0, 0, 0} stays as it is.
+inline WideVector unit(const WideVector& v) {
+  const DoubleDouble length = norm(v);
+  return length.head > 0 ? WideVector{v.x / length, v.y / length, v.z / length} : v;
+}
+
+/// A 3 × 3 matrix by rows.
+struct WideMatrix {
+  WideVector row0, row1, row2;
+};
+
+inline WideVector operator*(const WideMatrix& m, const WideVector& v) {
+  return {dot(m.row0, v), dot(m.row1, v), dot(m.row2, v)};
+}
+inline WideVector apply_transposed(const WideMatrix& m, const WideVector& v) {
+  return v.x * m.row0 + v.y * m.row1 + v.z * m.row2;
+}
+
+/// The rotation that a quaternion of any length stands for.
+inline WideMatrix wide_rotation(Quaternion q) {
+  const DoubleDouble xx = two_product(q.x, q.x), yy = two_product(q.y, q.y), zz = two_product(q.z, q.z),
+                     ww = two_product(q.w, q.w), xy = two_product(q.x, q.y), xz = two_product(q.x, q.z),
+                     yz = two_product(q.y, q.z), xw = two_product(q.x, q.w), yw = two_product(q.y, q.w),
+                     zw = two_product(q.z, q.w);
+  const DoubleDouble length2 = xx + yy + zz + ww, two{2};
+  const auto part = [&](DoubleDouble value) { return value / length2; };
+  return {{part(ww + xx - yy - zz), part(two * (xy - zw)), part(two * (xz + yw))},
+          {part(two * (xy + zw)), part(ww - xx + yy - zz), part(two * (yz - xw))},
+          {part(two * (xz - yw)), part(two * (yz + xw)), part(ww - xx - yy + zz)}};
+}
 
 }  // namespace overlapper

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <span>
+
+#include "wide_body.h"
+
+namespace overlapper {
+
+/// The largest ball in the common set, as in common_point.h but in double-double, as far as the question needs it: is
+/// its radius above `margin`, or below -margin?
+struct WideBall {
+  WideVector centre;
+  double lower;  ///< least slack at the centre
+  double upper;  ///< no point has more
+};
+
+/// `hint` is a direction in which a pair may be apart, or {0, 0, 0}. `reach` is how large the coordinates are, and
+/// `noise` how far rounding in double-double may move a plane.
+WideBall wide_deepest_ball(std::span<const WideBody> bodies, const WideVector& hint, double margin, double reach,
+                           double noise);
+
+}  // namespace overlapper
