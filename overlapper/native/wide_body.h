@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "shape.h"
-#include "wide.h"
+#include "wide_pose.h"
 
 namespace overlapper {
 
