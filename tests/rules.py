@@ -168,6 +168,10 @@ def the_order_of_bodies_keeps_the_status(case: Case, found: Overlap) -> str:
     return same_status(found, again) or volumes_agree(found, again)
 
 
+def the_order_of_bodies_keeps_every_bit(case: Case, found: Overlap) -> str:
+    return same_bits(found, answer(case.placed[::-1]), 1.0)
+
+
 def a_power_of_two_scales_every_bit(case: Case, found: Overlap) -> str:
     if not only_hulls(case):
         return ""
@@ -245,6 +249,7 @@ UNPROVED: tuple[Rule, ...] = (
     volume_of_hulls_is_right_to_twelve_digits,
     centroid_is_as_right_as_its_conditioning,
     the_order_of_bodies_keeps_the_status,
+    the_order_of_bodies_keeps_every_bit,
     a_power_of_two_scales_every_bit,
     mirror_image_and_turns_of_the_axes_keep_the_status,
     rigid_motion_keeps_the_status,
