@@ -3,17 +3,20 @@
 from importlib.metadata import version as _version
 
 from overlapper._core import (
+    Batch,
     Box,
     Capsule,
     Cylinder,
     HalfSpace,
     Hull,
     Overlap,
+    Overlaps,
     Placed,
     Sphere,
     distance,
     iou,
     overlap,
+    overlaps,
     penetration_depth,
 )
 
@@ -21,17 +24,20 @@ Shape = Box | Sphere | Capsule | Cylinder | Hull | HalfSpace
 
 __version__ = _version("overlapper")
 __all__ = [
+    "Batch",
     "Box",
     "Capsule",
     "Cylinder",
     "HalfSpace",
     "Hull",
     "Overlap",
+    "Overlaps",
     "Placed",
     "Shape",
     "Sphere",
     "distance",
     "iou",
     "overlap",
+    "overlaps",
     "penetration_depth",
 ]

@@ -1,5 +1,6 @@
 """Convex shapes and the polytopes they share."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy
@@ -484,13 +485,140 @@ def iou(a: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy
     Intersection over union of two shapes: common volume over the volume of their union, from 0 to 1.
     """
 
-def candidate_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
-    """
-    (p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
-    two half-spaces are no pair.
-    """
-
 def overlap_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike, tolerance: float = 0.001, method: Literal['auto', 'paper'] = 'auto') -> list[Overlap]:
     """
     overlap() of each pair (p, 2) of the shapes at positions (k, 3) and orientations (k, 4), in one call.
+    """
+
+class Overlaps:
+    """
+    What many pairs of shapes share: an array per quantity, a row per pair. SI units, world coordinates.
+
+    The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again;
+    `overlaps[mask]`, a slice or an array of indices picks rows.
+    """
+
+    @property
+    def pairs(self) -> numpy.typing.NDArray[numpy.int32]:
+        """(p, 2) indices of the shapes a and b of each row."""
+
+    @property
+    def status(self) -> numpy.typing.NDArray[numpy.int8]:
+        """(p,) Overlaps.SEPARATED (0), TOUCHING (1) or OVERLAPPING (2)."""
+
+    @property
+    def volume(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p,) m³; 0 unless overlapping."""
+
+    @property
+    def volume_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p,) m³, certified: the true volume is within volume ± volume_error."""
+
+    @property
+    def centroid(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 3) centre of the common volume, m; not a number unless overlapping.
+        """
+
+    @property
+    def area(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p,) m², of the surface of the common polytope."""
+
+    @property
+    def normal(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 3) unit, from b to a as pybullet's contactNormalOnB; 0 for pairs that are separated.
+        """
+
+    @property
+    def depth(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p,) m, the least translation that separates the pair, of a along normal; 0 unless overlapping.
+        """
+
+    @property
+    def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 2, 6) d volume / d (translation, rotation vector about the body's own position) of a and of b, m² and m³;
+        0 unless overlapping.
+        """
+
+    @property
+    def facets_touched(self) -> numpy.typing.NDArray[numpy.int32]:
+        """(p,) how many planes of the shapes took part in building the polytope."""
+
+    @property
+    def widened(self) -> numpy.typing.NDArray[numpy.bool_]:
+        """(p,) True where the volume was computed again in wider arithmetic."""
+
+    SEPARATED: int = 0
+
+    TOUCHING: int = 1
+
+    OVERLAPPING: int = 2
+
+    @property
+    def examined(self) -> int:
+        """How many pairs were looked at: those given, or those whose boxes meet."""
+
+    @property
+    def tolerance(self) -> float: ...
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, row: Any) -> Any: ...
+
+    def __repr__(self) -> str: ...
+
+class Batch:
+    """
+    Shapes that are asked for their overlaps again and again as they move.
+
+    `overlaps` is the function of that name for these shapes. What it finds is kept for its next call: pairs of which
+    neither has moved by a bit cost nothing, and pairs that are still apart along the same axis next to nothing. The
+    answers are those of a first call to the last bit. Threads that ask at the same time get their answers without waiting.
+    """
+
+    def __init__(self, shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace]) -> None: ...
+
+    def overlaps(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1) -> Overlaps:
+        """
+        What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
+        gradient as arrays.
+
+        `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs` (p, 2)
+        indexes them and has a row each in the answer; without it there is a row for each pair that overlaps or touches, found by
+        a sweep over boxes and sorted. `tolerance` is that of `overlap`, whose answers these are to the last bit. The work is
+        spread over `threads`, None being all that there are; their number does not change a bit of the answer.
+
+        Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
+        Raises ValueError naming an argument of the wrong shape, a pose that is not finite, or half-spaces whose common set is
+        unbounded.
+        """
+
+    def candidate_pairs(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        (p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
+        two half-spaces are no pair.
+        """
+
+def overlaps(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1) -> Overlaps:
+    """
+    What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
+    gradient as arrays.
+
+    `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs` (p, 2)
+    indexes them and has a row each in the answer; without it there is a row for each pair that overlaps or touches, found by
+    a sweep over boxes and sorted. `tolerance` is that of `overlap`, whose answers these are to the last bit. The work is
+    spread over `threads`, None being all that there are; their number does not change a bit of the answer.
+
+    Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
+    Raises ValueError naming an argument of the wrong shape, a pose that is not finite, or half-spaces whose common set is
+    unbounded.
+    """
+
+def candidate_pairs(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    (p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
+    two half-spaces are no pair.
     """

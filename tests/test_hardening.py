@@ -14,6 +14,7 @@ from strategies import hull_points, overlapping_points, quaternion
 
 import overlapper
 from overlapper import (
+    Batch,
     Box,
     Capsule,
     Cylinder,
@@ -26,6 +27,7 @@ from overlapper import (
     distance,
     iou,
     overlap,
+    overlaps,
     penetration_depth,
 )
 
@@ -86,8 +88,10 @@ def answers(seed):
         "iou": iou(a, b, TOLERANCE),
     }
     shapes, positions, orientations = zip(*((body.shape, body.position, body.orientation) for body in (a, b, c)))
-    pairs = _core.candidate_pairs(list(shapes), positions, orientations)
+    pairs = _core.candidate_pairs(shapes, positions, orientations)
     found["candidate_pairs"] = pairs
+    found["overlaps"] = overlaps(shapes, positions, orientations, tolerance=TOLERANCE, threads=2)
+    found["Batch"] = Batch(shapes).overlaps(positions, orientations, pairs, TOLERANCE)
     found["overlap_pairs"] = _core.overlap_pairs(list(shapes), positions, orientations, pairs, TOLERANCE)
     return {name: bits(value) for name, value in found.items()}
 
@@ -99,7 +103,11 @@ def test_answers_cover_every_public_name():
     used = set(answers.__code__.co_names) | set(random_shape.__code__.co_names)
     used |= {name for part in random_shape.__code__.co_consts if hasattr(part, "co_names") for name in part.co_names}
     used |= set(random_bodies.__code__.co_names)
-    assert set(overlapper.__all__) - used == {"Overlap", "Shape"}  # a class that functions return, and a typing alias
+    assert set(overlapper.__all__) - used == {
+        "Overlap",
+        "Overlaps",
+        "Shape",
+    }  # what functions return, and a typing alias
     assert {name for name, value in vars(_core).items() if not isinstance(value, type) and name[0] != "_"} <= used
 
 

@@ -249,17 +249,24 @@ double core_radius(const Shape& shape) {
   return 0;
 }
 
-Placed make_placed(Shape shape, Vec3 position, Quaternion q) {
-  require(finite(position), "position must be finite");
-  require(max_component(abs(position)) < kLargest, "position must be closer to the origin than 1e100 m");
+Placed make_placed(Shape shape, Vec3 position, Quaternion orientation) {
+  Placed placed{std::move(shape), {}, {}, {}};
+  placed.move_to(position, orientation);
+  return placed;
+}
+
+void Placed::move_to(Vec3 new_position, Quaternion q) {
+  require(finite(new_position), "position must be finite");
+  require(max_component(abs(new_position)) < kLargest, "position must be closer to the origin than 1e100 m");
   require(std::isfinite(q.x) && std::isfinite(q.y) && std::isfinite(q.z) && std::isfinite(q.w),
           "orientation must be finite");
   const double length = std::hypot(std::hypot(q.x, q.y), std::hypot(q.z, q.w));
   require(length > 0, "orientation must not be the zero quaternion");
   if (std::abs(length - 1) > DBL_EPSILON) q = {q.x / length, q.y / length, q.z / length, q.w / length};
-  Pose pose{rotation_matrix(q), position};
+  position = new_position;
+  orientation = q;
+  pose = {rotation_matrix(q), new_position};
   if (const Hull* hull = std::get_if<Hull>(&shape)) pose.translation = pose * hull->data->origin;
-  return {std::move(shape), position, q, pose};
 }
 
 Vec3 Placed::support(Vec3 direction) const {

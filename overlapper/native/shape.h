@@ -138,6 +138,9 @@ struct Placed {
   Plane ray_exit(Vec3 origin, Vec3 direction) const;
   Plane tightest(Vec3 point) const;
 
+  /// Throws std::invalid_argument, and stays where it is, unless the numbers are finite and the quaternion is not zero.
+  void move_to(Vec3 new_position, Quaternion new_orientation);
+
   /// The same body with coordinates counted from `reference`: relative poses keep the digits that world ones lose.
   Placed seen_from(Vec3 reference) const;
 };

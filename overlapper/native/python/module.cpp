@@ -6,4 +6,5 @@ NB_MODULE(_core, m) {
   m.doc() = "Convex shapes and the polytopes they share.";
   overlapper::python::define_shapes(m);
   overlapper::python::define_overlaps(m);
+  overlapper::python::define_batch(m);
 }

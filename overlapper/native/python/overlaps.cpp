@@ -1,6 +1,5 @@
 #include <chrono>
 
-#include "candidates.h"
 #include "canonical_order.h"
 #include "minkowski.h"
 #include "overlap.h"
@@ -380,22 +379,7 @@ nb::list overlap_pairs(nb::list shapes, nb::handle positions, nb::handle orienta
   return list;
 }
 
-void define_batch(nb::module_& m) {
-  m.def(
-      "candidate_pairs",
-      [](nb::list shapes, nb::handle positions, nb::handle orientations) {
-        std::vector<int> flat;
-        for (const auto& pair : candidate_pairs(place_all(shapes, positions, orientations)))
-          flat.insert(flat.end(), pair.begin(), pair.end());
-        const size_t rows = flat.size() / 2;
-        return to_numpy<IndexMatrix>(std::move(flat), {rows, 2});
-      },
-      nb::rv_policy::move, "shapes"_a, "positions"_a, "orientations"_a,
-      nb::sig("def candidate_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: "
-              "numpy.typing.ArrayLike, "
-              "orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]"),
-      R"((p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
-two half-spaces are no pair.)");
+void define_overlap_pairs(nb::module_& m) {
   m.def("overlap_pairs", &overlap_pairs, "shapes"_a, "positions"_a, "orientations"_a, "pairs"_a,
         "tolerance"_a.none() = 1e-3, "method"_a.none() = "auto",
         nb::sig("def overlap_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: "
@@ -410,7 +394,7 @@ two half-spaces are no pair.)");
 void define_overlaps(nb::module_& m) {
   define_overlap(m);
   define_functions(m);
-  define_batch(m);
+  define_overlap_pairs(m);
 }
 
 }  // namespace overlapper::python

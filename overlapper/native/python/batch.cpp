@@ -1,0 +1,254 @@
+#include "batch.h"
+
+#include <thread>
+
+#include "python/arrays.h"
+
+namespace overlapper::python {
+namespace {
+
+using Pairs = nb::ndarray<const int, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+std::vector<Shape> to_shapes(nb::handle given) {
+  if (!PySequence_Check(given.ptr())) throw nb::type_error("shapes must be a sequence of shapes");
+  std::vector<Shape> shapes;
+  for (nb::handle shape : nb::list(given))
+    shapes.push_back(to_shape(shape, "shapes[" + std::to_string(shapes.size()) + "]"));
+  return shapes;
+}
+
+/// (k, columns) numbers, one row per shape.
+std::pair<Doubles, std::span<const double>> to_poses(nb::handle given, const char* name, size_t k, size_t columns) {
+  const std::string expected = "an array of shape (k, " + std::to_string(columns) + "), one row per shape";
+  Doubles array = to_doubles(given, name, expected);
+  if (array.ndim() != 2 || array.shape(0) != k || array.shape(1) != columns)
+    fail(name, "must be " + expected + ", not of shape " + shape_text(array));
+  return {array, std::span(array.data(), k * columns)};
+}
+
+Pairs to_pairs(nb::handle given, size_t k) {
+  nb::object array;
+  const nb::module_ numpy = nb::module_::import_("numpy");
+  try {
+    // An empty list has no type of its own.
+    nb::object as_given = numpy.attr("asarray")(given);
+    if (nb::len(as_given) == 0) as_given = numpy.attr("empty")(nb::make_tuple(0, 2), "dtype"_a = "int32");
+    array =
+        numpy.attr("ascontiguousarray")(as_given.attr("astype")("int32", "casting"_a = "same_kind", "copy"_a = false));
+  } catch (nb::python_error& error) {
+    if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_TypeError)) throw;
+    fail("pairs", "must be an array of whole numbers of shape (p, 2)");
+  }
+  if (nb::cast<int>(array.attr("ndim")) != 2 || nb::cast<size_t>(array.attr("shape")[1]) != 2)
+    fail("pairs", "must be an array of whole numbers of shape (p, 2)");
+  const Pairs pairs = nb::cast<Pairs>(array);
+  for (size_t i = 0; i < 2 * pairs.shape(0); ++i)
+    if (pairs.data()[i] < 0 || pairs.data()[i] >= static_cast<int>(k))
+      fail("pairs", "must index the " + std::to_string(k) + " shapes, not " + std::to_string(pairs.data()[i]));
+  return pairs;
+}
+
+int to_threads(nb::handle given) {
+  if (given.is_none()) return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  int threads = 0;
+  if (!nb::try_cast<int>(given, threads)) throw nb::type_error("threads must be a whole number, or None");
+  if (threads < 1) fail("threads", "must be 1 or more, not " + std::to_string(threads));
+  return threads;
+}
+
+bool go_on() {
+  const nb::gil_scoped_acquire acquire;
+  return PyErr_CheckSignals() == 0;
+}
+
+nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orientations, nb::handle pairs,
+                          nb::handle tolerance_given, nb::handle threads_given) {
+  const size_t k = batch.shapes().size();
+  const auto [position_array, p] = to_poses(positions, "positions", k, 3);
+  const auto [orientation_array, q] = to_poses(orientations, "orientations", k, 4);
+  const double tolerance = to_double(tolerance_given, "tolerance");
+  const int threads = to_threads(threads_given);
+  std::optional<Pairs> given;
+  std::optional<std::span<const IndexPair>> span;
+  if (!pairs.is_none()) {
+    given = to_pairs(pairs, k);
+    span = std::span(reinterpret_cast<const IndexPair*>(given->data()), given->shape(0));
+  }
+  bool finished = false;
+  Overlaps found;
+  {
+    const nb::gil_scoped_release release;
+    found = batch.overlaps(p, q, span, tolerance, threads, go_on, finished);
+  }
+  nb::object answer = nb::cast(std::move(found));
+  if (finished) return answer;
+  nb::python_error interruption;
+  interruption.value().attr("overlaps") = answer;
+  throw interruption;
+}
+
+nb::object candidates(Batch& batch, nb::handle positions, nb::handle orientations) {
+  const size_t k = batch.shapes().size();
+  const auto [position_array, p] = to_poses(positions, "positions", k, 3);
+  const auto [orientation_array, q] = to_poses(orientations, "orientations", k, 4);
+  std::vector<IndexPair> pairs;
+  {
+    const nb::gil_scoped_release release;
+    pairs = batch.candidate_pairs(p, q);
+  }
+  std::vector<int> flat;
+  flat.reserve(2 * pairs.size());
+  for (const IndexPair& pair : pairs) flat.insert(flat.end(), pair.begin(), pair.end());
+  return nb::cast(to_numpy<IndexMatrix>(std::move(flat), {pairs.size(), 2}), nb::rv_policy::move);
+}
+
+/// A read-only array over one column of the answer, which it keeps alive.
+template <class T, class Element>
+void column(nb::class_<Overlaps>& cls, const char* name, std::vector<Element> Overlaps::* values,
+            std::initializer_list<size_t> row_shape, const char* type, const char* doc) {
+  const std::vector<size_t> row(row_shape);
+  const std::string sig = "def " + std::string(name) + "(self) -> numpy.typing.NDArray[numpy." + type + "]";
+  cls.def_prop_ro(
+      name,
+      [values, row](nb::handle self) {
+        const std::vector<Element>& elements = nb::cast<const Overlaps&>(self).*values;
+        std::vector<size_t> shape{elements.size()};
+        shape.insert(shape.end(), row.begin(), row.end());
+        return nb::ndarray<nb::numpy, const T>(reinterpret_cast<const T*>(elements.data()), shape.size(), shape.data(),
+                                               self);
+      },
+      nb::rv_policy::reference, nb::sig(sig.c_str()), doc);
+}
+
+void define_columns(nb::class_<Overlaps>& cls) {
+  column<int>(cls, "pairs", &Overlaps::pairs, {2}, "int32", "(p, 2) indices of the shapes a and b of each row.");
+  column<std::int8_t>(cls, "status", &Overlaps::status, {}, "int8",
+                      "(p,) Overlaps.SEPARATED (0), TOUCHING (1) or OVERLAPPING (2).");
+  column<double>(cls, "volume", &Overlaps::volume, {}, "float64", "(p,) m³; 0 unless overlapping.");
+  column<double>(cls, "volume_error", &Overlaps::volume_error, {}, "float64",
+                 "(p,) m³, certified: the true volume is within volume ± volume_error.");
+  column<double>(cls, "centroid", &Overlaps::centroid, {3}, "float64",
+                 "(p, 3) centre of the common volume, m; not a number unless overlapping.");
+  column<double>(cls, "area", &Overlaps::area, {}, "float64", "(p,) m², of the surface of the common polytope.");
+  column<double>(cls, "normal", &Overlaps::normal, {3}, "float64",
+                 "(p, 3) unit, from b to a as pybullet's contactNormalOnB; 0 for pairs that are separated.");
+  column<double>(cls, "depth", &Overlaps::depth, {}, "float64",
+                 "(p,) m, the least translation that separates the pair, of a along normal; 0 unless overlapping.");
+  column<double>(
+      cls, "gradient", &Overlaps::gradient, {2, 6}, "float64",
+      R"((p, 2, 6) d volume / d (translation, rotation vector about the body's own position) of a and of b, m² and m³;
+0 unless overlapping.)");
+  column<int>(cls, "facets_touched", &Overlaps::facets_touched, {}, "int32",
+              "(p,) how many planes of the shapes took part in building the polytope.");
+  column<bool>(cls, "widened", &Overlaps::widened, {}, "bool_",
+               "(p,) True where the volume was computed again in wider arithmetic.");
+}
+
+Overlap overlap_of_row(const Overlaps& overlaps, size_t row) {
+  const nb::gil_scoped_release release;
+  return overlaps.overlap(row);
+}
+
+void define_overlaps_class(nb::module_& m) {
+  nb::class_<Overlaps> cls(
+      m, "Overlaps",
+      R"(What many pairs of shapes share: an array per quantity, a row per pair. SI units, world coordinates.
+
+The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again;
+`overlaps[mask]`, a slice or an array of indices picks rows.)");
+  define_columns(cls);
+  for (const auto& [name, status] : {std::pair{"SEPARATED", Status::kSeparated},
+                                     {"TOUCHING", Status::kTouching},
+                                     {"OVERLAPPING", Status::kOverlapping}})
+    cls.attr(name) = static_cast<int>(status);
+  cls.def_ro("examined", &Overlaps::examined, "How many pairs were looked at: those given, or those whose boxes meet.");
+  cls.def_ro("tolerance", &Overlaps::tolerance);
+  cls.def("__len__", &Overlaps::size);
+  cls.def(
+      "__getitem__",
+      [](const Overlaps& self, nb::handle key) -> nb::object {
+        const nb::object rows = nb::module_::import_("numpy").attr("arange")(self.size())[key];
+        if (nb::cast<int>(rows.attr("ndim")) == 0)
+          return nb::cast(overlap_of_row(self, nb::cast<size_t>(nb::int_(rows))));
+        const auto chosen = nb::cast<nb::ndarray<const std::int64_t, nb::ndim<1>, nb::device::cpu>>(rows);
+        std::vector<std::int64_t> indices;
+        for (size_t i = 0; i < chosen.shape(0); ++i) indices.push_back(chosen(i));
+        return nb::cast(self.select(indices));
+      },
+      "row"_a, nb::sig("def __getitem__(self, row: typing.Any) -> typing.Any"));
+  cls.def("__repr__", [](const Overlaps& self) {
+    const auto overlapping = std::count(self.status.begin(), self.status.end(), int(Status::kOverlapping));
+    return "Overlaps(" + std::to_string(self.size()) + " pairs, " + std::to_string(overlapping) + " overlapping)";
+  });
+}
+
+#define OVERLAPPER_SHAPES "collections.abc.Sequence[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace]"
+#define OVERLAPPER_POSES "positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike"
+
+constexpr const char* kOverlapsDoc =
+    R"(What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
+gradient as arrays.
+
+`positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs` (p, 2)
+indexes them and has a row each in the answer; without it there is a row for each pair that overlaps or touches, found by
+a sweep over boxes and sorted. `tolerance` is that of `overlap`, whose answers these are to the last bit. The work is
+spread over `threads`, None being all that there are; their number does not change a bit of the answer.
+
+Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
+Raises ValueError naming an argument of the wrong shape, a pose that is not finite, or half-spaces whose common set is
+unbounded.)";
+
+void define_batch_class(nb::module_& m) {
+  nb::class_<Batch> cls(m, "Batch",
+                        R"(Shapes that are asked for their overlaps again and again as they move.
+
+`overlaps` is the function of that name for these shapes. What it finds is kept for its next call: pairs of which
+neither has moved by a bit cost nothing, and pairs that are still apart along the same axis next to nothing. The
+answers are those of a first call to the last bit. Threads that ask at the same time get their answers without waiting.)");
+  cls.def(
+      "__init__", [](Batch* self, nb::handle shapes) { new (self) Batch(to_shapes(shapes)); }, "shapes"_a.none(),
+      nb::sig("def __init__(self, shapes: " OVERLAPPER_SHAPES ") -> None"));
+  cls.def("overlaps", &batch_overlaps, "positions"_a.none(), "orientations"_a.none(), "pairs"_a.none() = nb::none(),
+          "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1,
+          nb::sig("def overlaps(self, " OVERLAPPER_POSES ", pairs: numpy.typing.ArrayLike | None = None, "
+                  "tolerance: float = 0.001, threads: int | None = 1) -> Overlaps"),
+          kOverlapsDoc);
+  cls.def(
+      "candidate_pairs", &candidates, "positions"_a.none(), "orientations"_a.none(),
+      nb::sig("def candidate_pairs(self, " OVERLAPPER_POSES ") -> numpy.typing.NDArray[numpy.int32]"),
+      R"((p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
+two half-spaces are no pair.)");
+}
+
+}  // namespace
+
+void define_batch(nb::module_& m) {
+  define_overlaps_class(m);
+  define_batch_class(m);
+  m.def(
+      "overlaps",
+      [](nb::handle shapes, nb::handle positions, nb::handle orientations, nb::handle pairs, nb::handle tolerance,
+         nb::handle threads) {
+        Batch batch(to_shapes(shapes));
+        return batch_overlaps(batch, positions, orientations, pairs, tolerance, threads);
+      },
+      "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none(), "pairs"_a.none() = nb::none(),
+      "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1,
+      nb::sig("def overlaps(shapes: " OVERLAPPER_SHAPES ", " OVERLAPPER_POSES
+              ", pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1) "
+              "-> Overlaps"),
+      kOverlapsDoc);
+  m.def(
+      "candidate_pairs",
+      [](nb::handle shapes, nb::handle positions, nb::handle orientations) {
+        Batch batch(to_shapes(shapes));
+        return candidates(batch, positions, orientations);
+      },
+      "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none(),
+      nb::sig("def candidate_pairs(shapes: " OVERLAPPER_SHAPES ", " OVERLAPPER_POSES
+              ") -> numpy.typing.NDArray[numpy.int32]"),
+      R"((p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
+two half-spaces are no pair.)");
+}
+
+}  // namespace overlapper::python
