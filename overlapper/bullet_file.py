@@ -60,18 +60,35 @@ class Leaf:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Collider:
+    """A link's body for collisions: the address of its shape, and where it is.
+
+    `position` (3,) and `rotation` (3, 3) are those of the inertial frame in the world, in double precision.
+    """
+
+    shape: int
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+
+    @property
+    def orientation(self) -> NDArray[np.float64]:
+        """(4,) unit quaternion xyzw of `rotation`."""
+        return _quaternion(self.rotation)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class SavedBody:
     """A body of the file; the file knows no body ids.
 
     `position` (3,) is the base's centre of mass in the world, to the bit what pybullet reports; `friction` the lateral
-    friction of the base. `shapes` holds the address of each collider's shape by link index, -1 for the base.
+    friction of the base. `colliders` are by link index, -1 for the base.
     `links` is the number of links, 0 for a rigid body (maximal coordinates).
     """
 
     links: int
     position: NDArray[np.float64]
     friction: float
-    shapes: dict[int, int]
+    colliders: dict[int, Collider]
 
 
 class Block(NamedTuple):
@@ -192,8 +209,17 @@ class BulletFile:
 
 
 def _saved(links: int, position: NDArray[np.float64], colliders: dict[int, Any]) -> SavedBody:
-    shapes = {link: int(collider["m_collisionShape"]) for link, collider in colliders.items()}
-    return SavedBody(links, position, float(colliders[-1]["m_friction"]), shapes)
+    made = {link: _collider(record) for link, record in colliders.items()}
+    return SavedBody(links, position, float(colliders[-1]["m_friction"]), made)
+
+
+def _collider(record: Any) -> Collider:
+    transform = record["m_worldTransform"]
+    return Collider(
+        int(record["m_collisionShape"]),
+        transform["m_origin"]["m_floats"][:3],
+        transform["m_basis"]["m_el"]["m_floats"][:, :3],
+    )
 
 
 def _blocks(data: bytes) -> list[Block]:

@@ -78,30 +78,40 @@ def _body_type(client: int, id: int) -> int:
     return int(pybullet.getDynamicsInfo(id, BASE, client)[10])
 
 
-def saved_bodies(client: int, ids: Sequence[int]) -> tuple[BulletFile, dict[int, SavedBody]]:
-    """The scene as a .bullet file, and the body of the file for each of `ids` but the soft ones.
+def saved_bodies(client: int, ids: Sequence[int]) -> tuple[BulletFile, dict[int, int]]:
+    """The scene as a .bullet file, and the place in the file of each of `ids` but the soft ones.
 
-    The file has no ids. Position and number of links identify a body unless another shares them; then each
-    has a friction of its own while the file is written.
+    The file has no ids. Position and number of links identify a body unless another shares them or pybullet hides
+    its position; then each has a friction of its own while the file is written.
     """
     ids = [id for id in ids if _body_type(client, id) != SOFT_BODY]
-    file = _save(client)
-    saved = {(body.links, *body.position.tolist()): body for body in file.bodies}
-    wanted = {
-        id: (pybullet.getNumJoints(id, client), *pybullet.getBasePositionAndOrientation(id, client)[0]) for id in ids
-    }
+    file = save(client)
+    saved = {(body.links, *body.position.tolist()): row for row, body in enumerate(file.bodies)}
+    wanted = {id: (pybullet.getNumJoints(id, client), *_base_position(client, id)) for id in ids}
     if len(saved) == len(file.bodies) and len(set(wanted.values())) == len(ids) and saved.keys() >= {*wanted.values()}:
         return file, {id: saved[key] for id, key in wanted.items()}
 
     taken = {body.friction for body in file.bodies}
     frictions = dict(zip(ids, (float(value) for value in count(1) if value not in taken)))
     with _frictions(client, frictions):
-        file = _save(client)
-    by_friction = {body.friction: body for body in file.bodies}
+        file = save(client)
+    by_friction = {body.friction: row for row, body in enumerate(file.bodies)}
     return file, {id: by_friction[friction] for id, friction in frictions.items() if friction in by_friction}
 
 
-def _save(client: int) -> BulletFile:
+def hides_pose(client: int, id: int) -> bool:
+    """Whether pybullet tells no poses of this body, as of one with more than 128 links; the .bullet file has them."""
+    return not _base_position(client, id)
+
+
+def _base_position(client: int, id: int) -> tuple[float, ...]:
+    try:
+        return tuple(pybullet.getBasePositionAndOrientation(id, client)[0])
+    except pybullet.error:
+        return ()
+
+
+def save(client: int) -> BulletFile:
     with tempfile.TemporaryDirectory(prefix="overlapper-") as folder:
         path = Path(folder) / "scene.bullet"
         try:
@@ -167,7 +177,7 @@ def _colors(client: int, id: int, links: Mapping[int, str]) -> dict[int, Color]:
 
 
 def _leaves(client: int, id: int, file: BulletFile, saved: SavedBody) -> dict[int, tuple[Leaf, ...]]:
-    leaves = {link: file.leaves(address) for link, address in sorted(saved.shapes.items())}
+    leaves = {link: file.leaves(collider.shape) for link, collider in sorted(saved.colliders.items())}
     kinds = {leaf.kind for each in leaves.values() for leaf in each}
     # getCollisionShapeData refuses maximal coordinates, and kills the process on a multi-sphere.
     if _body_type(client, id) != MULTIBODY or "multisphere" in kinds:

@@ -24,7 +24,18 @@ from overlapper.quaternion import composed, rotated
 try:
     import pybullet
 
-    from overlapper.extraction import BASE, Array, Body, Color, Skipped, body_ids, read_body, saved_bodies
+    from overlapper.extraction import (
+        BASE,
+        Array,
+        Body,
+        Color,
+        Skipped,
+        body_ids,
+        hides_pose,
+        read_body,
+        save,
+        saved_bodies,
+    )
 except ImportError as error:
     raise ImportError("overlapper.simulation needs pybullet: pip install 'overlapper[sim]'") from error
 
@@ -104,6 +115,7 @@ class Bodies:
         self._mark = f"overlapper {uuid.uuid4()}"
         self._bodies: dict[int, Body] = {}
         self._unidentified = 0
+        self._rows: dict[int, int] = {}  # in a .bullet file, of the bodies whose poses have no other source
         self._examined: list[Overlap] = []
         self._arrange()
         self._refresh()
@@ -218,12 +230,14 @@ class Bodies:
         ids = sorted(body_ids(client))
         known = {id: self._bodies[id] for id in ids if id in self._bodies and self._is_marked(id)}
         fresh = [id for id in ids if id not in known]
-        unidentified = self._unidentified if ids else 0
-        if fresh:
-            file, saved = saved_bodies(client, ids)
-            unidentified = len(file.bodies) - len(saved)
+        hidden = [id for id in ids if hides_pose(client, id)]
+        unidentified, self._rows = (self._unidentified if ids else 0), {}
+        if fresh or hidden:
+            file, rows = saved_bodies(client, ids)
+            unidentified = len(file.bodies) - len(rows)
+            self._rows = {id: rows[id] for id in hidden if id in rows}
         for id in fresh:
-            known[id] = read_body(client, id, file, saved.get(id))
+            known[id] = read_body(client, id, file, file.bodies[rows[id]] if id in rows else None)
             pybullet.addUserData(id, self._mark, "", physicsClientId=client)
         self._bodies = dict(sorted(known.items()))
         grown, self._unidentified = unidentified > self._unidentified, unidentified
@@ -256,7 +270,12 @@ class Bodies:
         """Place the shapes where their colliders are now, and ask which bases cannot move."""
         client = self.physicsClientId
         rows: list[tuple[float, ...]] = []
+        file = save(client) if self._rows.keys() & self._links.keys() else None
         for id, links in self._links.items():
+            if file and id in self._rows:
+                colliders = file.bodies[self._rows[id]].colliders
+                rows += [(*colliders[link].position, *colliders[link].orientation) for link in (BASE, *links)]
+                continue
             position, orientation = pybullet.getBasePositionAndOrientation(id, client)
             rows.append(position + orientation)
             if links:

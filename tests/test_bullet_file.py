@@ -35,7 +35,7 @@ def body(client, *shape, position=(0, 0, 0), maximal=False, **figures):
 
 
 def base_leaves(file, index=0):
-    return file.leaves(file.bodies[index].shapes[-1])
+    return file.leaves(file.bodies[index].colliders[-1].shape)
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_bodies_have_exact_positions_their_links_and_friction(client, saved):
     p.changeDynamics(robot, -1, lateralFriction=0.123, physicsClientId=client)
     body(client, p.GEOM_SPHERE, radius=1, position=[0.1, 0.2, 0.3], maximal=True)
     arm, ball = saved().bodies
-    assert arm.links == 7 and set(arm.shapes) == set(range(-1, 7))
+    assert arm.links == 7 and set(arm.colliders) == set(range(-1, 7))
     assert arm.position.tolist() == list(p.getBasePositionAndOrientation(robot, client)[0])
     assert arm.friction == 0.123
     assert ball.links == 0 and ball.position.tolist() == [0.1, 0.2, 0.3]

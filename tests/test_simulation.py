@@ -621,6 +621,44 @@ def test_a_body_without_a_finite_pose_is_named(client, pose):
     assert len(bodies.overlaps()) == 1
 
 
+def long_chain(client, folder, position, links=130):
+    """A chain that swings, of cubes 0.1 m apart; of more than 128 links pybullet reports no poses."""
+    # In lines, as pybullet cuts one that is very long.
+    text = ""
+    for i in range(links + 1):
+        text += f'<link name="l{i}">{INERTIAL.format("0 0 0", "0 0 0")}'
+        text += '<collision><geometry><box size=".06 .06 .06"/></geometry></collision></link>\n'
+        kind = "continuous" if i % 10 == 1 else "fixed"
+        if i:
+            text += f'<joint name="j{i}" type="{kind}"><parent link="l{i - 1}"/><child link="l{i}"/>'
+            text += '<origin xyz=".1 0 0"/><axis xyz="0 1 0"/></joint>\n'
+    (folder / "chain.urdf").write_text(f'<robot name="chain">{text}</robot>')
+    return p.loadURDF(str(folder / "chain.urdf"), position, physicsClientId=client)
+
+
+def test_bodies_whose_poses_pybullet_does_not_tell_are_placed_all_the_same(client, tmp_path):
+    p.setGravity(0, 0, -10, physicsClientId=client)
+    first = box(client, 0.1, position=[0, -5, 0])
+    chains = [long_chain(client, tmp_path, [0, y, 0]) for y in (0, 5)]
+    with pytest.raises(p.error):
+        p.getBasePositionAndOrientation(chains[0], client)
+    bodies = Bodies(client)
+    p.removeBody(first, physicsClientId=client)
+    assert box(client, 0.2, position=[0, -5, 0]) == first  # and the order of the bodies is another
+    for chain in chains:
+        p.resetJointState(chain, 0, 0.3 * chain, physicsClientId=client)
+    for _ in range(20):
+        p.stepSimulation(client)
+    bodies.update()
+    assert len(bodies.keys) == 1 + 2 * 131
+    for chain in chains:
+        for link in (-1, 0, 64, 129):
+            assert_modelled_as_collided(client, bodies, chain, link, np.random.default_rng(1), points=2)
+    p.removeBody(chains[0], physicsClientId=client)
+    bodies.update()
+    assert_modelled_as_collided(client, bodies, chains[1], 129, np.random.default_rng(1), points=2)
+
+
 # --- clients
 
 
