@@ -34,8 +34,10 @@ GROUPS = {
     "needles and plates": ("needles_and_plates", "stacked_plates"),
     "tiny and huge": ("scaled", "tiny_in_huge"),
     "far from the origin": ("far_away",),
-    "round hulls": ("round_hulls", "prisms"),
-    "several bodies": ("compounds", "many_bodies", "empty_triples", "slender_groups"),
+    "published failures": ("published",),
+    "moments of a motion": ("sequences",),
+    "round hulls": ("round_hulls", "prisms", "pole_slivers"),
+    "several bodies": ("compounds", "many_bodies", "crowds", "empty_triples", "slender_groups"),
 }
 
 # What the parameter of a family means, for those whose cases run over many decades of it.

@@ -18,6 +18,7 @@ from zlib import crc32
 
 import exact
 import numpy as np
+from published import PUBLISHED
 from scipy.spatial import ConvexHull
 from strategies import directions, hull_points, overlapping_points, quaternion, rotation, turn
 
@@ -217,6 +218,16 @@ def prism(sides, height=1.0):
     angle = 2 * np.pi * np.arange(sides) / sides
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     return np.vstack([np.column_stack([ring, np.full(sides, z)]) for z in (-height / 2, height / 2)])
+
+
+def globe(meridians, parallels):
+    """Vertices of a unit sphere of meridians and parallels, with both poles."""
+    tilt, turn_ = np.pi * np.arange(1, parallels) / parallels, 2 * np.pi * np.arange(meridians) / meridians
+    rings = [
+        np.column_stack([np.sin(t) * np.cos(turn_), np.sin(t) * np.sin(turn_), np.full(meridians, np.cos(t))])
+        for t in tilt
+    ]
+    return np.vstack([*rings, [[0, 0, 1], [0, 0, -1]]])
 
 
 def slender(rng, case, most):
@@ -433,6 +444,59 @@ def prisms(rng):
     return Case(f"{way} {way_out}", sides, bodies)
 
 
+def pole_slivers(rng):
+    """Spheres of meridians and parallels, whose poles are fans of `parameter` slender triangles, against themselves
+    turned, against a box that ends at the pole, or pole to pole."""
+    meridians = int(rng.choice([8, 16, 32]))
+    ball = globe(meridians, 6)
+    way = str(rng.choice(["turned", "boxed", "poles"]))
+    if way == "turned":
+        other = turned(rng, ball) + rng.uniform(-0.7, 0.7, 3)
+    elif way == "boxed":
+        other = CORNERS + [0, 0, 2 - float(rng.choice([0, 0, ULP, 1e-9, 1e-3]))]
+    else:
+        other = ball + [0, 0, 2 - float(rng.choice([0, 0, 1e-12, 1e-6, 1e-2]))]
+    return Case(way, meridians, (ball, other))
+
+
+def published(rng):
+    """One of the pairs on which GJK or EPA of another library fell (see published.py), turned or moved by a little in
+    two of three cases; `parameter` is that movement."""
+    pair = PUBLISHED[int(rng.integers(len(PUBLISHED)))]
+    change = float(rng.choice([0, 1e-15, 1e-9]))
+    a, b = pair.bodies()
+    return Case(pair.thread.split("github.com/")[1], change, (a, b + change * directions(rng, 1)[0] if change else b))
+
+
+def sequences(rng):
+    """A moment of a body that settles on another, rolls over an edge of it or passes through, and the next moment."""
+    name = str(rng.choice(list(SEQUENCES)))
+    floor, body, motion = SEQUENCES[name]
+    step = float(rng.choice([1e-2, 1e-4, 1e-6, 1e-9]))
+    start = float(rng.choice([0.0, 0.25, 0.5, rng.uniform(0, 1)])) - step * float(rng.choice([0, 0.5, 1]))
+    way = str(rng.choice(["straight", "turned"]))
+    now, later = (motion(body, time) for time in (start, start + step))
+    if way == "turned":
+        matrix = rotation(quaternion(rng))
+        floor, now, later = (mapped(points, matrix) for points in (floor, now, later))
+    case = Case(f"{name} {way}", step, (floor, now))
+    case.moved = later
+    return case
+
+
+def rolled(body, time):
+    """Turned by a right angle about the edge x = z = 0, to time 1."""
+    return mapped(body, rotation(turn([0, time * np.pi / 2, 0])))
+
+
+SEQUENCES = {
+    "settling": (CORNERS - [0, 0, 1], CORNERS + [0.5, 0.25, 1], lambda body, time: body + [0, 0, (0.25 - time) * 0.1]),
+    "rolling": (CORNERS * 2 - [0, 0, 2.0], CORNERS + [-1, 0, 1], rolled),
+    "passing": (CORNERS, CORNERS * 0.5, lambda body, time: body + [8 * time - 2, 4 * time - 1, 0.5]),
+    "passing an edge": (CORNERS, OCTAHEDRON, lambda body, time: body + [1.5, 8 * time - 4, 0.5]),
+}
+
+
 def cut_at_edges(rng):
     """A cube and a body with a plane through some of its vertices or edges without rounding, or `parameter` beside."""
     beside = float(rng.choice([0, 0, ULP, -ULP, 1e-12, -1e-12, 1e-6]))
@@ -472,9 +536,17 @@ def compounds(rng):
     return Case("random", count, tuple(turned(rng, points) for _ in range(count)))
 
 
+def crowds(rng):
+    """`parameter` bodies, 17 to 64, about a common point; or with one moved away so that none or little is common."""
+    return gathered(rng, int(rng.integers(17, 65)))
+
+
 def many_bodies(rng):
     """`parameter` bodies, 3 to 16, about a common point; or with one moved away so that none or little is common."""
-    count = int(rng.integers(3, 17))
+    return gathered(rng, int(rng.integers(3, 17)))
+
+
+def gathered(rng, count):
     bodies = overlapping_points(rng, count, 4, 12)
     way = str(rng.choice(["common", "little", "none"]))
     if way != "common":
@@ -563,9 +635,9 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
     for family in (
         general, posed, posed_boxes, posed_slivers, slivers, tilted_slivers, touching, parallel_edges,
         nearly_touching, identical, shared_planes, shared_facets, nested_flush, needles_and_plates,
-        stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls, prisms, cut_at_edges,
-        dual_pairs, compounds, many_bodies, empty_triples, slender_groups, half_spaces,
-        half_spaces_alone, lenses,
+        stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls, prisms,
+        pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds, many_bodies, crowds, empty_triples,
+        slender_groups, half_spaces, half_spaces_alone, lenses,
     )
 }  # fmt: skip
 

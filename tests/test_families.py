@@ -1,10 +1,13 @@
 """What holds for every pair and every group of bodies, however hard, against the exact truth."""
 
+from fractions import Fraction
+
 import exact
 import numpy as np
 import pytest
 import rules
 from families import FAMILIES, cases, icosphere, make
+from published import PUBLISHED
 
 from overlapper import Hull
 
@@ -40,6 +43,7 @@ class Planted:
 
 def test_an_answer_with_a_fault_breaks_the_rule_about_it():
     deep, touching, apart = make("general", 1), make("touching", 1), make("nearly_touching", 0)
+    moving = next(case for case in (make("sequences", seed) for seed in range(99)) if case.parameter < 1e-5)
     off = dict.fromkeys(("volume",), rules.answer(deep.placed).volume * (1 + 2e-12))
     planted = [
         (deep, {"area": np.nan}, "figures_are_finite"),
@@ -55,6 +59,7 @@ def test_an_answer_with_a_fault_breaks_the_rule_about_it():
         (deep, {"area": np.nextafter(rules.answer(deep.placed).area, 9)}, "a_power_of_two_scales_every_bit"),
         (touching, {"status": "separated"}, "mirror_image_and_turns_of_the_axes_keep_the_status"),
         (deep, {"status": "touching"}, "rigid_motion_keeps_the_status"),
+        (moving, {"volume": 7.0}, "the_volume_moves_no_faster_than_the_bodies"),
         (deep, {"volume_error": 1e-30}, "the_certificate_is_proved"),
     ]
     for case, fault, rule in planted:
@@ -126,6 +131,12 @@ def test_empty_groups_have_something_in_common_without_any_one_of_them():
             for leaving in range(len(case.solids)):
                 rest = case.solids[:leaving] + case.solids[leaving + 1 :]
                 assert exact.common(*rest).volume > 0
+
+
+def test_published_pairs_are_as_near_as_their_threads_say():
+    depth = {pair.thread: exact.depth_squared(*map(exact.hull, pair.bodies())) for pair in PUBLISHED}
+    assert float(depth["https://github.com/danfis/libccd/issues/25"]) == pytest.approx(0.1**2)
+    assert depth["https://github.com/flexible-collision-library/fcl/issues/495"] < Fraction(1e-15) ** 2
 
 
 @pytest.mark.parametrize("subdivisions", range(4))
