@@ -1,6 +1,8 @@
 """The volume that convex bodies share, with an error bound, centroid, normal, depth, patch and gradient."""
 
+from importlib import import_module as _import_module
 from importlib.metadata import version as _version
+from typing import TYPE_CHECKING
 
 from overlapper._core import (
     Batch,
@@ -19,6 +21,11 @@ from overlapper._core import (
     overlaps,
     penetration_depth,
 )
+from overlapper.sampling import random_polytope
+
+if TYPE_CHECKING:
+    from overlapper.database import read_polytopes as read_polytopes
+    from overlapper.database import write_polytopes as write_polytopes
 
 Shape = Box | Sphere | Capsule | Cylinder | Hull | HalfSpace
 
@@ -40,4 +47,14 @@ __all__ = [
     "overlap",
     "overlaps",
     "penetration_depth",
+    "random_polytope",
 ]
+
+# Imported when asked for, and not by *, as their modules need more than numpy.
+_LAZY = {"read_polytopes": "database", "write_polytopes": "database"}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _LAZY:
+        raise AttributeError(f"module 'overlapper' has no attribute {name!r}")
+    return getattr(_import_module(f"overlapper.{_LAZY[name]}"), name)
