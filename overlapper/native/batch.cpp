@@ -31,13 +31,12 @@ Overlaps::Row row_of(const Overlap& overlap) {
   row.normal = overlap.contact().normal;
   row.volume_error = overlap.volume_error();
   if (row.status == Status::kTouching) return row;
-  const Quantities& q = overlap.quantities();
-  row.widened = q.widened;
-  row.facets_touched = overlap.region().facets_touched;
-  row.volume = q.volume;
-  row.area = q.area;
+  row.widened = overlap.widened();
+  row.facets_touched = overlap.facets_touched();
+  row.volume = overlap.volume();
+  row.area = overlap.area();
   row.depth = overlap.contact().depth;
-  row.centroid = q.centroid;
+  row.centroid = overlap.centroid();
   const auto gradient = overlap.gradient();
   std::copy(gradient[0].begin(), gradient[0].end(), row.gradient.begin());
   std::copy(gradient[1].begin(), gradient[1].end(), row.gradient.begin() + 6);

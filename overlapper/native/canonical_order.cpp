@@ -44,10 +44,12 @@ std::partial_ordering compare(const Placed& a, const Placed& b) {
 
 }  // namespace
 
+bool comes_before(const Placed& a, const Placed& b) { return compare(a, b) < 0; }
+
 std::vector<int> canonical_order(std::span<const Placed> bodies) {
   std::vector<int> order(bodies.size());
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int i, int j) { return compare(bodies[i], bodies[j]) < 0; });
+  std::stable_sort(order.begin(), order.end(), [&](int i, int j) { return comes_before(bodies[i], bodies[j]); });
   return order;
 }
 

@@ -86,48 +86,77 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
   if (bodies_.size() < 2) throw std::invalid_argument("shapes must be two or more");
   if (!(tolerance > 0 && tolerance < 1))
     throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
-  order_ = canonical_order(bodies_);
-  reference_ = bodies_[order_[0]].pose.translation;
-  for (int body : order_) relative_.push_back(bodies_[body].seen_from(reference_));
   if (method == Method::kPaper) {
-    PaperResult result = intersect_as_in_paper(relative_, tolerance);
+    PaperResult result = intersect_as_in_paper(arrangement().relative, tolerance);
     status_ = result.status;
     if (result.region) {
-      lazy_->region = owned_as_given(std::move(*result.region));
-      lazy_->region->reference = reference_;
+      lazy().region = owned_as_given(std::move(*result.region));
+      lazy().region->reference = arrangement().reference;
     }
     return;
   }
+  if (pair()) clipped_ = clip(bodies_[0], bodies_[1]);
+  status_ = clipped_ ? clipped_->status : search().status;
+  measured_by_clipping_ = clipped_ && clipped_->measured;
+}
 
-  for (const Placed& body : relative_) reach_.push_back(magnitude(body));
+Overlap::Overlap(Overlap&& other) noexcept
+    : bodies_(std::move(other.bodies_)),
+      tolerance_(other.tolerance_),
+      method_(other.method_),
+      status_(other.status_),
+      clipped_(other.clipped_),
+      measured_by_clipping_(other.measured_by_clipping_),
+      lazy_(std::move(other.lazy_)) {}
+
+Overlap::Lazy& Overlap::lazy() const {
+  if (!lazy_) lazy_ = std::make_unique<Lazy>();
+  return *lazy_;
+}
+
+const Overlap::Arrangement& Overlap::arrangement() const {
+  std::optional<Arrangement>& kept = lazy().arrangement;
+  if (kept) return *kept;
+  Arrangement arrangement{canonical_order(bodies_), {}, {}};
+  arrangement.reference = bodies_[arrangement.order[0]].pose.translation;
+  for (int body : arrangement.order) arrangement.relative.push_back(bodies_[body].seen_from(arrangement.reference));
+  return kept.emplace(std::move(arrangement));
+}
+
+const Overlap::Search& Overlap::search() const {
+  std::optional<Search>& kept = lazy().search;
+  if (kept) return *kept;
+  const std::vector<Placed>& relative = arrangement().relative;
+  Search search{};
+  for (const Placed& body : relative) search.reach.push_back(magnitude(body));
   std::vector<OwnedPlane> hints;
-  if (pair() && (bounded(relative_[0].shape) || bounded(relative_[1].shape))) {
-    const Distance d = overlapper::distance(relative_[0], relative_[1]);
-    if (d.gap > rounding(std::max(reach_[0], reach_[1]))) return;
-    hints = facing_planes(relative_, d);
+  if (pair() && (bounded(relative[0].shape) || bounded(relative[1].shape))) {
+    const Distance d = overlapper::distance(relative[0], relative[1]);
+    if (d.gap > rounding(std::max(search.reach[0], search.reach[1]))) return kept.emplace(std::move(search));
+    hints = facing_planes(relative, d);
   }
-  std::vector<OwnedPlane> planes = gather_planes(relative_);
-  ball_ = deepest_ball(relative_, reach_, planes, hints);
-  if (ball_.lower > ball_.rounding) {
-    status_ = Status::kOverlapping;
-    lazy_->planes = std::move(planes);
-  } else if (!ball_.apart) {
-    status_ = Status::kTouching;
-    settle_in_wide_arithmetic();
-    if (status_ == Status::kOverlapping) lazy_->planes = std::move(planes);
+  search.planes = gather_planes(relative);
+  search.ball = deepest_ball(relative, search.reach, search.planes, hints);
+  if (search.ball.lower > search.ball.rounding) {
+    search.status = Status::kOverlapping;
+  } else if (!search.ball.apart) {
+    search.status = Status::kTouching;
+    settle_in_wide_arithmetic(search);
   }
-  if (status_ != Status::kSeparated && !bounds_space(bodies_))
+  if (search.status != Status::kSeparated && !bounds_space(bodies_))
     throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
+  return kept.emplace(std::move(search));
 }
 
 /// Where doubles see neither a gap nor a common ball, of slender bodies and of bodies of very different size there may
 /// still be either.
-void Overlap::settle_in_wide_arithmetic() {
-  const double reach = *std::max_element(reach_.begin(), reach_.end());
+void Overlap::settle_in_wide_arithmetic(Search& search) const {
+  const auto& [order, relative, reference] = arrangement();
+  const double reach = *std::max_element(search.reach.begin(), search.reach.end());
   double least_size = std::numeric_limits<double>::infinity();
   std::vector<WideBody> bodies;
-  for (const Placed& body : relative_) {
-    bodies.emplace_back(body, wide(reference_));
+  for (const Placed& body : relative) {
+    bodies.emplace_back(body, wide(reference));
     if (!bounded(body.shape)) continue;
     const Bounds box = bounds(body);
     least_size = std::min(least_size, norm(box.upper - box.lower));
@@ -139,44 +168,66 @@ void Overlap::settle_in_wide_arithmetic() {
   if (pair()) {
     const WideGap gap = wide_gap(bodies[0], bodies[1], noise);
     if (gap.certified > margin) {
-      status_ = Status::kSeparated;
+      search.status = Status::kSeparated;
       return;
     }
     apart = wide(gap.normal);
   }
   const WideBall found = wide_deepest_ball(bodies, apart, margin, reach, noise);
-  if (found.upper < -margin) status_ = Status::kSeparated;
+  if (found.upper < -margin) search.status = Status::kSeparated;
   // What is thinner cannot be put into a frame in doubles about this reference.
   const double thick = 64 * rounding(reach);
   if (found.lower <= thick) return;
-  status_ = Status::kOverlapping;
-  ball_.centre = rounded(found.centre);
-  ball_.lower = found.lower;
-  ball_.upper = found.upper;
-  ball_.rounding = rounding(reach);
+  search.status = Status::kOverlapping;
+  search.ball.centre = rounded(found.centre);
+  search.ball.lower = found.lower;
+  search.ball.upper = found.upper;
+  search.ball.rounding = rounding(reach);
 }
 
-double Overlap::volume() const { return status_ == Status::kOverlapping ? quantities().volume : 0; }
+double Overlap::volume() const {
+  if (status_ != Status::kOverlapping) return 0;
+  return measured_by_clipping_ ? clipped_->volume : quantities().volume;
+}
 
 double Overlap::volume_error() const {
   if (method_ == Method::kAuto) {
     if (status_ == Status::kSeparated) return 0;
-    return status_ == Status::kTouching ? touching_volume() : quantities().volume_error;
+    if (measured_by_clipping_) return clipped_->volume_error;
+    if (status_ == Status::kOverlapping) return quantities().volume_error;
+    const std::scoped_lock lock(mutex_);
+    return touching_volume(search().ball);
   }
   const double claimed = volume();
-  const std::scoped_lock lock(lazy_->mutex);
-  if (!lazy_->error_of_paper) {
+  const std::scoped_lock lock(mutex_);
+  if (!lazy().error_of_paper) {
     const Overlap judge(bodies_, tolerance_, Method::kAuto);
-    lazy_->error_of_paper = std::abs(claimed - judge.volume()) + judge.volume_error();
+    lazy().error_of_paper = std::abs(claimed - judge.volume()) + judge.volume_error();
   }
-  return *lazy_->error_of_paper;
+  return *lazy().error_of_paper;
+}
+
+double Overlap::area() const {
+  if (status_ != Status::kOverlapping) return 0;
+  return measured_by_clipping_ ? clipped_->area : quantities().area;
+}
+
+Vec3 Overlap::centroid() const { return measured_by_clipping_ ? clipped_->centroid : quantities().centroid; }
+
+bool Overlap::widened() const {
+  return status_ == Status::kOverlapping && !measured_by_clipping_ && quantities().widened;
+}
+
+int Overlap::facets_touched() const {
+  if (status_ != Status::kOverlapping) return 0;
+  return clipped_ ? clipped_->facets_touched : region().facets_touched;
 }
 
 /// The inradius is rounding, and a convex set's volume is at most its inradius times its surface, which is no larger
 /// than that of a box around any of the bodies.
-double Overlap::touching_volume() const {
+double Overlap::touching_volume(const DeepestBall& ball) const {
   double least = std::numeric_limits<double>::infinity();
-  const double inradius = std::max(0.0, ball_.upper) + ball_.rounding;
+  const double inradius = std::max(0.0, ball.upper) + ball.rounding;
   for (const Placed& body : bodies_) {
     if (!bounded(body.shape)) continue;
     const Bounds box = bounds(body);
@@ -187,65 +238,82 @@ double Overlap::touching_volume() const {
 }
 
 Region Overlap::owned_as_given(Region region) const {
-  for (Region::Facet& facet : region.facets) facet.owner = order_[facet.owner];
+  for (Region::Facet& facet : region.facets) facet.owner = arrangement().order[facet.owner];
   return region;
 }
 
-const Region& Overlap::region() const {
+const Region& Overlap::grown() const {
   assert(status_ == Status::kOverlapping);
-  const std::scoped_lock lock(lazy_->mutex);
-  if (!lazy_->region) {
-    lazy_->region = owned_as_given(grow(relative_, lazy_->planes, ball_, tolerance_,
-                                        rounding(*std::max_element(reach_.begin(), reach_.end())), reference_));
-    lazy_->planes.clear();
+  std::optional<Region>& kept = lazy().region;
+  if (kept) return *kept;
+  const Search& found = search();
+  const double most = rounding(*std::max_element(found.reach.begin(), found.reach.end()));
+  const Arrangement& about = arrangement();
+  return kept.emplace(
+      owned_as_given(grow(about.relative, found.planes, found.ball, tolerance_, most, about.reference)));
+}
+
+const Quantities& Overlap::measured() const {
+  std::optional<Quantities>& kept = lazy().quantities;
+  if (kept) return *kept;
+  const Region& region = grown();
+  Quantities found = measure(region);
+  const bool enough = found.volume_error <= kEnough * found.volume;
+  if (!enough && method_ == Method::kAuto && std::none_of(bodies_.begin(), bodies_.end(), smooth_body)) {
+    if (auto wide = overlapper::widened(arrangement().relative, region)) {
+      found = measure(owned_as_given(std::move(*wide)));
+      found.widened = true;
+    } else {
+      // The point about which the region was grown is not inside after all: all that is sure is how much could be.
+      found.volume_error += found.volume + touching_volume(search().ball);
+    }
   }
-  return *lazy_->region;
+  return kept.emplace(std::move(found));
+}
+
+const Region& Overlap::region() const {
+  const std::scoped_lock lock(mutex_);
+  return grown();
 }
 
 const Quantities& Overlap::quantities() const {
-  const Region& r = region();
-  const std::scoped_lock lock(lazy_->mutex);
-  if (!lazy_->quantities) {
-    lazy_->quantities = measure(r);
-    const bool enough = lazy_->quantities->volume_error <= kEnough * lazy_->quantities->volume;
-    if (!enough && method_ == Method::kAuto && std::none_of(bodies_.begin(), bodies_.end(), smooth_body)) {
-      if (auto wide = widened(relative_, r)) {
-        lazy_->quantities = measure(owned_as_given(std::move(*wide)));
-        lazy_->quantities->widened = true;
-      } else {
-        // The point about which the region was grown is not inside after all: all that is sure is how much could be.
-        lazy_->quantities->volume_error += lazy_->quantities->volume + touching_volume();
-      }
-    }
-  }
-  return *lazy_->quantities;
+  const std::scoped_lock lock(mutex_);
+  return measured();
 }
 
 const Surface& Overlap::surface() const {
-  const Region& r = region();
-  const std::scoped_lock lock(lazy_->mutex);
-  if (!lazy_->surface) lazy_->surface = surface_of(r, static_cast<int>(bodies_.size()));
-  return *lazy_->surface;
+  const std::scoped_lock lock(mutex_);
+  std::optional<Surface>& kept = lazy().surface;
+  return kept ? *kept : kept.emplace(surface_of(grown(), static_cast<int>(bodies_.size())));
 }
 
 std::vector<std::array<double, 6>> Overlap::gradient() const {
   std::vector<std::array<double, 6>> rows(bodies_.size());
   if (status_ != Status::kOverlapping) return rows;
-  for (const Quantities::Pull& pull : quantities().pulls) {
-    const Vec3 force = pull.area_vector;
-    const Vec3 moment = cross(pull.centroid - bodies_[pull.owner].position, force);
-    std::array<double, 6>& row = rows[pull.owner];
-    for (int i = 0; i < 3; ++i) row[i] += force[i], row[3 + i] += moment[i];
+  const auto pull = [&](int body, Vec3 force, Vec3 moment) {
+    for (int i = 0; i < 3; ++i) rows[body][i] += force[i], rows[body][3 + i] += moment[i];
+  };
+  if (measured_by_clipping_) {
+    for (int body : {0, 1}) {
+      const Vec3 force = body == 0 ? clipped_->pull : -clipped_->pull;
+      const Vec3 moment = body == 0 ? clipped_->moment : -clipped_->moment;
+      pull(body, force, moment + cross(clipped_->centroid - bodies_[body].position, force));
+    }
+    return rows;
   }
+  for (const Quantities::Pull& facet : quantities().pulls)
+    pull(facet.owner, facet.area_vector, cross(facet.centroid - bodies_[facet.owner].position, facet.area_vector));
   return rows;
 }
 
 const Overlap::Contact& Overlap::contact() const {
   assert(pair());
-  const std::scoped_lock lock(lazy_->mutex);
-  if (lazy_->contact) return *lazy_->contact;
+  const std::scoped_lock lock(mutex_);
+  std::optional<Contact>& kept = lazy().contact;
+  if (kept) return *kept;
   Contact contact;
-  const Placed &a = relative_[0], &b = relative_[1];
+  const auto& [order, relative, reference] = arrangement();
+  const Placed &a = relative[0], &b = relative[1];
   if (status_ == Status::kOverlapping) {
     const Penetration p = penetration(a, b);
     contact.depth = std::max(0.0, p.depth);
@@ -256,21 +324,20 @@ const Overlap::Contact& Overlap::contact() const {
     // Where the bodies touch, the line between the witness points may be all rounding; the way out is not.
     if (norm2(d.normal) == 0 || d.gap < 0) contact.normal = penetration(a, b).normal;
     contact.distance = status_ == Status::kSeparated ? std::max(0.0, d.distance) : 0;
-    contact.witness_a = d.witness_a + reference_;
-    contact.witness_b = d.witness_b + reference_;
+    contact.witness_a = d.witness_a + reference;
+    contact.witness_b = d.witness_b + reference;
     // Half-way between the supports; a half-space reaches to its witness point.
     const double level_a = dot(contact.normal, bounded(a.shape) ? a.support(-contact.normal) : d.witness_a);
     const double level_b = dot(contact.normal, bounded(b.shape) ? b.support(contact.normal) : d.witness_b);
     const double level = level_a / 2 + level_b / 2;
-    contact.separating = {contact.normal, level + dot(contact.normal, reference_)};
+    contact.separating = {contact.normal, level + dot(contact.normal, reference)};
   }
-  if (order_[0] == 1) {
+  if (order[0] == 1) {
     contact.normal = Vec3{} - contact.normal;  // and not -normal, which would make negative zeros
     contact.separating = {contact.normal, -contact.separating.offset};
     std::swap(contact.witness_a, contact.witness_b);
   }
-  lazy_->contact = contact;
-  return *lazy_->contact;
+  return kept.emplace(contact);
 }
 
 }  // namespace overlapper

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "clip.h"
 #include "common_point.h"
 #include "region.h"
 #include "shape.h"
@@ -12,7 +13,6 @@
 
 namespace overlapper {
 
-enum class Status { kSeparated, kTouching, kOverlapping };
 enum class Method { kAuto, kPaper };
 
 /// The common set of two or more placed shapes. Only the status is found on construction; each quantity when first
@@ -22,6 +22,7 @@ class Overlap {
   /// Throws std::invalid_argument if the common set is unbounded. `tolerance` is the fraction by which the polytope may
   /// have to shrink, about its inner point, to fit into smooth shapes; polyhedra are exact whatever it is.
   Overlap(std::vector<Placed> bodies, double tolerance, Method method);
+  Overlap(Overlap&& other) noexcept;
 
   const std::vector<Placed>& bodies() const { return bodies_; }
   double tolerance() const { return tolerance_; }
@@ -36,6 +37,11 @@ class Overlap {
   /// article gives no bound, and what its method loses may be a whole overlap: for kPaper it is the difference from
   /// what kAuto finds, plus the error of that.
   double volume_error() const;
+
+  double area() const;         ///< m², of the surface; 0 unless overlapping
+  Vec3 centroid() const;       ///< only for overlapping bodies
+  bool widened() const;        ///< double arithmetic was not enough
+  int facets_touched() const;  ///< how many planes took part in building the polytope
 
   /// Only for overlapping bodies.
   const Region& region() const;
@@ -56,30 +62,49 @@ class Overlap {
   const Contact& contact() const;
 
  private:
-  double touching_volume() const;
-  void settle_in_wide_arithmetic();
-  Region owned_as_given(Region region) const;
+  /// The bodies in the order in which they are computed with, about a reference near them.
+  struct Arrangement {
+    std::vector<int> order;
+    std::vector<Placed> relative;
+    Vec3 reference;
+  };
 
-  std::vector<Placed> bodies_;
-  std::vector<int> order_;        ///< in which the bodies are computed with
-  std::vector<Placed> relative_;  ///< in that order, about the reference
-  double tolerance_;
-  Method method_;
-  Vec3 reference_;
-  std::vector<double> reach_;  ///< per relative body: how large the numbers are that describe it
-  Status status_ = Status::kSeparated;
-  DeepestBall ball_;
+  /// What looking for the deepest ball in the common set finds.
+  struct Search {
+    Status status = Status::kSeparated;
+    std::vector<double> reach;       ///< per relative body: how large the numbers are that describe it
+    std::vector<OwnedPlane> planes;  ///< of all bodies
+    DeepestBall ball{};
+  };
 
   struct Lazy {
-    std::mutex mutex;
-    std::vector<OwnedPlane> planes;  ///< of all bodies, until the region is built
+    std::optional<Arrangement> arrangement;
+    std::optional<Search> search;
     std::optional<Region> region;
     std::optional<Quantities> quantities;
     std::optional<Surface> surface;
     std::optional<Contact> contact;
     std::optional<double> error_of_paper;
   };
-  std::shared_ptr<Lazy> lazy_ = std::make_shared<Lazy>();
+
+  // Those down to measured() want the mutex held.
+  Lazy& lazy() const;
+  const Arrangement& arrangement() const;
+  const Search& search() const;
+  void settle_in_wide_arithmetic(Search& search) const;
+  const Region& grown() const;
+  const Quantities& measured() const;
+  double touching_volume(const DeepestBall& ball) const;
+  Region owned_as_given(Region region) const;
+
+  std::vector<Placed> bodies_;
+  double tolerance_;
+  Method method_;
+  Status status_ = Status::kSeparated;
+  std::optional<ClippedPair> clipped_;  ///< if clipping has decided
+  bool measured_by_clipping_ = false;   ///< and its figures are as good as any
+  mutable std::mutex mutex_;
+  mutable std::unique_ptr<Lazy> lazy_;
 };
 
 }  // namespace overlapper

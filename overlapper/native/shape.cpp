@@ -406,8 +406,10 @@ void drop_edge_points(std::vector<std::vector<int>>& loops, int points) {
   std::vector<int> facets_at(points, 0);
   for (const auto& loop : loops)
     for (int v : loop) ++facets_at[v];
-  for (auto& loop : loops) std::erase_if(loop, [&](int v) { return facets_at[v] < 3; });
-  std::erase_if(loops, [](const auto& loop) { return loop.size() < 3; });
+  for (auto& loop : loops) {
+    std::erase_if(loop, [&](int v) { return facets_at[v] < 3; });
+    if (loop.size() < 3) loop.clear();
+  }
 }
 
 /// Newell's normal of a polygon, taken about its first corner; the offset is that of its outermost corner.
@@ -426,12 +428,30 @@ Plane supporting_plane(const std::vector<Vec3>& vertices, std::span<const int> r
   return {normal, offset};
 }
 
-HullData hull_data(const ExpandingHull& hull, const std::vector<std::vector<int>>& loops, Vec3 origin,
+/// Per region: the corners of its largest triangle, unless rounding alone has merged others with that.
+std::vector<std::array<int, 3>> exact_corners(const CoplanarRegions& regions) {
+  const ExpandingHull& hull = regions.hull;
+  std::vector<std::array<int, 3>> corners;
+  for (int t : regions.first) corners.push_back(hull.facets[t].vertex);
+  for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t) {
+    if (hull.facets[t].removed() || regions.first[regions.region[t]] == t) continue;
+    std::array<int, 3>& corner = corners[regions.region[t]];
+    if (corner[0] < 0) continue;
+    const auto [a, b, c] = corner;
+    for (int v : hull.facets[t].vertex)
+      if (orientation(hull.points[a], hull.points[b], hull.points[c], hull.points[v]) != 0) corner = {-1, -1, -1};
+  }
+  return corners;
+}
+
+HullData hull_data(const CoplanarRegions& regions, const std::vector<std::vector<int>>& loops, Vec3 origin,
                    std::vector<int>* source) {
+  const ExpandingHull& hull = regions.hull;
   HullData data;
   data.origin = origin;
   std::vector<int> index(hull.points.size(), -1);
   for (const auto& loop : loops) {
+    if (loop.empty()) continue;
     for (int p : loop) {
       if (index[p] < 0) {
         index[p] = static_cast<int>(data.vertices.size());
@@ -456,12 +476,66 @@ HullData hull_data(const ExpandingHull& hull, const std::vector<std::vector<int>
     }
     data.triangles.push_back(triangle);
   }
-  for (int f = 0; f < static_cast<int>(loops.size()); ++f)
-    data.planes.push_back(supporting_plane(data.vertices, data.facet(f)));
+  const std::vector<std::array<int, 3>> exact = exact_corners(regions);
+  for (int r = 0; r < static_cast<int>(loops.size()); ++r) {
+    if (loops[r].empty()) continue;
+    const auto& [a, b, c] = exact[r];
+    data.facet_corners.push_back(a < 0 ? exact[r] : std::array{corner[a], corner[b], corner[c]});
+    data.planes.push_back(supporting_plane(data.vertices, data.facet(static_cast<int>(data.planes.size()))));
+  }
   return data;
 }
 
 }  // namespace
+
+namespace {
+
+std::vector<Edge> edges_of(const HullData& data) {
+  struct Side {
+    int from, to, facet;
+  };
+  std::vector<Side> sides;
+  for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
+    const auto ring = data.facet(f);
+    for (size_t i = 0; i < ring.size(); ++i) sides.push_back({ring[i], ring[(i + 1) % ring.size()], f});
+  }
+  const auto ends = [](const Side& s) { return std::minmax(s.from, s.to); };
+  std::stable_sort(sides.begin(), sides.end(), [&](const Side& a, const Side& b) { return ends(a) < ends(b); });
+  std::vector<Edge> edges;
+  for (size_t i = 0; i < sides.size(); i += 2) {
+    const bool paired = i + 1 < sides.size() && sides[i].from == sides[i + 1].to && sides[i].to == sides[i + 1].from;
+    if (!paired || (i + 2 < sides.size() && ends(sides[i + 2]) == ends(sides[i]))) return {};
+    edges.push_back({sides[i].from, sides[i].to, sides[i].facet, sides[i + 1].facet});
+  }
+  return edges;
+}
+
+/// Of the facets around a vertex: the first, the one at the largest angle to it, and the one that with these spans
+/// most.
+std::array<int, 3> well_spread(std::span<const int> around, const std::vector<Plane>& planes) {
+  const auto most = [&](auto spread) {
+    return *std::max_element(around.begin(), around.end(), [&](int f, int g) { return spread(f) < spread(g); });
+  };
+  const Vec3 a = planes[around[0]].normal;
+  const int second = most([&](int f) { return norm2(cross(a, planes[f].normal)); });
+  const Vec3 ab = cross(a, planes[second].normal);
+  return {around[0], second, most([&](int f) { return std::abs(dot(ab, planes[f].normal)); })};
+}
+
+}  // namespace
+
+void complete(HullData& data) {
+  data.edges = edges_of(data);
+  std::vector<std::vector<int>> around(data.vertices.size());
+  for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
+    for (int v : data.facet(f)) {
+      around[v].push_back(f);
+      data.flatness = std::max(data.flatness, -signed_distance(data.planes[f], data.vertices[v]));
+    }
+  }
+  for (const auto& facets : around) data.facets_meet.push_back(well_spread(facets, data.planes));
+  for (Vec3 v : data.vertices) data.radius = std::max(data.radius, norm(v));
+}
 
 std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source) {
   Vec3 lower = points[0], upper = points[0];
@@ -475,13 +549,15 @@ std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>
   // Corners computed by a user as centre plus rotated half extents carry a few roundings each, relative to the extent;
   // a plane through three of them misses a fourth by up to about eight of those.
   const double rounding = 16 * DBL_EPSILON * max_component(max(abs(lower - origin), abs(upper - origin)));
-  std::vector<std::vector<int>> loops = region_loops(merge_coplanar(hull, rounding));
+  const CoplanarRegions regions = merge_coplanar(hull, rounding);
+  std::vector<std::vector<int>> loops = region_loops(regions);
   drop_edge_points(loops, static_cast<int>(hull.points.size()));
-  if (loops.size() < 4) return nullptr;
-  auto data = std::make_shared<HullData>(hull_data(hull, loops, origin, source));
+  auto data = std::make_shared<HullData>(hull_data(regions, loops, origin, source));
+  if (data->planes.size() < 4) return nullptr;
   const HullMeasures measures = measure(*data);
   data->volume = measures.volume;
   data->centroid = measures.centroid;
+  complete(*data);
   // A solid thinner than the rounding of its corners has no inside to speak of.
   if (!(data->volume > rounding * measures.area / 2)) return nullptr;
   return data;

@@ -68,6 +68,11 @@ struct HalfSpace {
   Plane tightest(Vec3) const { return plane; }
 };
 
+/// A ridge of a polytope: from vertex `from` to vertex `to`, the facet `left` on the left hand seen from outside.
+struct Edge {
+  int from, to, left, right;
+};
+
 /// What a convex polytope is made of. Facet f is the polygon ring[ring_start[f] .. ring_start[f + 1]) of vertices,
 /// counter-clockwise from outside, in the plane planes[f]. Coordinates are relative to `origin`: subtracting it lost no
 /// bit, and it keeps the digits of a hull that lies far from where its points are counted from.
@@ -80,9 +85,17 @@ struct HullData {
   /// arithmetic.
   std::vector<Vec3> corners;
   std::vector<std::array<int, 3>> triangles;
+  /// Per facet: three corners whose plane holds all corners of its triangles without any rounding; -1 if there are
+  /// none.
+  std::vector<std::array<int, 3>> facet_corners;
   double volume = 0;
   Vec3 centroid;
   std::shared_ptr<const HullGraph> graph;  ///< for climbing; null where rounding left no closed convex surface
+
+  std::vector<Edge> edges;                      ///< none if merging facets has left a ridge without its other side
+  std::vector<std::array<int, 3>> facets_meet;  ///< per vertex: three of its facets, as far from a common line as any
+  double radius = 0;                            ///< of a ball about the coordinates' origin that holds all vertices
+  double flatness = 0;                          ///< m: no vertex lies deeper than this inside the plane of its facet
 
   std::span<const int> facet(int f) const {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
@@ -110,6 +123,9 @@ HalfSpace make_half_space(Vec3 normal, double offset);
 Hull make_hull(std::span<const Vec3> points);
 /// The same for finite points, or null if they are flat; `source[i]` becomes the index of vertex i among the points.
 std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source = nullptr);
+
+/// Fills in what follows from vertices, planes and rings.
+void complete(HullData& data);
 
 /// m³; infinite for a half-space.
 double volume(const Shape& shape);

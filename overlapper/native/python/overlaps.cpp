@@ -40,7 +40,7 @@ Overlap make_overlap(std::vector<Placed> bodies, double tolerance, Method method
 const Overlap& measured(const Overlap& o) {
   if (solid(o)) {
     const nb::gil_scoped_release release;
-    o.quantities();
+    o.volume();
   }
   return o;
 }
@@ -122,16 +122,16 @@ area. For smooth shapes it is the share of the volume between an outer and an in
 that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
 difference from what 'auto' finds, plus the error of that. 0 if separated.)");
   cls.def_prop_ro(
-      "widened", [](const Overlap& o) { return solid(o) && measured(o).quantities().widened; },
+      "widened", [](const Overlap& o) { return measured(o).widened(); },
       R"(True if double arithmetic could not place the volume within 1e-12 of itself, and it was computed again in wider
 arithmetic from the shapes' own numbers, as were centroid, area, inertia and gradient.)");
   cls.def_prop_ro(
-      "area", [](const Overlap& o) { return solid(o) ? measured(o).quantities().area : 0.0; },
+      "area", [](const Overlap& o) { return measured(o).area(); },
       "m², of the surface of the common polytope; 0 unless overlapping.");
   cls.def_prop_ro(
       "centroid",
       [](const Overlap& o) -> nb::object {
-        return solid(o) ? nb::cast(to_numpy(measured(o).quantities().centroid), nb::rv_policy::move) : nb::none();
+        return solid(o) ? nb::cast(to_numpy(measured(o).centroid()), nb::rv_policy::move) : nb::none();
       },
       nb::sig("def centroid(self) -> numpy.typing.NDArray[numpy.float64] | None"),
       "(3,) centre of the common volume, m; None unless overlapping.");
@@ -225,7 +225,7 @@ polytope contains the common set and could shrink into it by the fraction `toler
       "method", [](const Overlap& o) { return o.method() == Method::kAuto ? "auto" : "paper"; },
       nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
   cls.def_prop_ro(
-      "facets_touched", [](const Overlap& o) { return solid(o) ? o.region().facets_touched : 0; },
+      "facets_touched", [](const Overlap& o) { return o.facets_touched(); },
       "How many planes of the shapes took part in building the polytope.");
   define_measures(cls);
   define_surface(cls);
@@ -266,7 +266,7 @@ std::pair<Placed, Placed> relative_pair(nb::handle a, nb::handle b) {
 double union_ratio(nb::handle a, nb::handle b, double tolerance) {
   const Overlap common = make_overlap({to_placed(a, "a"), to_placed(b, "b")}, tolerance, Method::kAuto);
   if (!solid(common)) return 0;
-  const double shared = measured(common).quantities().volume;
+  const double shared = measured(common).volume();
   const double both = volume(common.bodies()[0].shape) + volume(common.bodies()[1].shape) - shared;
   return std::min(1.0, shared / both);
 }

@@ -112,17 +112,19 @@ void define_pickle(nb::class_<T>& cls, Arguments arguments) {
       nb::sig("def __reduce__(self) -> tuple[type, tuple[object, ...]]"));
 }
 
+nb::object triples(const std::vector<std::array<int, 3>>& rows) {
+  return nb::cast(to_numpy(std::span<const int>(rows.data()->data(), 3 * rows.size())), nb::rv_policy::move);
+}
+
 /// A hull travels as it was built, so that indices into its facets mean the same in another process.
 nb::tuple hull_state(const Hull& hull) {
   const HullData& d = *hull.data;
-  return nb::make_tuple(nb::cast(to_numpy(d.origin), nb::rv_policy::move),
-                        nb::cast(to_numpy(d.vertices), nb::rv_policy::move),
-                        nb::cast(halfspace_rows(d.planes), nb::rv_policy::move),
-                        nb::cast(to_numpy(std::span<const int>(d.ring)), nb::rv_policy::move),
-                        nb::cast(to_numpy(std::span<const int>(d.ring_start)), nb::rv_policy::move),
-                        nb::cast(to_numpy(d.corners), nb::rv_policy::move),
-                        nb::cast(to_numpy(std::span<const int>(d.triangles.data()->data(), 3 * d.triangles.size())),
-                                 nb::rv_policy::move));
+  return nb::make_tuple(
+      nb::cast(to_numpy(d.origin), nb::rv_policy::move), nb::cast(to_numpy(d.vertices), nb::rv_policy::move),
+      nb::cast(halfspace_rows(d.planes), nb::rv_policy::move),
+      nb::cast(to_numpy(std::span<const int>(d.ring)), nb::rv_policy::move),
+      nb::cast(to_numpy(std::span<const int>(d.ring_start)), nb::rv_policy::move),
+      nb::cast(to_numpy(d.corners), nb::rv_policy::move), triples(d.triangles), triples(d.facet_corners));
 }
 
 Hull hull_from_state(nb::tuple state) {
@@ -141,12 +143,16 @@ Hull hull_from_state(nb::tuple state) {
   data->ring = integers(state[3]);
   data->ring_start = integers(state[4]);
   data->corners = to_rows(state[5], "corners");
-  const std::vector<int> triangles = integers(state[6]);
-  for (size_t i = 0; i + 2 < triangles.size(); i += 3)
-    data->triangles.push_back({triangles[i], triangles[i + 1], triangles[i + 2]});
+  const auto read_triples = [&](nb::handle value, std::vector<std::array<int, 3>>& rows) {
+    const std::vector<int> flat = integers(value);
+    for (size_t i = 0; i + 2 < flat.size(); i += 3) rows.push_back({flat[i], flat[i + 1], flat[i + 2]});
+  };
+  read_triples(state[6], data->triangles);
+  read_triples(state[7], data->facet_corners);
   const HullMeasures measures = measure(*data);
   data->volume = measures.volume;
   data->centroid = measures.centroid;
+  complete(*data);
   return {std::move(data)};
 }
 

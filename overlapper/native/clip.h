@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "shape.h"
+
+namespace overlapper {
+
+enum class Status { kSeparated, kTouching, kOverlapping };
+
+/// What a pair of polytopes, or of a polytope and a half-space, has in common. World coordinates; zeros if separated.
+struct ClippedPair {
+  Status status = Status::kSeparated;  ///< never kTouching
+  bool measured = false;        ///< overlapping, and the volume is right to 1e-12; otherwise only the status counts
+  double volume = 0, area = 0;  ///< m³, m²
+  double volume_error = 0;      ///< m³: the true volume is within volume ± volume_error
+  Vec3 centroid;
+  Vec3
+      pull;  ///< d volume / d translation of the first body: the area vector of its facets; the second has the opposite
+  Vec3 moment;  ///< d volume / d rotation vector of the first body about the centroid; the second has the opposite
+  int facets_touched = 0;  ///< facets of the common polytope
+};
+
+/// Decides by static filters alone, and measures what is common; nothing where one of the signs that it needs is not
+/// certain, and for smooth shapes. Allocates nothing once its thread has seen bodies of that size.
+///
+/// A vertex of the common polytope is a vertex of one body inside the other or the point where an edge of one crosses a
+/// facet of the other. Both are found from the signed distances of all vertices of each body from all planes of the
+/// other. The common polytope is then known by its edges: whole and cut ones of either body, and for each pair of
+/// facets that cross, the segment between the two points that lie on both. Volume, moments and area vectors are sums
+/// over edges, in any order.
+std::optional<ClippedPair> clip(const Placed& a, const Placed& b);
+
+}  // namespace overlapper

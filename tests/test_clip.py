@@ -1,0 +1,72 @@
+"""Pairs decided by static filters: what clipping finds without looking closer, against the exact truth."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from families import make
+from numpy.testing import assert_allclose
+
+from overlapper import Box, HalfSpace, Placed, overlap
+
+EVERYDAY = [
+    make(family, seed) for family in ("general", "posed", "posed_boxes", "slivers", "half_spaces") for seed in range(12)
+]
+PAIRS = [case for case in EVERYDAY if len(case.placed) == 2]
+
+
+@pytest.mark.parametrize("case", PAIRS, ids=repr)
+def test_a_pair_has_the_exact_volume_area_centroid_and_pull(case):
+    found = overlap(*case.placed)
+    if case.truth.dimension < 3:
+        assert not found
+        return
+    assert abs(Fraction(found.volume) - case.truth.volume) <= Fraction(found.volume_error)
+    assert_allclose(found.area, case.truth.area, rtol=1e-9)
+    size = float(np.abs(case.truth.centroid).max()) + 1
+    assert_allclose(found.centroid, np.array(case.truth.centroid, float), atol=1e-9 * size)
+    for body in (0, 1) if case.family != "half_spaces" else ():
+        pull = np.array(case.truth.pull(body), float)
+        assert_allclose(found.gradient[body, :3], pull, atol=1e-9 * case.truth.area)
+
+
+def test_the_moment_of_a_pull_is_the_slope_of_the_volume_by_turning():
+    still = Placed(Box((1, 1.5, 0.5)), (0.2, -0.1, 0.3), (0.3, 0.2, -0.4, 0.8))
+    step = 1e-5
+
+    def turned(angle, axis):
+        half = angle / 2
+        quaternion = [0.0, 0.0, 0.0, np.cos(half)]
+        quaternion[axis] = np.sin(half)
+        return Placed(Box((1, 1, 1)), (0.5, 0.25, 0.125), quaternion)
+
+    found = overlap(turned(0, 0), still)
+    slopes = [
+        (overlap(turned(step, axis), still).volume - overlap(turned(-step, axis), still).volume) / (2 * step)
+        for axis in range(3)
+    ]
+    assert_allclose(found.gradient[0, 3:], slopes, atol=1e-7)
+
+
+def test_a_body_inside_another_is_all_that_is_common():
+    found = overlap(Box((3, 3, 3)), Placed(Box((1, 0.5, 0.25)), (0.3, 0.2, 0.1), (0.1, 0.2, 0.3, 0.9)))
+    assert found.volume == pytest.approx(1.0, rel=1e-14)
+    assert_allclose(found.gradient, 0, atol=1e-14)
+
+
+def test_a_bar_through_a_plate_leaves_by_both_sides():
+    found = overlap(Box((2, 2, 0.25)), Placed(Box((0.25, 0.5, 3)), orientation=(0, 0, 0.2, 1)))
+    assert found.volume == pytest.approx(0.25, rel=1e-14)
+    assert_allclose(found.centroid, 0, atol=1e-15)
+
+
+def test_flush_sides_are_decided_by_looking_closer():
+    found = overlap(Box((1, 1, 1)), Placed(Box((1, 1, 1)), (0, 0, 1.5)))
+    assert abs(found.volume - 2) <= found.volume_error
+
+
+def test_a_corner_under_the_ground_is_a_tetrahedron():
+    corner = Placed(Box((1, 1, 1)), (0, 0, 0), (0, 0, 0, 1))
+    level = -3 + 0.5  # the plane x + y + z = level cuts a corner with legs of a half
+    found = overlap(corner, HalfSpace((1, 1, 1), level))
+    assert found.volume == pytest.approx(0.5**3 / 6, rel=1e-12)
