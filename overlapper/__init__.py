@@ -26,6 +26,8 @@ from overlapper.sampling import random_polytope
 if TYPE_CHECKING:
     from overlapper.database import read_polytopes as read_polytopes
     from overlapper.database import write_polytopes as write_polytopes
+    from overlapper.mesh_file import read_hull as read_hull
+    from overlapper.mesh_file import write_mesh as write_mesh
 
 Shape = Box | Sphere | Capsule | Cylinder | Hull | HalfSpace
 
@@ -51,7 +53,12 @@ __all__ = [
 ]
 
 # Imported when asked for, and not by *, as their modules need more than numpy.
-_LAZY = {"read_polytopes": "database", "write_polytopes": "database"}
+_LAZY = {
+    "read_polytopes": "database",
+    "write_polytopes": "database",
+    "read_hull": "mesh_file",
+    "write_mesh": "mesh_file",
+}
 
 
 def __getattr__(name: str) -> object:
