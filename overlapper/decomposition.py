@@ -26,7 +26,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from overlapper import Hull
+from overlapper import Hull, Placed
+from overlapper.union import union_volume
 
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -54,6 +55,11 @@ class Decomposition:
     mesh_volume: float | None
     path: Path | None
 
+    @property
+    def volume(self) -> float:
+        """Of the union of the parts, in m³."""
+        return union_volume([Placed(part) for part in self.parts])[0]
+
 
 def cache_folder() -> Path:
     """Where decompositions are kept: overlapper/convex_parts in $XDG_CACHE_HOME, by default in ~/.cache."""
@@ -65,7 +71,7 @@ def cache_folder() -> Path:
 def check_threshold(threshold: float) -> None:
     """ValueError unless CoACD takes this threshold."""
     if not 0.01 <= threshold <= 1:
-        raise ValueError(f"threshold must lie between 0.01 and 1, not {threshold}")
+        raise ValueError(f"the threshold of concavity must lie between 0.01 and 1, not {threshold}")
 
 
 def decompose(

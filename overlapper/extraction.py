@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import count
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pybullet
@@ -21,10 +22,12 @@ from numpy.typing import NDArray
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Shape, Sphere
 from overlapper.bullet_file import BulletFile, Leaf, SavedBody
+from overlapper.decomposition import Decomposition, NotDecomposed, decompose
 from overlapper.quaternion import composed, rotated
 
 Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]
+Concave = Literal["decompose", "enclose", "skip"]
 
 BASE = -1
 MULTIBODY, SOFT_BODY = 2, 3  # of getDynamicsInfo; 1 is a rigid body in maximal coordinates
@@ -36,6 +39,7 @@ REPORTED = {  # by getCollisionShapeData
     pybullet.GEOM_CYLINDER: "cylinder",
     pybullet.GEOM_PLANE: "plane",
 }
+MESHES = ("hull", "concave mesh")  # both reported as GEOM_MESH
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +50,23 @@ class Skipped:
     link: int
     name: str
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Decomposed:
+    """A concave mesh of one link (-1 is the base), modelled as the union of convex parts: the shapes `shapes` of it.
+
+    `volume` (m³) is that of the parts together, `mesh_volume` what the mesh bounds; None where its surface is open or
+    turns both ways. `path` is where the parts are kept on disk, None if the mesh had them already and they are exact.
+    """
+
+    body: int
+    link: int
+    name: str
+    shapes: range
+    volume: float
+    mesh_volume: float | None
+    path: Path | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +89,7 @@ class Body:
     shape_count: int
     parts: tuple[Part, ...]
     skipped: tuple[Skipped, ...]
+    decomposed: tuple[Decomposed, ...]
 
 
 def body_ids(client: int) -> set[int]:
@@ -136,7 +158,9 @@ def _frictions(client: int, frictions: Mapping[int, float]) -> Iterator[None]:
             pybullet.changeDynamics(id, BASE, lateralFriction=friction, physicsClientId=client)
 
 
-def read_body(client: int, id: int, file: BulletFile, saved: SavedBody | None) -> Body:
+def read_body(
+    client: int, id: int, file: BulletFile, saved: SavedBody | None, concave: Concave, threshold: float
+) -> Body:
     base, name = (text.decode(errors="replace") for text in pybullet.getBodyInfo(id, client))
     name = name or f"body {id}"
     joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
@@ -146,17 +170,24 @@ def read_body(client: int, id: int, file: BulletFile, saved: SavedBody | None) -
     leaves = _leaves(client, id, file, saved) if saved else {}
     parts: list[Part] = []
     skipped: list[Skipped] = []
+    decomposed: list[Decomposed] = []
+    shape_count = 0 if saved else 1
     for link, each in leaves.items():
-        modelled, reasons = _modelled(link, each)
+        modelled, reasons, meshes = _modelled(link, each, concave, threshold)
         parts += modelled
+        shapes = len(modelled) + len(reasons)
+        shape_count += shapes
+        label = f"{name}/{link_names[link]}"
         if reasons:
-            skipped.append(Skipped(id, link, f"{name}/{link_names[link]}", _summary(reasons, len(each))))
+            skipped.append(Skipped(id, link, label, _summary(reasons, shapes)))
+        decomposed += [
+            Decomposed(id, link, label, numbers, mesh.volume, mesh.mesh_volume, mesh.path) for numbers, mesh in meshes
+        ]
     if not saved:
         soft = _body_type(client, id) == SOFT_BODY
         skipped.append(Skipped(id, BASE, name, "a soft body is not modelled" if soft else "saveBullet leaves it out"))
-    shape_count = sum(map(len, leaves.values())) if saved else 1
     colors = _colors(client, id, link_names)
-    return Body(name, link_names, colors, fixed_links, shape_count, tuple(parts), tuple(skipped))
+    return Body(name, link_names, colors, fixed_links, shape_count, tuple(parts), tuple(skipped), tuple(decomposed))
 
 
 def _is_tied_to_base(link: int, welds: Mapping[int, int]) -> bool:
@@ -190,17 +221,17 @@ def _in_double_precision(client: int, id: int, link: int, leaves: tuple[Leaf, ..
 
     As they came if pybullet does not report all of them, or would print complaints.
     """
-    if not leaves or any(leaf.kind not in REPORTED.values() for leaf in leaves):
+    if not leaves or any(leaf.kind not in (*REPORTED.values(), *MESHES) for leaf in leaves):
         return leaves
     reported = _reported(client, id, link)
     frames = [leaf for leaf in reported if leaf.kind == "hull"]
     primitives = (leaf for leaf in reported if leaf.kind != "hull")
     exact: list[Leaf] = []
     for leaf in leaves:
-        if leaf.kind == "hull":
+        if leaf.kind in MESHES:
             # A mesh file of many hulls is reported once.
             frame = min(frames, key=lambda other: sum(_gaps(leaf, other)), default=leaf)
-            other = replace(frame, figures=leaf.figures)
+            other = replace(frame, kind=leaf.kind, figures=leaf.figures)
         else:
             other = next(primitives, leaf)
         exact.append(other if _alike(leaf, other) else leaf)
@@ -242,19 +273,50 @@ def _gaps(a: Leaf, b: Leaf) -> tuple[float, float]:
     return float(shift), float(turn)
 
 
-def _modelled(link: int, leaves: tuple[Leaf, ...]) -> tuple[list[Part], list[str]]:
-    """The leaves of a link as shapes, and a reason for each that has none."""
+def _modelled(
+    link: int, leaves: tuple[Leaf, ...], concave: Concave, threshold: float
+) -> tuple[list[Part], list[str], list[tuple[range, Decomposition]]]:
+    """The leaves of a link as shapes, a reason for each that has none, and which shapes are parts of a concave mesh."""
     parts: list[Part] = []
     reasons: list[str] = []
-    for index, saved in enumerate(leaves):
+    meshes: list[tuple[range, Decomposition]] = []
+    for saved in leaves:
         leaf = _capsule(saved) if saved.kind == "multisphere" else saved
+        first = len(parts) + len(reasons)
         try:
-            shape = _shape(leaf.kind, leaf.figures.tobytes())
+            shapes: Sequence[Shape]
+            if leaf.kind == "concave mesh":
+                mesh = _solid(leaf.figures.tobytes(), concave, threshold)
+                shapes = mesh.parts
+                meshes.append((range(first, first + len(shapes)), mesh))
+            else:
+                shapes = [_shape(leaf.kind, leaf.figures.tobytes())]
         except ValueError as error:
             reasons.append(str(error))
         else:
-            parts.append(Part(link, index, shape, leaf.position, leaf.orientation))
-    return parts, reasons
+            parts += [
+                Part(link, index, shape, leaf.position, leaf.orientation) for index, shape in enumerate(shapes, first)
+            ]
+    return parts, reasons, meshes
+
+
+def _solid(data: bytes, concave: Concave, threshold: float) -> Decomposition:
+    """A concave mesh as convex parts. NotDecomposed says why there are none."""
+    if concave == "skip":
+        raise NotDecomposed("a concave mesh is left out, as concave='skip' asks")
+    found = _decomposition(data, concave == "enclose", threshold)
+    if isinstance(found, NotDecomposed):
+        raise NotDecomposed(str(found))
+    return found
+
+
+@lru_cache(maxsize=64)
+def _decomposition(data: bytes, enclose: bool, threshold: float) -> Decomposition | NotDecomposed:
+    """Of a mesh that many bodies may have; also the failure is kept, as it may have taken minutes."""
+    try:
+        return decompose(np.frombuffer(data).reshape(-1, 3, 3), threshold, enclose)
+    except NotDecomposed as error:
+        return error
 
 
 def _capsule(leaf: Leaf) -> Leaf:

@@ -13,12 +13,13 @@ import warnings
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Overlap, Placed, Shape, _core
+from overlapper.decomposition import check_threshold
 from overlapper.quaternion import composed, rotated
 
 try:
@@ -29,6 +30,8 @@ try:
         Array,
         Body,
         Color,
+        Concave,
+        Decomposed,
         Skipped,
         body_ids,
         hides_pose,
@@ -39,7 +42,7 @@ try:
 except ImportError as error:
     raise ImportError("overlapper.simulation needs pybullet: pip install 'overlapper[sim]'") from error
 
-__all__ = ["Bodies", "Contact", "Report", "Skipped", "SkippedShapeWarning"]
+__all__ = ["Bodies", "Contact", "Decomposed", "Report", "Skipped", "SkippedShapeWarning"]
 
 
 class SkippedShapeWarning(UserWarning):
@@ -99,7 +102,12 @@ class Bodies:
                 ...
 
     Boxes, spheres, capsules, cylinders, planes and convex meshes are modelled, compounds part by part. What cannot be
-    (concave meshes, height fields, soft bodies, flat hulls) is listed in `skipped`, with one SkippedShapeWarning each.
+    (height fields, soft bodies, flat hulls) is listed in `skipped`, with one SkippedShapeWarning each.
+
+    Concave meshes are decomposed into convex parts, which count as so many shapes of their link and are listed in
+    `decomposed`; `concave_threshold`, from 0.01 to 1, is the concavity that may be left (see overlapper.decomposition).
+    It takes up to minutes the first time, and needs the extra `concave`. A mesh whose surface is open bounds no volume
+    and is skipped; with concave="enclose" CoACD lays walls around it. With concave="skip" all concave meshes are.
 
     Bodies that come, go or take over the id of another are noticed by `update()`, which marks every body with a user
     data entry. New bodies are read from a temporary .bullet file; if two stand at the same point, the
@@ -110,8 +118,15 @@ class Bodies:
     writes where this process cannot read.
     """
 
-    def __init__(self, physicsClientId: int = 0) -> None:
+    def __init__(
+        self, physicsClientId: int = 0, *, concave: Concave = "decompose", concave_threshold: float = 0.05
+    ) -> None:
+        if concave not in get_args(Concave):
+            raise ValueError(f"concave must be one of {', '.join(map(repr, get_args(Concave)))}, not {concave!r}")
+        check_threshold(concave_threshold)
         self.physicsClientId = physicsClientId
+        self._concave: Concave = concave
+        self._threshold = concave_threshold
         self._mark = f"overlapper {uuid.uuid4()}"
         self._bodies: dict[int, Body] = {}
         self._unidentified = 0
@@ -197,6 +212,11 @@ class Bodies:
         }
 
     @property
+    def decomposed(self) -> list[Decomposed]:
+        """The concave meshes that are modelled as unions of convex parts."""
+        return [each for body in self._bodies.values() for each in body.decomposed]
+
+    @property
     def skipped(self) -> list[Skipped]:
         """What is not modelled, one entry per body and link."""
         return [each for body in self._bodies.values() for each in body.skipped] + self._skipped_unidentified()
@@ -237,7 +257,8 @@ class Bodies:
             unidentified = len(file.bodies) - len(rows)
             self._rows = {id: rows[id] for id in hidden if id in rows}
         for id in fresh:
-            known[id] = read_body(client, id, file, file.bodies[rows[id]] if id in rows else None)
+            body = file.bodies[rows[id]] if id in rows else None
+            known[id] = read_body(client, id, file, body, self._concave, self._threshold)
             pybullet.addUserData(id, self._mark, "", physicsClientId=client)
         self._bodies = dict(sorted(known.items()))
         grown, self._unidentified = unidentified > self._unidentified, unidentified

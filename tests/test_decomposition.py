@@ -210,7 +210,7 @@ def test_an_open_surface_is_enclosed_only_when_asked():
 
 @pytest.mark.parametrize("threshold", [0, 0.005, 1.5, -1, float("nan")])
 def test_a_threshold_that_coacd_cannot_take_is_named(threshold):
-    with pytest.raises(ValueError, match=r"threshold must lie between 0\.01 and 1"):
+    with pytest.raises(ValueError, match=r"threshold of concavity must lie between 0\.01 and 1"):
         decompose(bent(), threshold=threshold)
 
 
