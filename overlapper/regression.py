@@ -1,48 +1,34 @@
 """Scenes run, written down, and compared with what was written down before.
 
-The expected file of a scene has the poses and the measures of some of its steps, so that geometry is compared on equal
-input, whatever the simulator of the day makes of the scene.
+Three things may move, and are told apart. The geometry is ours: the shapes and poses recorded, measured again. The
+shapes are the models', as they are read today. The dynamics are the simulator's: where it puts the shapes today.
 """
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Container, Generator, Iterable, Sequence
-from dataclasses import dataclass, field
-from itertools import groupby
-from pathlib import Path
+from collections.abc import Container, Generator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Shape, _core
+from overlapper import Hull, Placed, Shape, _core
+from overlapper.comparison import Differences, Move, compare_measures, compare_poses, loose_budgets, poses, shape_label
+from overlapper.expected import DRIFT, MEASURES, ROUNDING, Budget, Expected, Key, read_expected
 from overlapper.scene import Scene, SceneError, Step, broken, load_scene
+from overlapper.shape_text import alike, shape_of, text_of
 from overlapper.simulation import Bodies, Contact
-from overlapper.table import COLUMNS, POSE, Row, Value, key, placements, rows
-from overlapper.table_file import CsvTable, read_csv
+from overlapper.table import Row, key, placements, rows
+from overlapper.table_file import origin
 
 try:
     import pybullet
 except ImportError as error:
     raise ImportError("overlapper.regression needs pybullet: pip install 'overlapper[sim]'") from error
 
-__all__ = [
-    "Budget",
-    "Differences",
-    "Expected",
-    "Frame",
-    "Scene",
-    "SceneError",
-    "compare",
-    "load_scene",
-    "loose_budgets",
-    "read_expected",
-    "record",
-    "replay",
-    "run",
-]
+__all__ = ["Frame", "Scene", "SceneError", "Still", "Verdict", "examine", "load_scene", "record", "replay", "run"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,157 +87,132 @@ def _controlled(scene: Scene, step: Step | None, i: int) -> None:
         raise broken(scene.path, f"fails before step {i + 1}", error) from error
 
 
-# The columns of an expected file. A shape that meets no other has a row with the status "alone", of which the columns
-# of B and the measures are empty, so that every shape of a step is placed, and a pair out of nothing is noticed.
-EXPECTED_COLUMNS = [name for name in COLUMNS if name not in ("time_s", "nameA", "nameB", "fcl", "fcl_explanation")]
+# What is told of the overlaps when bodies are elsewhere, or are others: changes of a hundredth.
+HUNDREDTHS = {"volume": Budget(0.01, 0.0), "depth": Budget(0.01, 0.0)}
 
-# The measures that are compared, each with its columns.
-QUANTITIES = {
-    "volume": ["volume_m3"],
-    "centroid": ["centroid_x_m", "centroid_y_m", "centroid_z_m"],
-    "area": ["area_m2"],
-    "depth": ["depth_m"],
-    "normal": ["normal_x", "normal_y", "normal_z"],
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Budget:
-    """How far a quantity may be from what was recorded: `absolute` (SI units) + `relative` times the recorded one."""
-
-    relative: float
-    absolute: float
-
-    def spent(self, value: float, recorded: float) -> float:
-        """The part of the budget that a difference uses up; above 1 is too far."""
-        difference = abs(value - recorded)
-        allowed = self.absolute + self.relative * abs(recorded)
-        return difference / allowed if allowed else 0.0 if difference == 0 else math.inf
-
-
-# The budgets of a scene of polyhedra: five times what rounding did to the scenes when all their poses were moved by
-# less than a metre, which changed volumes by up to 2e-10 of themselves and centroids by up to 3e-12 m.
-ROUNDING = {
-    "volume": Budget(1e-9, 0.0),
-    "centroid": Budget(0.0, 1.5e-11),
-    "area": Budget(1e-9, 0.0),
-    "depth": Budget(1e-9, 1e-15),
-    "normal": Budget(0.0, 1e-12),
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Expected:
-    """What was recorded of a scene: some of its `steps`, at `tolerance`, and the budget of each quantity."""
-
-    steps: list[int]
-    tolerance: float
-    budgets: dict[str, Budget]
-    rows: list[Row] = field(default_factory=list)
-
-    def heading(self) -> dict[str, str]:
-        """The first lines of the file, which are written by hand where the defaults do not do."""
-        return {
-            "steps": " ".join(map(str, self.steps)),
-            "tolerance": repr(self.tolerance),
-            **{
-                f"budget {name}": f"relative {each.relative!r} absolute {each.absolute!r}"
-                for name, each in self.budgets.items()
-            },
-        }
-
-
-def read_expected(path: Path) -> Expected:
-    """An expected file. FileNotFoundError if there is none."""
-    heading = "".join(line for line in path.read_text(encoding="utf-8").splitlines(True) if line.startswith("#"))
-    number = r"([-+.e\d]+)"
-    steps = re.search(r"steps:? ([\d ]+)", heading)
-    tolerance = re.search(rf"tolerance:? {number}", heading)
-    if steps is None or tolerance is None:
-        raise ValueError(f"{path} must say `# steps <numbers>` and `# tolerance <number>` in its first lines")
-    budgets = re.findall(rf"budget (\w+): relative {number} absolute {number}", heading)
-    return Expected(
-        [int(step) for step in steps[1].split()],
-        float(tolerance[1]),
-        {name: Budget(float(relative), float(absolute)) for name, relative, absolute in budgets},
-        read_csv(path),
-    )
+# Where a scene is put to see what rounding alone does to its measures, in m.
+ASIDES = ((0.3, 0.7, 0.1), (-0.2, 0.4, 0.9), (0.6, -0.5, -0.3))
 
 
 def record(scene: Scene) -> None:
-    """Run the scene and write its expected file anew; the first lines of an old one stay in force."""
+    """Run the scene and write its expected file anew.
+
+    The steps, the tolerance and the budgets of an old file stay in force. A new file has four steps and budgets of five
+    times what rounding does to its measures when all is moved by less than a metre.
+    """
     try:
         old = read_expected(scene.expected)
+        made = _observed(scene, old)
     except FileNotFoundError:
-        old = Expected([scene.steps * quarter // 4 for quarter in (1, 2, 3, 4)], 1e-3, ROUNDING)
-    scene.expected.parent.mkdir(exist_ok=True)
-    table = CsvTable(scene.expected, old.heading(), EXPECTED_COLUMNS)
-    try:
-        for frame in run(scene, only=old.steps):
-            bodies = frame.bodies
-            still = Still(bodies.keys, bodies.shapes, bodies.positions, bodies.orientations, bodies.names)
-            table.write(still.rows(frame.step, old.tolerance))
-    finally:
-        table.close()
+        steps = sorted({max(scene.steps * quarter // 4, 1) for quarter in (1, 2, 3, 4)})
+        made = _observed(scene, Expected(steps, 1e-3, ROUNDING | DRIFT))
+        made.budgets.update(_needed(made))
+    made.write(scene.expected, origin())
 
 
-def replay(scene: Scene, expected: Expected, moved_by: Sequence[float] = (0.0, 0.0, 0.0)) -> list[Row]:
-    """The rows that today's geometry makes of the poses of an expected file; the simulator only builds the scene.
+def _observed(scene: Scene, wanted: Expected) -> Expected:
+    """What the scene is today, in the steps wanted."""
+    stills = _stills(scene, wanted.steps)
+    table = [row for step, still in stills.items() for row in still.rows(step, wanted.tolerance)]
+    shapes = {step: dict(zip(still.keys, still.shapes)) for step, still in stills.items()}
+    return Expected(wanted.steps, wanted.tolerance, dict(wanted.budgets), table, shapes)
+
+
+def _needed(made: Expected) -> dict[str, Budget]:
+    """Budgets of five times what rounding needs, to one digit; where it needs nothing, those made."""
+    return {
+        name: Budget(*(float(f"{5 * part * each:.0e}") for each in (budget.relative, budget.absolute)))
+        for name, part in _rounding(made).items()
+        for budget in [made.budgets[name]]
+        if part
+    }
+
+
+def _rounding(expected: Expected) -> dict[str, float]:
+    """The largest part of each budget of a measure that rounding takes when all is moved by less than a metre."""
+    spent = [compare_measures(expected.rows, replay(expected, aside), expected.budgets).spent for aside in ASIDES]
+    return {name: max(each[name] for each in spent) for name in spent[0]}
+
+
+def replay(expected: Expected, moved_by: Sequence[float] = (0.0, 0.0, 0.0)) -> list[Row]:
+    """The rows that today's geometry makes of the shapes and poses of an expected file, without a simulator.
 
     With `moved_by`, in m, all is moved before it is measured, and the rows are moved back: what differs is rounding.
     """
-    client = pybullet.connect(pybullet.DIRECT)
-    try:
-        _built(scene, client)
-        bodies = Bodies(client)
-    finally:
-        pybullet.disconnect(client)
     table: list[Row] = []
-    for step, recorded in groupby(expected.rows, lambda row: int(row["step"] or 0)):
-        poses = _poses(recorded)
-        if poses.keys() != set(bodies.keys):
-            raise ValueError(f"{scene.expected} does not have the shapes of the scene in step {step}: record it again")
-        ordered = np.array([poses[shape] for shape in bodies.keys])
-        still = Still(bodies.keys, bodies.shapes, ordered[:, :3] + moved_by, ordered[:, 3:], bodies.names)
-        table += still.rows(step, expected.tolerance)
+    for step, recorded in expected.rows_by_step():
+        table += Still.recorded(recorded, expected.shapes[step]).moved(moved_by).rows(step, expected.tolerance)
     for row in table:
-        for column, distance in zip(QUANTITIES["centroid"], moved_by):
+        for column, distance in zip(MEASURES["centroid"], moved_by):
             if row.get(column) is not None:
-                row[column] = _number(row, column) - distance
+                row[column] = float(row[column] or 0.0) - distance
     return table
-
-
-def _poses(recorded: Iterable[Row]) -> dict[tuple[Value, ...], list[Value]]:
-    """Position and orientation of every shape in the rows of one step, by (body, link, shape)."""
-    return {
-        tuple(row[f"{word}{side}"] for word in ("body", "link", "shape")): [row[part.format(side)] for part in POSE]
-        for row in recorded
-        for side in ("A" if row["status"] == "alone" else "AB")
-    }
 
 
 @dataclass(frozen=True, slots=True)
 class Still:
     """The shapes of a scene in one step, apart from the simulator; the fields are those of `simulation.Bodies`."""
 
-    keys: list[tuple[int, int, int]]
+    keys: list[Key]
     shapes: list[Shape]
     positions: NDArray[np.float64]
     orientations: NDArray[np.float64]
     names: dict[tuple[int, int], str]
+    colors: dict[tuple[int, int], tuple[float, float, float, float]]
+
+    @classmethod
+    def of(cls, bodies: Bodies) -> Still:
+        """The bodies as they are now, with the shapes as they will be read from a file."""
+        shapes = {id(shape): shape_of(text_of(shape)) for shape in bodies.shapes}
+        return cls(
+            list(bodies.keys),
+            [shapes[id(shape)] for shape in bodies.shapes],
+            bodies.positions.copy(),
+            bodies.orientations.copy(),
+            bodies.names,
+            bodies.colors,
+        )
+
+    @classmethod
+    def recorded(cls, recorded: Sequence[Row], shapes: dict[Key, Shape]) -> Still:
+        """The shapes of a step of an expected file where its rows say; names are numbers and all is grey."""
+        where = {each: pose for (_, each), pose in poses(recorded).items()}
+        keys = sorted(where)
+        ordered = np.array([where[each] for each in keys]).reshape(-1, 7)
+        links = {each[:2] for each in keys}
+        return cls(
+            keys,
+            [shapes[each] for each in keys],
+            ordered[:, :3],
+            ordered[:, 3:],
+            {(body, link): f"body {body}/link {link}" for body, link in links},
+            dict.fromkeys(links, (0.6, 0.6, 0.6, 1.0)),
+        )
+
+    def moved(self, by: Sequence[float]) -> Still:
+        """All of it, moved by a vector in m."""
+        return replace(self, positions=self.positions + by)
+
+    @property
+    def placed(self) -> list[Placed]:
+        """The shapes where they are, parallel to `keys`."""
+        return [Placed(*each) for each in zip(self.shapes, self.positions, self.orientations)]
 
     def rows(self, step: int, tolerance: float) -> list[Row]:
         """A row for each pair of shapes of different bodies that overlap or touch, and one for each shape alone."""
-        contacts = self._contacts(tolerance)
-        pairs = rows(step, 0.0, self, contacts)
+        pairs = rows(step, 0.0, self, self.contacts(tolerance))
         met = {shape for row in pairs for shape in (key(row)[:3], key(row)[3:])}
-        alone = [row for shape, row in placements(self, "A").items() if shape not in met]
-        return pairs + [{"step": step, **row, "status": "alone"} for row in alone]
+        return pairs + [row for row in self.placements(step) if key(row)[:3] not in met]
 
-    def _contacts(self, tolerance: float) -> list[Contact]:
+    def placements(self, step: int) -> list[Row]:
+        """A row for each shape, as if it were alone."""
+        return [{"step": step, **row, "status": "alone"} for row in placements(self, "A").values()]
+
+    def contacts(self, tolerance: float) -> list[Contact]:
+        """The pairs of shapes of different bodies that overlap or touch."""
         # Pairs of static bodies are in it, too: whether they may be left out is the simulator's business.
         pairs = _core.candidate_pairs(self.shapes, self.positions, self.orientations)
-        bodies = np.array(self.keys)[:, 0]
+        bodies = np.array(self.keys).reshape(-1, 3)[:, 0]
         pairs = pairs[bodies[pairs[:, 0]] != bodies[pairs[:, 1]]]
         overlaps = _core.overlap_pairs(self.shapes, self.positions, self.orientations, pairs, tolerance)
         return [
@@ -261,72 +222,122 @@ class Still:
         ]
 
 
-@dataclass(frozen=True, slots=True)
-class Differences:
-    """`failures`: a sentence for each row that is not as recorded.
+def _stills(scene: Scene, steps: Sequence[int]) -> dict[int, Still]:
+    """Today's scene in some of its steps."""
+    last = min(max(steps), scene.steps)
+    return {frame.step: Still.of(frame.bodies) for frame in run(scene, last, only=steps)}
 
-    `spent`: the largest part of its budget that each quantity used up, 1 being all of it. `error_gain`: the sum of the
-    certified errors of the volumes over what it was when recorded, below 1 if they have become better.
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What has moved in a scene since it was recorded, by cause.
+
+    `geometry`: overlaps of the shapes and poses recorded, measured by today's package. `shapes`: shapes as today's
+    simulation has them. `dynamics`: poses of today's simulation. `overlaps`: what has become of the overlaps because of
+    the last two, and empty if both are as recorded. `notes`: sentences about budgets that do not fit. `before` and
+    `after` are the steps as recorded and as they are today.
     """
 
-    failures: list[str]
-    spent: dict[str, float]
-    error_gain: float
+    expected: Expected
+    geometry: list[Move]
+    shapes: list[Move]
+    dynamics: list[Move]
+    overlaps: list[Move]
+    notes: list[str]
+    before: dict[int, Still] = field(repr=False)
+    after: dict[int, Still] = field(repr=False)
+
+    @property
+    def causes(self) -> dict[str, list[Move]]:
+        """The moves by cause: a verdict on each of the three."""
+        return {"geometry": self.geometry, "shapes": self.shapes, "dynamics": self.dynamics}
+
+    @property
+    def moves(self) -> list[Move]:
+        """All that moved, the worst first; nothing, if all is as recorded."""
+        return sorted((move for moves in self.causes.values() for move in moves), key=lambda move: -move.part)
+
+    @property
+    def worst_step(self) -> int:
+        """The step of the worst move: of the largest one that can be measured, or else of the first."""
+        measured = [move for move in self.moves if math.isfinite(move.part)]
+        return (measured or self.moves)[0].step
+
+    def lines(self, limit: int = 5) -> list[str]:
+        """The verdict on each cause, with its `limit` worst moves."""
+        sections = {
+            "geometry": (self.geometry, "overlaps of the shapes and poses recorded, measured today"),
+            "shapes": (self.shapes, "what today's models are read as"),
+            "dynamics": (self.dynamics, "where today's simulation puts them"),
+        }
+        if self.overlaps:
+            sections["overlaps"] = (self.overlaps, "what comes of it, where it is more than a hundredth")
+        lines = []
+        for cause, (moves, meaning) in sections.items():
+            lines.append(f"{cause:9} {f'{len(moves):,} moved' if moves else 'as recorded'} ({meaning})")
+            lines += [f"    {move}" for move in sorted(moves, key=lambda move: -move.part)[:limit]]
+            if len(moves) > limit:
+                lines.append(f"    and {len(moves) - limit:,} more")
+        return lines + [f"note      {note}" for note in self.notes]
 
 
-def compare(expected: Expected, found: list[Row]) -> Differences:
-    """Pairs and statuses must be those recorded, measures within their budgets, certified errors much the same."""
-    recorded = {(row["step"], *key(row)): row for row in expected.rows}
-    now = {(row["step"], *key(row)): row for row in found}
-    failures = [
-        f"{_label(recorded[k])} is recorded as {recorded[k]['status']}, not found" for k in recorded.keys() - now
+def examine(scene: Scene, expected: Expected) -> Verdict:
+    """Run the scene and compare it with what was recorded. SceneError if it fails."""
+    after = _stills(scene, expected.steps)
+    names = {link: name for still in after.values() for link, name in still.names.items()}
+    before = {step: Still.recorded(recorded, expected.shapes[step]) for step, recorded in expected.rows_by_step()}
+    geometry = compare_measures(expected.rows, replay(expected), expected.budgets, names)
+    today = [row for step, still in after.items() for row in still.placements(step)]
+    dynamics = compare_poses(expected.rows, today, expected.budgets, names)
+    shapes = _shape_moves(scene, before, after, names)
+    overlaps: list[Move] = []
+    if shapes or dynamics.moves:
+        today = [row for step, still in after.items() for row in still.rows(step, expected.tolerance)]
+        changes = compare_measures(expected.rows, today, HUNDREDTHS, names).moves
+        overlaps = [replace(move, allowed=math.nan) for move in changes if move.quantity != "volume_error_m3"]
+    return Verdict(
+        expected,
+        geometry.moves,
+        shapes,
+        dynamics.moves,
+        overlaps,
+        _notes(geometry, _rounding(expected), dynamics),
+        before,
+        after,
+    )
+
+
+def _shape_moves(
+    scene: Scene, before: dict[int, Still], after: dict[int, Still], names: dict[tuple[int, int], str]
+) -> list[Move]:
+    """The shapes that are not those recorded, each in the first step where it is so."""
+    moves: dict[str, Move] = {}
+    for step, recorded in before.items():
+        if step not in after:
+            moves.setdefault("", Move(step, "the scene", "last step", str(step), str(scene.steps)))
+            continue
+        was, now = (dict(zip(still.keys, still.shapes)) for still in (recorded, after[step]))
+        for k in sorted(was.keys() | now.keys()):
+            if k not in was or k not in now or not alike(was[k], now[k]):
+                who = shape_label(k, names)
+                moves.setdefault(who, Move(step, who, "shape", _described(was.get(k)), _described(now.get(k))))
+    return list(moves.values())
+
+
+def _described(shape: Shape | None) -> str:
+    if isinstance(shape, Hull):
+        return f"{shape} of {shape.volume:.9g} m³"
+    return "not there" if shape is None else str(shape)
+
+
+def _notes(geometry: Differences, rounding: dict[str, float], dynamics: Differences) -> list[str]:
+    """Which budgets do not fit: ten times too wide for what moves and for rounding, or too narrow for rounding."""
+    needed = {name: max(part, rounding[name]) for name, part in geometry.spent.items()}
+    if not dynamics.moves:
+        needed |= dynamics.spent
+    notes = [
+        f"the budget of {name} is too narrow: rounding alone takes {part:.3g} times of it when all is moved by a metre"
+        for name, part in rounding.items()
+        if part > 1
     ]
-    failures += [f"{_label(now[k])} is {now[k]['status']}, not recorded" for k in now.keys() - recorded]
-    spent = dict.fromkeys(expected.budgets, 0.0)
-    for k in recorded.keys() & now.keys():
-        failures += _row_failures(recorded[k], now[k], expected.budgets, spent)
-    before, after = (sum(_number(row, "volume_error_m3") for row in rows) for rows in (expected.rows, found))
-    return Differences(sorted(failures), spent, after / before if before else 1.0)
-
-
-def _row_failures(old: Row, new: Row, budgets: dict[str, Budget], spent: dict[str, float]) -> list[str]:
-    if old["status"] != new["status"]:
-        return [f"{_label(old)} is {new['status']}, recorded as {old['status']}"]
-    if old["status"] == "alone":
-        return []
-    failures = []
-    for name, budget in budgets.items():
-        parts = {column: budget.spent(_number(new, column), _number(old, column)) for column in QUANTITIES[name]}
-        spent[name] = max(spent[name], *parts.values())
-        failures += [
-            f"{_label(old)}: {column} is {new[column]}, recorded as {old[column]}, {part:.3g} times its budget"
-            for column, part in parts.items()
-            if not part <= 1  # as it is for a value that is not a number
-        ]
-    # Ten times, for the bound of one pair depends on the order of operations: moving a scene multiplied one by 4.7.
-    if _number(new, "volume_error_m3") > 10 * _number(old, "volume_error_m3"):
-        failures.append(f"{_label(old)}: volume_error_m3 is {new['volume_error_m3']}, was {old['volume_error_m3']}")
-    return failures
-
-
-def loose_budgets(differences: Differences) -> list[str]:
-    """A sentence for each budget that is ten times what these differences need, if there are any at all."""
-    loose = [
-        f"the budget of {name} is {1 / most:.3g} times what is needed"
-        for name, most in differences.spent.items()
-        if 0 < most < 0.1
-    ]
-    if differences.error_gain < 0.1:
-        loose.append(f"the certified errors of the volumes are {differences.error_gain:.3g} of those recorded")
-    return loose
-
-
-def _number(row: Row, column: str) -> float:
-    """A measure as a number; 0.0 where it has none, which is the same on both sides if the status is."""
-    value = row.get(column)
-    return float(value) if value is not None else 0.0
-
-
-def _label(row: Row) -> str:
-    a, b = ("/".join(str(part) for part in half) for half in (key(row)[:3], key(row)[3:]))
-    return f"step {row['step']}, body/link/shape {a}" + ("" if row["status"] == "alone" else f" and {b}")
+    return notes + loose_budgets(Differences([], needed, geometry.error_gain))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import difflib
 import importlib.util
+import re
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,6 +45,35 @@ def scene_paths() -> dict[str, Path]:
     folders = [checkout / "scenes"] if (checkout / "pyproject.toml").is_file() else []
     paths = {path.stem: path for folder in [*folders, Path("scenes")] for path in folder.glob("[!_]*.py")}
     return dict(sorted(paths.items()))
+
+
+def is_scene(path: Path) -> bool:
+    """True for a Python file with a docstring, STEPS and build(client); it is read, not run.
+
+    A file with the last two that is not Python at all counts as one, so that it is refused and not overlooked.
+    """
+    source = path.read_bytes()
+    # Most files are no scenes, and are not worth parsing.
+    if not all(re.search(pattern, source, re.MULTILINE) for pattern in (rb"^STEPS\b", rb"^def build\(\s*client\b")):
+        return False
+    try:
+        module = ast.parse(source)
+    except (SyntaxError, ValueError):
+        return True
+    # The lines found may be those of a string.
+    names = {node.name for node in module.body if isinstance(node, ast.FunctionDef)}
+    for node in module.body:
+        targets = getattr(node, "targets", [getattr(node, "target", None)])
+        names |= {target.id for target in targets if isinstance(target, ast.Name)}
+    return {"STEPS", "build"} <= names and ast.get_docstring(module) is not None
+
+
+def scenes_in(path: Path) -> list[Path]:
+    """The scene files in a folder and the folders in it, by name; or the one file. SceneError if there is none."""
+    paths = [path] if path.is_file() else sorted(filter(is_scene, path.rglob("*.py")))
+    if not paths:
+        raise SceneError(f"there is no scene in {path}" if path.is_dir() else f"there is no scene file {path}")
+    return paths
 
 
 def headline(path: Path) -> str:

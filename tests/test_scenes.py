@@ -1,20 +1,17 @@
-"""The scenes: their geometry is as recorded, on the poses recorded, and what they promise is what happens."""
+"""The scenes: what they promise is what happens. That they are as recorded is tested by `pytest scenes`."""
 
-import warnings
 from functools import lru_cache
 from pathlib import Path
 
 import pytest
 
+from overlapper.comparison import compare_measures
+from overlapper.expected import read_expected
 from overlapper.reference import Fcl
-from overlapper.regression import compare, load_scene, loose_budgets, read_expected, record, replay, run
+from overlapper.regression import load_scene, replay, run
 
 SCENES = Path(__file__).parents[1] / "scenes"
 NAMES = sorted(path.stem for path in SCENES.glob("*.py"))
-
-
-class LooseBudget(UserWarning):
-    """A budget in an expected file could be ten times tighter."""
 
 
 @lru_cache
@@ -34,21 +31,10 @@ def overlapping_at_the_end(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_geometry_is_as_recorded_on_the_poses_recorded(name, request):
-    if request.config.getoption("record"):
-        record(scene(name))
-    expected = read_expected(scene(name).expected)
-    differences = compare(expected, replay(scene(name), expected))
-    assert not differences.failures, "\n".join(differences.failures[:20])
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_measures_stay_within_their_budgets_when_a_scene_is_moved(name):
     expected = read_expected(scene(name).expected)
-    differences = compare(expected, replay(scene(name), expected, moved_by=(0.3, 0.7, 0.1)))
-    for sentence in loose_budgets(differences):
-        warnings.warn(f"{scene(name).expected.name}: {sentence}", LooseBudget, stacklevel=1)
-    assert all(part <= 1 for part in differences.spent.values()), differences.spent
+    spent = compare_measures(expected.rows, replay(expected, moved_by=(0.4, -0.1, 0.8)), expected.budgets).spent
+    assert all(part <= 1 for part in spent.values()), spent
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -93,5 +79,5 @@ def test_the_jenga_tower_stands_at_first_and_has_fallen_in_the_end():
 
 def test_expected_files_are_small_enough_to_be_kept_in_git():
     sizes = [path.stat().st_size for path in (SCENES / "expected").glob("*.csv")]
-    assert max(sizes) <= 300_000
+    assert max(sizes) <= 400_000
     assert sum(sizes) <= 2_000_000
