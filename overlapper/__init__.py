@@ -21,13 +21,13 @@ from overlapper._core import (
     overlaps,
     penetration_depth,
 )
-from overlapper.sampling import random_polytope
 
 if TYPE_CHECKING:
     from overlapper.database import read_polytopes as read_polytopes
     from overlapper.database import write_polytopes as write_polytopes
     from overlapper.mesh_file import read_hull as read_hull
     from overlapper.mesh_file import write_mesh as write_mesh
+    from overlapper.sampling import random_polytope
 
 Shape = Box | Sphere | Capsule | Cylinder | Hull | HalfSpace
 
@@ -52,8 +52,10 @@ __all__ = [
     "random_polytope",
 ]
 
-# Imported when asked for, and not by *, as their modules need more than numpy.
+# Imported when asked for. What needs more than numpy is not imported by *, either; what needs numpy would make every
+# start of pytest wait for it, as the plugin is a module of this package.
 _LAZY = {
+    "random_polytope": "sampling",
     "read_polytopes": "database",
     "write_polytopes": "database",
     "read_hull": "mesh_file",
