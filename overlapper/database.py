@@ -8,7 +8,7 @@ as the corners determine them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from itertools import groupby, islice
 from operator import index
 from pathlib import Path
@@ -59,8 +59,10 @@ def read_polytopes(
     the database refuses.
     """
     _must_exist(sql.make_url(url))
-    with _engine(url) as engine, engine.connect() as connection:
-        rows = connection.execution_options(yield_per=ROWS).execute(sql.text(query or ALL))
+    with ExitStack() as stack:
+        connection = stack.enter_context(stack.enter_context(_engine(url)).connect())
+        # Closed first, as a server keeps a cursor for it.
+        rows = stack.enter_context(connection.execution_options(yield_per=ROWS).execute(sql.text(query or ALL)))
         if len(rows.keys()) != 4:
             raise ValueError(f"the query must return id, x, y and z, not {', '.join(rows.keys())}")
         met = set()
