@@ -1,6 +1,5 @@
 #include "clip.h"
 
-#include <cfloat>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -326,10 +325,11 @@ class Sums {
       ++common.facets_touched;
     }
     if (!(least_slack > least)) return std::nullopt;
-    // As for a region: every plane moved by its rounding, growth on the way included. Then the sums themselves: each
-    // product of three coordinates is rounded less than eight times, and then added.
+    // As for a region: every plane moved by its rounding, growth on the way included. Then each product of three
+    // coordinates, rounded less than eight times, and the sum of the tetrahedra, of which none is negative.
     const double grown = 1 + rounding / least_slack;
-    const double summed = (8 + static_cast<double>(w_.edges.size() + w_.seam.size())) * DBL_EPSILON / 6 * lost_;
+    const double terms = 2 * static_cast<double>(w_.edges.size() + w_.seam.size());
+    const double summed = 8 * 0x1p-53 * lost_ / 6 + terms * 0x1p-53 * common.volume;
     common.volume_error = rounding * common.area * (grown * grown + grown + 1) / 3 + summed;
     common.measured = common.volume_error <= kEnough * common.volume;
     return common;
