@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from overlapper import read_hull
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
@@ -109,3 +111,11 @@ def test_fcl_is_asked_and_survived(run):
         ("cubes, edge on edge", "crashed"),
     ]
     assert "by us -1e-05 m (overlapping), exactly -1e-05 m" in text and "so ours is nearer" in text
+
+
+def test_polytopes_of_a_database_share_less_than_each_of_them(run, tmp_path):
+    text = run("polytopes_from_a_database.py")
+    volumes = [volume for _, volume in numbers(r"polytope (\d): \d+ corners, ([\d.]+) m³", text)]
+    ((common,),) = numbers(r"all share +([\d.]+) m³", text)
+    assert len(volumes) == 5 and 0.0 < common < min(volumes)
+    assert read_hull(tmp_path / "common.stl").volume == pytest.approx(common, rel=1e-5)
