@@ -315,7 +315,7 @@ class Overlap:
 
     @property
     def facets_touched(self) -> int:
-        """How many planes of the shapes took part in building the polytope."""
+        """How many planes of the shapes took part in the measures."""
 
     @property
     def volume(self) -> float:
@@ -327,8 +327,9 @@ class Overlap:
         m³, certified: the true volume is within volume ± volume_error.
 
         For polyhedra it bounds the rounding: every plane moved by 16 half-ulps of the coordinates' magnitude, times the
-        area. For smooth shapes it is the share of the volume between an outer and an inner polytope, plus that. A pair
-        that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
+        area. For smooth shapes it is the share of the volume between an outer and an inner polytope, plus that; or that
+        alone where a formula gives the measures: balls and ends of capsules with each other; a ball, capsule or cylinder that
+        at most one plane of a half-space, box or hull cuts. A pair that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
         difference from what 'auto' finds, plus the error of that. 0 if separated.
         """
 
@@ -341,7 +342,7 @@ class Overlap:
 
     @property
     def area(self) -> float:
-        """m², of the surface of the common polytope; 0 unless overlapping."""
+        """m², of the surface of the common set; 0 unless overlapping."""
 
     @property
     def centroid(self) -> numpy.typing.NDArray[numpy.float64] | None:

@@ -65,7 +65,10 @@ def assert_is_a_closed_polytope(answer):
     corners = answer.vertices[answer.faces]
     doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert_allclose(doubled.sum(0), 0, atol=1e-14 * np.abs(doubled).sum())
-    assert np.linalg.norm(doubled, axis=1).sum() / 2 == pytest.approx(answer.area, rel=1e-12)
+    smooth = any(isinstance(body.shape, Sphere | Capsule | Cylinder) for body in answer.shapes)
+    # The polytope around a smooth part may have to shrink by the tolerance to fit inside.
+    rel = 3 * answer.tolerance if smooth else 1e-12
+    assert np.linalg.norm(doubled, axis=1).sum() / 2 == pytest.approx(answer.area, rel=rel)
     assert_array_equal(answer.bounds, [answer.vertices.min(0), answer.vertices.max(0)])
 
 
@@ -147,14 +150,15 @@ def test_smooth_closed_forms_hold_wherever_the_scene_stands(shapes, volume):
     assert_holds(overlap(*turned[::-1]), volume)
 
 
-def test_lens_narrows_to_the_truth_with_the_tolerance():
-    bodies, errors = (Sphere(1), Placed(Sphere(1), (1, 0, 0))), []
+def test_error_narrows_with_the_tolerance_where_there_is_no_closed_form():
+    cylinders = (Cylinder(1, 4), Placed(Cylinder(1, 4), (0, 0, 0), (np.sqrt(0.5), 0, 0, np.sqrt(0.5))))
+    errors = []
     for tolerance in (1e-1, 1e-2, 1e-3, 1e-4):
-        answer = overlap(*bodies, tolerance=tolerance)
-        assert_holds(answer, lens(1, 1, 1))
+        answer = overlap(*cylinders, tolerance=tolerance)
+        assert_holds(answer, 16 / 3)
         errors.append(answer.volume_error)
     assert errors == sorted(errors, reverse=True)
-    assert errors[-1] <= 3e-4 * lens(1, 1, 1)
+    assert errors[-1] <= 3e-4 * 16 / 3
 
 
 def test_lens_has_its_depth_normal_and_centre():

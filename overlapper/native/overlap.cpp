@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "canonical_order.h"
+#include "closed_forms.h"
 #include "expanding_hull.h"
 #include "minkowski.h"
 #include "paper.h"
@@ -220,7 +221,7 @@ bool Overlap::widened() const {
 
 int Overlap::facets_touched() const {
   if (status_ != Status::kOverlapping) return 0;
-  return clipped_ ? clipped_->facets_touched : region().facets_touched;
+  return clipped_ ? clipped_->facets_touched : quantities().facets_touched;
 }
 
 /// The inradius is rounding, and a convex set's volume is at most its inradius times its surface, which is no larger
@@ -256,6 +257,15 @@ const Region& Overlap::grown() const {
 const Quantities& Overlap::measured() const {
   std::optional<Quantities>& kept = lazy().quantities;
   if (kept) return *kept;
+  if (pair() && method_ == Method::kAuto) {
+    const Arrangement& at = arrangement();
+    const std::vector<double>& reach = search().reach;
+    kept = closed_form(at.relative[0], at.relative[1], rounding(std::max(reach[0], reach[1])), at.reference);
+    if (kept) {
+      for (Quantities::Pull& pull : kept->pulls) pull.owner = at.order[pull.owner];
+      return *kept;
+    }
+  }
   const Region& region = grown();
   Quantities found = measure(region);
   const bool enough = found.volume_error <= kEnough * found.volume;
@@ -279,6 +289,15 @@ const Region& Overlap::region() const {
 const Quantities& Overlap::quantities() const {
   const std::scoped_lock lock(mutex_);
   return measured();
+}
+
+Mat3 Overlap::inertia() const {
+  const Quantities& q = quantities();
+  if (!q.closed_form) return q.inertia;
+  const Quantities of_polytope = measure(region());
+  const double share = q.volume / of_polytope.volume;
+  const Mat3& i = of_polytope.inertia;
+  return {share * i.row0, share * i.row1, share * i.row2};
 }
 
 const Surface& Overlap::surface() const {

@@ -46,6 +46,8 @@ class Overlap {
   /// Only for overlapping bodies.
   const Region& region() const;
   const Quantities& quantities() const;
+  /// Inertia tensor about the centroid, unit density; by the polytope where the other quantities have closed forms.
+  Mat3 inertia() const;
   const Surface& surface() const;
 
   /// Per body: d volume / d translation, then / d rotation vector about the body's position; zeros unless overlapping.

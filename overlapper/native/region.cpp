@@ -121,6 +121,7 @@ std::optional<Region> widened(std::span<const Placed> bodies, const Region& regi
     const double rounding = duals[p].slack * kWideRounding * std::max(1.0, norm(duals[p].point) * farthest);
     wide.facets.push_back({duals[p].normal, duals[p].slack, rounding, duals[p].owner});
   }
+  wide.facets_touched = region.facets_touched;
   wide.inner.assign(wide.polytope.vertices.size(), 1);
   return wide;
 }
@@ -165,6 +166,7 @@ Quantities measure(const Region& region) {
   const Mat3& axes = region.frame.axes;
   const double scale = determinant(axes);
   Quantities q;
+  q.facets_touched = region.facets_touched;
   const double outer = scale * in_frame.volume;
   const bool exact = std::all_of(region.inner.begin(), region.inner.end(), [](double t) { return t == 1; });
   const double inner = exact ? outer : scale * inner_volume(region);

@@ -47,15 +47,17 @@ std::optional<Region> widened(std::span<const Placed> bodies, const Region& regi
 struct Quantities {
   double volume = 0, volume_error = 0, area = 0;
   Vec3 centroid;
-  Mat3 inertia;  ///< about the centroid, unit density
+  Mat3 inertia;  ///< about the centroid, unit density; of no meaning for a closed form
   /// A facet's pull: the derivative of the volume by moving the body that owns it.
   struct Pull {
     int owner;
     Vec3 area_vector;  ///< outward, of length the facet's area
     Vec3 centroid;
   };
-  std::vector<Pull> pulls;  ///< one per facet
-  bool widened = false;     ///< double arithmetic was not enough
+  std::vector<Pull> pulls;   ///< one per facet
+  bool widened = false;      ///< double arithmetic was not enough
+  bool closed_form = false;  ///< without a polytope: see closed_forms.h
+  int facets_touched = 0;    ///< how many planes of the bodies entered
 };
 Quantities measure(const Region& region);
 

@@ -118,8 +118,9 @@ void define_measures(nb::class_<Overlap>& cls) {
       R"(m³, certified: the true volume is within volume ± volume_error.
 
 For polyhedra it bounds the rounding: every plane moved by 16 half-ulps of the coordinates' magnitude, times the
-area. For smooth shapes it is the share of the volume between an outer and an inner polytope, plus that. A pair
-that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
+area. For smooth shapes it is the share of the volume between an outer and an inner polytope, plus that; or that
+alone where a formula gives the measures: balls and ends of capsules with each other; a ball, capsule or cylinder that
+at most one plane of a half-space, box or hull cuts. A pair that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
 difference from what 'auto' finds, plus the error of that. 0 if separated.)");
   cls.def_prop_ro(
       "widened", [](const Overlap& o) { return measured(o).widened(); },
@@ -127,7 +128,7 @@ difference from what 'auto' finds, plus the error of that. 0 if separated.)");
 arithmetic from the shapes' own numbers, as were centroid, area, inertia and gradient.)");
   cls.def_prop_ro(
       "area", [](const Overlap& o) { return measured(o).area(); },
-      "m², of the surface of the common polytope; 0 unless overlapping.");
+      "m², of the surface of the common set; 0 unless overlapping.");
   cls.def_prop_ro(
       "centroid",
       [](const Overlap& o) -> nb::object {
@@ -137,9 +138,7 @@ arithmetic from the shapes' own numbers, as were centroid, area, inertia and gra
       "(3,) centre of the common volume, m; None unless overlapping.");
   array_property(
       cls, "inertia",
-      [](const Overlap& o) {
-        return solid(o) ? to_numpy(measured(o).quantities().inertia) : to_numpy(Mat3{{}, {}, {}});
-      },
+      [](const Overlap& o) { return solid(o) ? to_numpy(measured(o).inertia()) : to_numpy(Mat3{{}, {}, {}}); },
       "(3, 3) inertia tensor about the centroid at unit density, world axes, m⁵ (trimesh's moment_inertia); zeros "
       "unless overlapping.");
   array_property(
@@ -226,7 +225,7 @@ polytope contains the common set and could shrink into it by the fraction `toler
       nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
   cls.def_prop_ro(
       "facets_touched", [](const Overlap& o) { return o.facets_touched(); },
-      "How many planes of the shapes took part in building the polytope.");
+      "How many planes of the shapes took part in the measures.");
   define_measures(cls);
   define_surface(cls);
   define_contact(cls);

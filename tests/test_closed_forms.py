@@ -1,0 +1,111 @@
+"""Where a formula gives the measures, they are right to rounding, whatever the tolerance."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from strategies import quaternions, reach
+
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Placed, Sphere, overlap
+
+ROUNDING = 1e-13
+share = st.floats(-1, 1)
+size = st.floats(0.05, 2)
+SOLIDS = {
+    "ball": lambda r, h: Sphere(r),
+    "capsule": lambda r, h: Capsule(r, 2 * h),
+    "cylinder": lambda r, h: Cylinder(r, 2 * h),
+}
+
+
+@st.composite
+def cut_solids(draw):
+    """A solid about the origin and a plane (normal, offset) through it: upright, level, nearly so, or anyhow."""
+    solid = SOLIDS[draw(st.sampled_from(sorted(SOLIDS)))](draw(size), draw(size))
+    tilt = draw(st.sampled_from([0, 1e-12, 1e-6, 1e-3, 0.1, 0.7, np.pi / 2 - 1e-9, np.pi / 2]))
+    around = draw(st.floats(0, 2 * np.pi))
+    normal = np.array([np.sin(tilt) * np.cos(around), np.sin(tilt) * np.sin(around), np.cos(tilt)])
+    return solid, normal, draw(share) * reach(Placed(solid), normal)
+
+
+@given(cut_solids())
+def test_two_parts_make_the_whole(case):
+    solid, normal, offset = case
+    below, above = overlap(solid, HalfSpace(normal, offset)), overlap(solid, HalfSpace(-normal, -offset))
+    assume(below and above)
+    assert below.volume + above.volume == pytest.approx(solid.volume, rel=ROUNDING)
+    moments = below.volume * below.centroid + above.volume * above.centroid
+    assert_allclose(moments, 0, atol=ROUNDING * solid.volume * (solid.radius + np.max(np.abs(moments))))
+    assert below.volume_error + above.volume_error <= 1e-12 * (solid.volume + below.area + above.area)
+
+
+@given(cut_solids())
+def test_volume_grows_by_the_area_of_the_cut(case):
+    solid, normal, offset = case
+    whole, step = reach(Placed(solid), normal), 1e-4 * solid.radius
+    assume(abs(offset) < whole - 10 * step)
+    volumes = [overlap(solid, HalfSpace(normal, offset + k * step)).volume for k in (-1, 0, 1)]
+    here = overlap(solid, HalfSpace(normal, offset))
+    slope = (volumes[2] - volumes[0]) / (2 * step)
+    # The area of a section may have a kink, where the plane passes an end; it moves by less than this in a step.
+    kink = 8 * step * (solid.radius + getattr(solid, "length", 0)) / max(0.02, np.sqrt(1 - (offset / whole) ** 2))
+    if not isinstance(solid, Cylinder):
+        assert here.gradient[1, :3] @ normal == pytest.approx(slope, abs=kink)
+    assert_allclose(here.gradient[0] + here.gradient[1], 0, atol=1e-9 * (1 + np.abs(here.gradient).max()))
+
+
+@given(cut_solids(), quaternions())
+def test_a_closed_form_lies_within_the_bounds_of_a_polytope(case, turn):
+    solid, normal, offset = case
+    placed, plane = Placed(solid), HalfSpace(normal, offset)
+    exact = overlap(placed, plane)
+    assume(exact.volume > 1e-9 * solid.volume)
+    # A box around everything makes three bodies of them, for which there is no closed form.
+    around = Box([4 * (solid.radius + getattr(solid, "length", 0))] * 3)
+    polytope = overlap(placed, plane, around, tolerance=1e-2)
+    assert abs(exact.volume - polytope.volume) <= exact.volume_error + polytope.volume_error
+    assert_allclose(exact.centroid, polytope.centroid, atol=0.1 * (solid.radius + getattr(solid, "length", 0)))
+    moved = overlap(Placed(solid, (3, -2, 1), turn), Placed(plane, (3, -2, 1), turn))
+    assert moved.volume == pytest.approx(exact.volume, rel=1e-9, abs=1e-12)
+
+
+@given(size, size, st.floats(0, 1))
+def test_lens_is_the_closed_form_at_any_tolerance(r, s, share_of_depth):
+    distance = abs(r - s) + share_of_depth * (r + s - abs(r - s))
+    lens = overlap(Sphere(r), Placed(Sphere(s), (0, distance, 0)), tolerance=0.5)
+    assume(lens and distance > 1e-3)
+    truth = np.pi * (r + s - distance) ** 2 * (distance**2 + 2 * distance * (r + s) - 3 * (r - s) ** 2)
+    assert lens.volume == pytest.approx(truth / (12 * distance), rel=1e-9, abs=1e-12)
+    assert lens.volume_error <= 1e-12 * (lens.volume + lens.area)
+
+
+def test_ball_on_a_face_is_a_cap_and_on_an_edge_is_not():
+    box = Box([1, 1, 1])
+    on_face = overlap(Placed(Sphere(0.5), (0.2, -0.1, 1.4)), box)
+    assert on_face.volume == pytest.approx(np.pi * 0.1**2 * (1.5 - 0.1) / 3, rel=1e-12)
+    assert on_face.volume_error < 1e-14
+    on_edge = overlap(Placed(Sphere(0.5), (0.9, 0, 1.4)), box)
+    assert on_edge.volume_error > 1e-6
+    assert on_edge.volume < on_face.volume
+
+
+def test_ends_of_two_capsules_share_a_lens_and_their_sides_do_not():
+    end_on = overlap(Capsule(0.5, 1), Placed(Capsule(0.4, 1), (0.05, 0, 1.8)))
+    distance = np.hypot(0.05, 0.8)
+    lens = np.pi * (0.9 - distance) ** 2 * (distance**2 + 2 * distance * 0.9 - 3 * 0.1**2) / (12 * distance)
+    assert end_on.volume == pytest.approx(lens, rel=1e-11)
+    assert overlap(Capsule(0.5, 1), Placed(Capsule(0.4, 1), (0.8, 0, 0))).volume_error > 1e-6
+
+
+def test_solid_inside_the_other_is_whole():
+    for solid in (Sphere(0.5), Capsule(0.2, 0.4), Cylinder(0.3, 0.5)):
+        inside = overlap(Placed(solid, (0.1, 0, 0)), Box([1, 1, 1]))
+        assert inside.volume == pytest.approx(solid.volume, rel=1e-14)
+        assert_allclose(inside.centroid, [0.1, 0, 0], atol=1e-15)
+        assert_allclose(inside.gradient, 0, atol=1e-15)
+
+
+def test_inertia_of_a_closed_form_is_that_of_the_polytope_scaled_to_its_volume():
+    ball = overlap(Sphere(1), HalfSpace([0, 0, 1], 2), tolerance=1e-3)
+    assert_allclose(ball.inertia, 8 / 15 * np.pi * np.eye(3), rtol=3e-3, atol=3e-3)
