@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal, NoReturn
@@ -24,8 +24,9 @@ except ImportError:
     sys.exit(2)
 
 from overlapper import __version__
+from overlapper.links import link_contacts
 from overlapper.scene import SceneError, headline, load_scene, scene_paths, scenes_in
-from overlapper.table import rows
+from overlapper.table import link_rows, rows
 from overlapper.table_file import TABLES, origin
 
 if TYPE_CHECKING:
@@ -103,6 +104,17 @@ def run(
         Literal["auto", "paper"], typer.Option(help="How overlaps are computed; `paper` is the article, step for step.")
     ] = "auto",
     tolerance: Annotated[float, typer.Option(help="Relative accuracy of smooth shapes; polyhedra are exact.")] = 1e-3,
+    per: Annotated[
+        Literal["shape", "link"],
+        typer.Option(help="What the rows of --out are of: two shapes, or two links as a whole."),
+    ] = "shape",
+    concave: Annotated[
+        Literal["decompose", "enclose", "skip"],
+        typer.Option(help="Concave meshes: as convex parts, open ones too with walls around them, or not at all."),
+    ] = "decompose",
+    concave_threshold: Annotated[
+        float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
+    ] = 0.05,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
     """Simulate a scene and measure what its bodies have in common in every step.
@@ -124,10 +136,18 @@ def run(
         raise Refused(f"--tolerance must lie between 0 and 1, not {tolerance}")
     if out and out.suffix not in TABLES:
         raise Refused(f"--out must end in {', '.join(TABLES)}, not {out.name!r}")
-    summary, finished = _measure(scene, steps, out, html, check is not None, method, tolerance)
+    if not 0.01 <= concave_threshold <= 1:
+        raise Refused(f"--concave-threshold must lie between 0.01 and 1, not {concave_threshold}")
+    geometry = {
+        "tolerance": tolerance,
+        "method": method,
+        "concave": concave,
+        "concave_threshold": concave_threshold,
+    }
+    summary, finished = _measure(scene, steps, out, html, check is not None, per, geometry)
     files = {name: str(path) for name, path in (("out", out), ("html", html)) if path}
     if as_json:
-        print(json.dumps(summary.as_dict() | {"finished": finished, "method": method, "tolerance": tolerance} | files))
+        print(json.dumps(summary.as_dict() | {"finished": finished} | geometry | files))
     else:
         _show(summary, finished, files)
     if not finished:
@@ -356,8 +376,8 @@ def _measure(
     out: Path | None,
     html: Path | None,
     check: bool,
-    method: Literal["auto", "paper"],
-    tolerance: float,
+    per: Literal["shape", "link"],
+    geometry: Mapping[str, Any],
 ) -> tuple[Summary, bool]:
     """The run, with its files; False if it was interrupted, and then both have what was done until then."""
     with _quiet() as noise, _refusals(noise), ExitStack() as stack:
@@ -373,18 +393,22 @@ def _measure(
         settings = {
             "scene": scene.name,
             "steps": str(steps or scene.steps),
-            "tolerance": repr(tolerance),
-            "method": method,
+            "per": per,
+            **{setting: str(value) for setting, value in geometry.items()},
         }
         table = stack.enter_context(closing(TABLES[out.suffix](out, origin() | settings))) if out else None
         record = stack.enter_context(_recorder(html)) if html else None
-        frames = stack.enter_context(closing(frames_of(scene, steps, tolerance, method)))
+        frames = stack.enter_context(closing(frames_of(scene, steps, **geometry)))
         summary = Summary(scene.name)
         try:
             for frame in _with_progress(frames, scene.name, steps or scene.steps):
                 opinions = fcl.compare_many(contact.overlap for contact in frame.contacts) if fcl else []
                 if table:
-                    table.write(rows(frame.step, frame.time, frame.bodies, frame.contacts, opinions))
+                    where = frame.step, frame.time, frame.bodies
+                    if per == "link":
+                        table.write(link_rows(*where, link_contacts(frame.contacts)))
+                    else:
+                        table.write(rows(*where, frame.contacts, opinions))
                 summary.add(frame, opinions)
                 if record:
                     record(frame)
@@ -465,7 +489,7 @@ def _show(summary: Summary, finished: bool, files: dict[str, str]) -> None:
     console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
     console.print(overlaps_table(summary) if summary.pairs else f"Nothing overlaps in {summary.steps} steps.")
     for line in remarks(summary):
-        console.print(line, markup=False)
+        console.print(line, markup=False, soft_wrap=True)
     if not finished:
         console.print(f"Interrupted after step {summary.steps}; what came before is kept.")
     for path in files.values():

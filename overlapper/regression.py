@@ -19,7 +19,7 @@ from overlapper.comparison import Differences, Move, compare_measures, compare_p
 from overlapper.expected import DRIFT, MEASURES, ROUNDING, Budget, Expected, Key, read_expected
 from overlapper.scene import Scene, SceneError, Step, broken, load_scene
 from overlapper.shape_text import alike, shape_of, text_of
-from overlapper.simulation import Bodies, Contact
+from overlapper.simulation import Bodies, Concave, Contact
 from overlapper.table import Row, key, placements, rows
 from overlapper.table_file import origin
 
@@ -47,16 +47,18 @@ def run(
     tolerance: float = 1e-3,
     method: Literal["auto", "paper"] = "auto",
     only: Container[int] | None = None,
+    concave: Concave = "decompose",
+    concave_threshold: float = 0.05,
 ) -> Generator[Frame, None, None]:
     """Build the scene in a client of its own and step it, `scene.steps` times by default.
 
     Every step is a frame, the first has number 1; or only those in `only`, if given. `tolerance` and `method` are those
-    of `overlapper.overlap`. SceneError if the scene itself fails.
+    of `overlapper.overlap`, `concave` and `concave_threshold` of `Bodies`. SceneError if the scene itself fails.
     """
     client = pybullet.connect(pybullet.DIRECT)
     try:
         step = _built(scene, client)
-        bodies = Bodies(client)
+        bodies = Bodies(client, concave=concave, concave_threshold=concave_threshold)
         seconds = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
         for i in range(steps or scene.steps):
             _controlled(scene, step, i)

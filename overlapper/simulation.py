@@ -42,7 +42,7 @@ try:
 except ImportError as error:
     raise ImportError("overlapper.simulation needs pybullet: pip install 'overlapper[sim]'") from error
 
-__all__ = ["Bodies", "Contact", "Decomposed", "Report", "Skipped", "SkippedShapeWarning"]
+__all__ = ["Bodies", "Concave", "Contact", "Decomposed", "Report", "Skipped", "SkippedShapeWarning"]
 
 
 class SkippedShapeWarning(UserWarning):

@@ -12,9 +12,10 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from overlapper.links import LinkContact, link_contacts
 from overlapper.reference import Comparison
 from overlapper.regression import Frame
-from overlapper.simulation import Contact, Report, Skipped
+from overlapper.simulation import Decomposed, Report, Skipped
 
 # Units for the volumes of one table, in m³: the largest of them that makes the largest volume a tenth or more.
 VOLUME_UNITS = {"m³": 1.0, "cm³": 1e-6, "mm³": 1e-9, "µm³": 1e-18}
@@ -28,13 +29,12 @@ ROUNDED_UP = Context(prec=1, rounding=ROUND_UP)
 class PairSummary:
     """Two links over a run: in how many steps they overlap, and the figures of the largest overlap, with its step.
 
-    Volumes are in m³, lengths in m, each of one shape of either link: the shapes of a link may overlap each other, so
-    that sums would count some volumes twice. `normal` is that of the largest depth, from the second link to the first.
+    Volumes are in m³ and of the links as a whole, where the shapes of one overlap each other counted once. Depths are
+    in m and of two of their shapes; `normal` is that of the largest, from the second link to the first.
     """
 
     names: tuple[str, str]
     steps: int = 0
-    last_step: int = 0
     volume: float = 0.0
     volume_error: float = 0.0
     volume_step: int = 0
@@ -42,16 +42,13 @@ class PairSummary:
     depth_step: int = 0
     normal: tuple[float, ...] = ()
 
-    def add(self, step: int, contact: Contact) -> None:
-        """Take in an overlap of two of their shapes; all those of one step come one after the other."""
-        overlap = contact.overlap
-        assert overlap.depth is not None and overlap.normal is not None
-        if step != self.last_step:
-            self.steps, self.last_step = self.steps + 1, step
-        if overlap.volume > self.volume:
-            self.volume, self.volume_error, self.volume_step = overlap.volume, overlap.volume_error, step
-        if overlap.depth > self.depth:
-            self.depth, self.depth_step, self.normal = overlap.depth, step, tuple(overlap.normal.tolist())
+    def add(self, step: int, pair: LinkContact) -> None:
+        """Take in what the links have in common in a step."""
+        self.steps += 1
+        if pair.volume > self.volume:
+            self.volume, self.volume_error, self.volume_step = pair.volume, pair.volume_error, step
+        if pair.depth > self.depth:
+            self.depth, self.depth_step, self.normal = pair.depth, step, tuple(pair.normal.tolist())
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +71,7 @@ class Summary:
     pairs: dict[tuple[int, int, int, int], PairSummary] = field(default_factory=dict)
     report: Report | None = None
     skipped: list[Skipped] = field(default_factory=list)
+    decomposed: list[Decomposed] = field(default_factory=list)
     verdicts: Counter[str] = field(default_factory=Counter)
     disagreements: list[Disagreement] = field(default_factory=list)
 
@@ -81,15 +79,15 @@ class Summary:
         """Take in a frame; `opinions` are FCL's of its contacts, if it was asked."""
         self.steps, self.seconds = frame.step, frame.time
         self.report = _sum(self.report, frame.bodies.report())
-        self.skipped = frame.bodies.skipped
+        self.skipped, self.decomposed = frame.bodies.skipped, frame.bodies.decomposed
         names = frame.bodies.names
-        for k, contact in enumerate(frame.contacts):
-            links = (contact.bodyA, contact.linkA), (contact.bodyB, contact.linkB)
-            pair = names[links[0]], names[links[1]]
-            if contact.overlap:
-                self.pairs.setdefault(links[0] + links[1], PairSummary(pair)).add(frame.step, contact)
-            if opinions:
-                self._add_opinion(frame.step, pair, opinions[k])
+        for pair in filter(None, link_contacts(frame.contacts)):
+            key = pair.bodyA, pair.linkA, pair.bodyB, pair.linkB
+            self.pairs.setdefault(key, PairSummary((names[key[:2]], names[key[2:]]))).add(frame.step, pair)
+        for contact, opinion in zip(frame.contacts, opinions):
+            self._add_opinion(
+                frame.step, (names[contact.bodyA, contact.linkA], names[contact.bodyB, contact.linkB]), opinion
+            )
 
     def _add_opinion(self, step: int, names: tuple[str, str], opinion: Comparison) -> None:
         self.verdicts[opinion.verdict] += 1
@@ -122,6 +120,10 @@ class Summary:
             ],
             "report": asdict(self.report) if self.report else None,
             "skipped": [asdict(each) for each in self.skipped],
+            "decomposed": [
+                asdict(each) | {"shapes": [*each.shapes], "path": str(each.path) if each.path else None}
+                for each in self.decomposed
+            ],
             "fcl": dict(self.verdicts),
             "disagreements": [asdict(each) for each in self.disagreements],
         }
@@ -142,8 +144,9 @@ def overlaps_table(summary: Summary, limit: int = 20) -> Table:
     left_out = f"\nThe {limit} largest of {len(pairs)} pairs." if len(pairs) > limit else ""
     table = Table(
         title=f"Overlaps of {summary.scene} in {summary.steps} steps, {summary.seconds:.3g} s",
-        caption="Volume: the largest in any step, true to within ±. Depth: the shortest way to part the two, in the "
-        "step where that is longest. Normal: that way, for the first of them." + left_out,
+        caption="Volume: the largest in any step, true to within ±. Depth: the shortest way to part the two, or the "
+        "deepest of their shapes, in the step where that is longest. Normal: that way, for the first of them."
+        + left_out,
         caption_justify="left",
         box=SIMPLE_HEAD,
         show_edge=False,
@@ -171,6 +174,7 @@ def remarks(summary: Summary, limit: int = 10) -> list[str]:
     """What there is to say below the table: what was modelled and what not, and the first `limit` disagreements."""
     lines = str(summary.report).splitlines() if summary.report else []
     lines += [f"Not modelled: {each.name}, {each.reason}." for each in summary.skipped]
+    lines += [_decomposed(each) for each in summary.decomposed]
     if summary.verdicts:
         counts = ", ".join(f"{count:,} {verdict}" for verdict, count in summary.verdicts.most_common())
         lines.append(f"FCL on {sum(summary.verdicts.values()):,} pairs that overlap or touch: {counts}.")
@@ -180,3 +184,10 @@ def remarks(summary: Summary, limit: int = 10) -> list[str]:
         rest = len(summary.disagreements) - limit
         lines.append(f"  and {rest:,} more, each explained in the file of --out and by --json.")
     return lines
+
+
+def _decomposed(mesh: Decomposed) -> str:
+    parts = f"{len(mesh.shapes)} convex parts" if len(mesh.shapes) > 1 else "one convex part"
+    bounds = "surface is open" if mesh.mesh_volume is None else f"mesh bounds {mesh.mesh_volume:.4g} m³"
+    kept = f"; kept in {mesh.path}" if mesh.path else ""
+    return f"Concave: {mesh.name} is {parts} of {mesh.volume:.4g} m³ together, the {bounds}{kept}."

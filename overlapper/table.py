@@ -1,4 +1,4 @@
-"""A run as a table: one row per step and pair that overlaps or touches."""
+"""A run as a table: one row per step and pair, of shapes or of links, that overlaps or touches."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from overlapper.links import LinkContact
     from overlapper.reference import Comparison
     from overlapper.simulation import Contact
 
@@ -100,6 +101,30 @@ def rows(
                 **dict(zip(MEASURES, measures)),
                 "fcl": opinions[k].verdict if opinions else None,
                 "fcl_explanation": opinions[k].explanation if opinions else None,
+            }
+        )
+    return table
+
+
+def link_rows(step: int, time: float, bodies: Bodies, pairs: Sequence[LinkContact]) -> list[Row]:
+    """The rows of one step by links as a whole; columns of single shapes, their poses, area and FCL, are left empty."""
+    names = bodies.names
+    table: list[Row] = []
+    for pair in pairs:
+        centroid = [None] * 3 if pair.centroid is None else pair.centroid.tolist()
+        measures = [pair.volume, pair.volume_error, *centroid, None, pair.depth, *pair.normal.tolist()]
+        table.append(
+            {
+                "step": step,
+                "time_s": time,
+                "bodyA": pair.bodyA,
+                "linkA": pair.linkA,
+                "nameA": names[pair.bodyA, pair.linkA],
+                "bodyB": pair.bodyB,
+                "linkB": pair.linkB,
+                "nameB": names[pair.bodyB, pair.linkB],
+                "status": pair.status,
+                **dict(zip(MEASURES, measures)),
             }
         )
     return table

@@ -97,6 +97,97 @@ def test_what_is_not_modelled_is_named_below_the_table(tmp_path):
     assert done.stderr == ""
 
 
+CROSSES = '''
+"""Two crosses of three bars, 0.2 apart: in each, all bars lie over the middle."""
+import pybullet as p
+
+STEPS = 2
+
+
+def build(client):
+    bars = [[0.3, 0.1, 0.1], [0.1, 0.3, 0.1], [0.1, 0.1, 0.3]]
+    for x in (0.0, 0.2):
+        cross = p.createCollisionShapeArray(
+            [p.GEOM_BOX] * 3, halfExtents=bars, collisionFramePositions=[[0, 0, 0]] * 3, physicsClientId=client
+        )
+        p.createMultiBody(x, cross, basePosition=[x, 0, 0], physicsClientId=client)
+    p.setCollisionFilterPair(0, 1, -1, -1, 0, physicsClientId=client)
+'''
+
+
+def test_links_as_a_whole_are_measured_where_their_shapes_overlap_each_other(tmp_path):
+    (tmp_path / "crosses.py").write_text(CROSSES)
+    done = overlapper("run", "crosses.py", "--json", "--out", "shapes.csv")
+    (pair,) = json.loads(done.stdout)["pairs"]
+    # Each middle lies in an arm of the other.
+    assert pair["largest_volume_m3"] == pytest.approx(2 * 0.2**3, rel=1e-6)
+    assert pair["volume_error_m3"] < 1e-12
+    overlapper("run", "crosses.py", "--per", "link", "--out", "links.csv")
+    shapes, links = (read_csv(tmp_path / name) for name in ("shapes.csv", "links.csv"))
+    assert [row["step"] for row in links] == [1, 2]
+    for row in links:
+        assert row["shapeA"] is row["shapeB"] is row["area_m2"] is None
+        assert (row["nameA"], row["nameB"], row["status"]) == ("body 0/link0", "body 1/link0", "overlapping")
+        assert row["volume_m3"] == pytest.approx(2 * 0.2**3, rel=1e-6)
+        step = [each for each in shapes if each["step"] == row["step"]]
+        assert sum(each["volume_m3"] for each in step) > 1.4 * row["volume_m3"]
+        assert row["depth_m"] == max(each["depth_m"] for each in step)
+
+
+CUP = '''
+"""A ball lies a centimetre deep in an open box that is one concave mesh."""
+import pybullet as p
+
+STEPS = 1
+
+
+def build(client):
+    corners = [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    corners += [[x, y, z] for x in (-0.8, 0.8) for y in (-0.8, 0.8) for z in (-0.8, 1)]
+    bottom, well = [0, 2, 6, 4], [8, 12, 14, 10]
+    walls = [[0, 4, 5, 1], [4, 6, 7, 5], [6, 2, 3, 7], [2, 0, 1, 3]]
+    inside = [[8, 9, 13, 12], [12, 13, 15, 14], [14, 15, 11, 10], [10, 11, 9, 8]]
+    rim = [[1, 5, 13, 9], [5, 7, 15, 13], [7, 3, 11, 15], [3, 1, 9, 11]]
+    quads = [bottom, well, *walls, *inside, *rim]
+    indices = [corner for a, b, c, d in quads for corner in (a, b, c, a, c, d)]
+    cup = p.createCollisionShape(
+        p.GEOM_MESH, vertices=corners, indices=indices, meshScale=[0.1] * 3, physicsClientId=client
+    )
+    p.createMultiBody(0, cup, physicsClientId=client)
+    ball = p.createCollisionShape(p.GEOM_SPHERE, radius=0.03, physicsClientId=client)
+    p.createMultiBody(1, ball, basePosition=[0, 0, -0.06], physicsClientId=client)
+    p.setCollisionFilterPair(0, 1, -1, -1, 0, physicsClientId=client)
+    p.setGravity(0, 0, 0, physicsClientId=client)
+'''
+
+
+def test_a_concave_mesh_is_named_with_its_parts_and_where_they_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "cup.py").write_text(CUP)
+    first, second = (overlapper("run", "cup.py") for _ in range(2))
+    assert first.stdout == second.stdout
+    assert "CoACD decomposes a mesh of 28 triangles, once" in first.stderr and second.stderr == ""
+    words = (
+        r"^Concave: body 0/link0 is (\d+) convex parts of (\S+) m³ together, the mesh bounds (\S+) m³; kept in (.*)\.$"
+    )
+    parts, volume, mesh, path = re.search(words, first.stdout, re.MULTILINE).groups()
+    assert int(parts) >= 5
+    assert float(mesh) == pytest.approx(8e-3 - 0.16**2 * 0.18, rel=1e-3)
+    assert float(volume) == pytest.approx(float(mesh), rel=0.05)
+    assert (tmp_path / "cache") in Path(path).parents and Path(path).is_file()
+    (pair,) = json.loads(overlapper("run", "cup.py", "--json").stdout)["pairs"]
+    cap = 3.14159 * 0.01**2 * (0.09 - 0.01) / 3  # of a ball of 3 cm, 1 cm high
+    assert pair["largest_volume_m3"] == pytest.approx(cap, rel=0.05)
+    skipped = overlapper("run", "cup.py", "--concave", "skip")
+    assert "Not modelled: body 0/link0, a concave mesh is left out" in skipped.stdout
+
+
+def test_a_threshold_out_of_range_is_refused():
+    assert refusal("run", "two_cubes.py", "--concave-threshold", "2") == (
+        "overlapper: --concave-threshold must lie between 0.01 and 1, not 2.0\n"
+    )
+
+
 def test_a_run_prints_a_table_of_pairs_with_units():
     done = overlapper("run", "two_cubes.py")
     assert done.returncode == 0
