@@ -329,6 +329,91 @@ def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
     assert len(steps) - int(said[1]) in (0, 1)
 
 
+def checked(*arguments):
+    """Exit code, stdout and stderr of `overlapper check`."""
+    done = overlapper("check", *arguments)
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.fixture
+def two_scenes(tmp_path):
+    """A folder of scenes that are as recorded."""
+    (tmp_path / "guarded" / "deeper").mkdir(parents=True)
+    for path in ("one.py", "deeper/two.py"):
+        (tmp_path / "guarded" / path).write_text(TWO_CUBES)
+    (tmp_path / "guarded" / "no_scene.py").write_text("STEPS = 8")
+    assert checked("guarded", "--record")[0] == 0
+    return tmp_path / "guarded"
+
+
+def test_scenes_as_recorded_are_checked_with_exit_code_0(two_scenes):
+    code, said, complaints = checked("guarded")
+    assert (code, complaints.replace("a scene may talk\n", "")) == (0, "")
+    assert said == "guarded/deeper/two.py: as recorded\nguarded/one.py: as recorded\n"
+
+
+def test_a_scene_that_has_moved_is_told_with_exit_code_1(two_scenes):
+    (two_scenes / "one.py").write_text(TWO_CUBES.replace("[0, 0, 0.08]", "[0, 0, 0.07]"))
+    code, said, _ = checked("guarded", "--out", "pages")
+    assert code == 1
+    assert said.startswith("guarded/deeper/two.py: as recorded\nguarded/one.py: moved\n    geometry  as recorded")
+    assert "    dynamics  4 moved" in said
+    assert "off by 0.01 where 0.0001 is allowed, 100 times its budget" in said
+    assert "before and after: pages/one.moved.html" in said
+    assert [path.name for path in Path("pages").iterdir()] == ["one.moved.html"]
+
+
+def test_a_new_scene_is_written_with_exit_code_1_once(two_scenes):
+    (two_scenes / "three.py").write_text(TWO_CUBES)
+    assert checked("guarded/three.py")[:2] == (
+        1,
+        "guarded/three.py: new\n    written: guarded/expected/three.csv\n"
+        "    look at it, commit it, and the scene is guarded from now on\n",
+    )
+    assert checked("guarded/three.py")[0] == 0
+
+
+def test_scenes_that_cannot_be_run_are_told_with_exit_code_2_after_all_others(two_scenes):
+    (two_scenes / "deeper" / "two.py").write_text(FAILS_LATE)
+    (two_scenes / "one.py").write_text(TWO_CUBES.replace("[0, 0, 0.08]", "[0, 0, 0.07]"))
+    code, said, complaints = checked("guarded")
+    assert code == 2
+    assert "guarded/one.py: moved" in said
+    assert "overlapper: the scene guarded/deeper/two.py fails before step 6 at line 16: AssertionError" in complaints
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda folder: folder / "nowhere", "there is no scene file"),
+        (lambda folder: folder / "expected", "there is no scene in"),
+        (lambda folder: (folder / "expected" / "one.csv").write_text("# steps") and folder, "must say `# steps"),
+    ],
+)
+def test_what_cannot_be_checked_is_refused(two_scenes, spoil, words):
+    code, _, complaints = checked(str(spoil(two_scenes)))
+    assert code == 2
+    assert words in complaints
+
+
+def test_tables_are_compared(two_scenes):
+    def diff(*tables):
+        done = overlapper("diff", *tables)
+        return done.returncode, done.stdout + done.stderr
+
+    overlapper("run", "two_cubes.py", "--out", "before.csv")
+    overlapper("run", "two_cubes.py", "--out", "same.sqlite")
+    Path("two_cubes.py").write_text(TWO_CUBES.replace("[0, 0, 0.08]", "[0, 0, 0.07]"))
+    overlapper("run", "two_cubes.py", "--out", "after.csv")
+    assert diff("before.csv", "same.sqlite") == (0, "poses     the same\noverlaps  the same\n")
+    code, said = diff("before.csv", "after.csv")
+    assert code == 1
+    assert "poses     8 moved" in said
+    assert "step 8, 0/-1/0 and 1/-1/0: volume_m3 is 0.0003, recorded as 0.0002: off by 0.0001" in said
+    assert diff("before.csv", "nowhere.csv") == (2, "overlapper: [Errno 2] No such file or directory: 'nowhere.csv'\n")
+    assert diff("two_cubes.py", "after.csv")[0] == 2
+
+
 def test_a_bar_is_drawn_on_a_terminal_only(tmp_path):
     assert "two_cubes" not in overlapper("run", "two_cubes.py", "--json").stderr
     pty = pytest.importorskip("pty")
