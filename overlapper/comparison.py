@@ -98,11 +98,13 @@ def _measure_moves(
             if not part <= 1:  # as it is for a value that is not a number
                 allowed = budgets[name].allowed(was)
                 yield Move(_step(old), who, column, _text(was), _text(now), abs(now - was), allowed, part)
-    # Ten times, for the bound of one pair depends on the order of operations: moving a scene multiplied one by 4.7.
+    # A bound is free to be within the budget of what it bounds. Beyond that ten times are allowed, for the bound of one
+    # pair depends on the order of operations: moving a scene multiplied one by 4.7, another way of cutting one by 14.
     was, now = (_number(row, "volume_error_m3") for row in (old, new))
-    if now > 10 * was:
-        part = now / (10 * was) if was else math.inf
-        yield Move(_step(old), who, "volume_error_m3", _text(was), _text(now), now - was, 9 * was, part)
+    allowed = max(10 * was, budgets["volume"].allowed(_number(old, "volume_m3")) if "volume" in budgets else 0.0)
+    if now > allowed:
+        part = now / allowed if allowed else math.inf
+        yield Move(_step(old), who, "volume_error_m3", _text(was), _text(now), now - was, allowed - was, part)
 
 
 def compare_poses(

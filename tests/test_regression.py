@@ -303,10 +303,11 @@ def test_a_measure_that_is_not_a_number_is_a_failure():
     assert failures([pair()], [pair(volume_m3=math.nan)]) != []
 
 
-def test_a_certified_error_ten_times_larger_is_a_failure():
-    assert failures([pair()], [pair(volume_error_m3=9e-12)]) == []
-    (failure,) = failures([pair()], [pair(volume_error_m3=11e-12)])
-    assert "volume_error_m3 is 1.1e-11, recorded as 1e-12" in failure
+def test_a_certified_error_ten_times_larger_and_beyond_the_budget_of_the_volume_is_a_failure():
+    assert failures([pair(volume_error_m3=1e-9)], [pair(volume_error_m3=9e-9)]) == []
+    assert failures([pair(volume_error_m3=1e-12)], [pair(volume_error_m3=9e-10)]) == []
+    (failure,) = failures([pair(volume_error_m3=1e-9)], [pair(volume_error_m3=1.1e-8)])
+    assert "volume_error_m3 is 1.1e-08, recorded as 1e-09" in failure
 
 
 def loose(old, new):
