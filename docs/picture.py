@@ -15,19 +15,23 @@ HERE = Path(__file__).parent
 
 
 def main() -> None:
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if chromium is None:
-        sys.exit("docs/picture.py needs Chromium: apt-get install chromium")
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder, "recording.html")
         scene = HERE.parent / "scenes" / "franka_grasp.py"
         subprocess.run([sys.executable, "-m", "overlapper", "run", str(scene), "--html", str(page)], check=True)
-        options = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--no-first-run"]
-        options += ["--enable-unsafe-swiftshader", "--disable-background-networking", "--virtual-time-budget=4000"]
-        options += [f"--user-data-dir={folder}/profile", "--window-size=960,600", "--force-device-scale-factor=2"]
-        picture = HERE / "picture.png"
-        link = f"{page.as_uri()}#t={TIME}&{CAMERA}"
-        subprocess.run([chromium, *options, f"--screenshot={picture}", link], check=True, capture_output=True)
+        screenshot(f"{page.as_uri()}#t={TIME}&{CAMERA}", HERE / "picture.png")
+
+
+def screenshot(link: str, picture: Path) -> None:
+    """What Chromium shows of a recording, as a PNG of 1920 x 1200."""
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        sys.exit("the pictures of the documentation need Chromium: apt-get install chromium")
+    options = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--no-first-run"]
+    options += ["--enable-unsafe-swiftshader", "--disable-background-networking", "--virtual-time-budget=4000"]
+    options += ["--window-size=960,600", "--force-device-scale-factor=2", f"--screenshot={picture}"]
+    with tempfile.TemporaryDirectory() as profile:
+        subprocess.run([chromium, *options, f"--user-data-dir={profile}", link], check=True, capture_output=True)
     print(picture)
 
 

@@ -119,3 +119,21 @@ def test_polytopes_of_a_database_share_less_than_each_of_them(run, tmp_path):
     ((common,),) = numbers(r"all share +([\d.]+) m³", text)
     assert len(volumes) == 5 and 0.0 < common < min(volumes)
     assert read_hull(tmp_path / "common.stl").volume == pytest.approx(common, rel=1e-5)
+
+
+def test_links_of_a_chain_share_less_than_their_hulls(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    text = run("chain_links.py")
+    rings = numbers(r"body \d/link0: (\d+) parts, ([\d.]+) cm³, mesh ([\d.]+) cm³", text)
+    assert len(rings) == 2
+    for parts, volume, mesh in rings:
+        assert parts > 4
+        assert mesh == pytest.approx(568.9)
+        assert mesh < volume < 1.05 * mesh
+    ((whole, error),) = numbers(r"rings +([\d.]+) cm³ ± (\S+),", text)
+    ((by_parts, pairs),) = numbers(r"by parts +([\d.]+) cm³ in (\d+) pairs", text)
+    ((hulls,),) = [numbers(r"hulls +([\d.]+) cm³", text)]
+    # The meshes themselves share 16.6 cm³.
+    assert 16.6 < whole < by_parts + 1e-3 < hulls[0] / 4
+    assert pairs > 1 and error < 1e-9
+    assert (tmp_path / "chain_links.html").is_file()
