@@ -29,6 +29,7 @@ from overlapper import (
     overlap,
     overlaps,
     penetration_depth,
+    random_polytope,
 )
 
 HANG = 120  # s after which something hangs; nothing here takes a tenth of it
@@ -93,6 +94,7 @@ def answers(seed):
     found["overlaps"] = overlaps(shapes, positions, orientations, tolerance=TOLERANCE, threads=2)
     found["Batch"] = Batch(shapes).overlaps(positions, orientations, pairs, TOLERANCE)
     found["overlap_pairs"] = _core.overlap_pairs(list(shapes), positions, orientations, pairs, TOLERANCE)
+    found["random_polytope"] = Placed(random_polytope(9, rng=rng))
     return {name: bits(value) for name, value in found.items()}
 
 

@@ -414,8 +414,12 @@ int facets(const Shape& shape) {
   return std::holds_alternative<Box>(shape) ? 6 : 1;
 }
 
+/// Beyond it, asking every vertex of one body against every plane of the other takes longer than the dual hull.
+constexpr size_t kMostFacets = 1024;
+
 bool clippable(const Shape& shape) {
-  if (const Hull* hull = std::get_if<Hull>(&shape)) return !hull->data->edges.empty();
+  if (const Hull* hull = std::get_if<Hull>(&shape))
+    return !hull->data->edges.empty() && hull->data->planes.size() <= kMostFacets;
   return std::holds_alternative<Box>(shape) || std::holds_alternative<HalfSpace>(shape);
 }
 
