@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.union import UnionOverlap, of_pairs
+from overlapper.union import UnionOverlap, of_pair, of_pairs
 
 if TYPE_CHECKING:
     from overlapper import Placed
@@ -83,6 +83,8 @@ def _links(contact: Contact) -> tuple[int, int, int, int]:
 
 
 def _union(contacts: tuple[Contact, ...]) -> UnionOverlap:
+    if len(contacts) == 1:
+        return of_pair(contacts[0].overlap)
     sides: tuple[dict[int, Placed], dict[int, Placed]] = ({}, {})
     for contact in contacts:
         a, b = contact.overlap.shapes

@@ -34,36 +34,52 @@ COARSE = 0.1
 class UnionOverlap:
     """What two unions share. True only if they overlap.
 
-    `volume` (m³) is within `volume_error` of the true one. `centroid` (3,) in m is None unless they overlap.
-    `gradient` (2, 6) is the derivative of the volume as either union moves as a whole: translation (m²), and rotation
-    vector about `about` (m³), a point of the world. `terms` is the number of convex bodies that were added up.
+    `volume` (m³) is within `volume_error` of the true one. It is the sum of convex parts, `terms` in number.
     """
 
-    about: Array
     volume: float = 0.0
     volume_error: float = 0.0
-    gradient: Array = field(default_factory=lambda: np.zeros((2, 6)))
-    terms: int = 0
-    _moment: Array = field(default_factory=lambda: np.zeros(3))  # of the volume about `about`
+    # Each with its sign and, for each of its bodies, which of the two unions that belongs to.
+    _parts: list[tuple[int, Overlap, Sequence[int]]] = field(default_factory=list)
 
     def __bool__(self) -> bool:
         return self.volume > 0
 
     @property
+    def terms(self) -> int:
+        return len(self._parts)
+
+    @property
+    def about(self) -> Array | None:
+        """(3,) the point about which `gradient` rotates: the centroid of one part, in m; None unless they overlap."""
+        return next(np.asarray(part.centroid) for _, part, _ in self._parts if part) if self else None
+
+    @property
     def centroid(self) -> Array | None:
-        return self.about + self._moment / self.volume if self.volume > 0 else None
+        """(3,) of what is common, in the world, m; None unless they overlap."""
+        if not self:
+            return None
+        about = np.asarray(self.about)
+        moments = [sign * part.volume * (np.asarray(part.centroid) - about) for sign, part, _ in self._parts if part]
+        return np.asarray(about + np.sum(moments, axis=0) / self.volume)
+
+    @property
+    def gradient(self) -> Array:
+        """(2, 6) derivative of the volume as either union moves as a whole: translation (m²), and rotation vector about
+        `about` (m³), world axes; zeros unless they overlap.
+        """
+        gradient = np.zeros((2, 6))
+        about = np.asarray(self.about)
+        for sign, part, sides in self._parts if self else ():
+            for side, body, slope in zip(sides, part.shapes, part.gradient):
+                gradient[side, :3] += sign * slope[:3]
+                gradient[side, 3:] += sign * (slope[3:] + np.cross(body.position - about, slope[:3]))
+        return gradient
 
     def _add(self, sign: int, part: Overlap, sides: Sequence[int]) -> None:
-        """Add a convex part; `sides` says to which of the two unions each of its bodies belongs."""
-        self.terms += 1
+        self._parts.append((sign, part, sides))
         self.volume_error += part.volume_error
-        if not part:
-            return
         self.volume += sign * part.volume
-        self._moment += sign * part.volume * (np.asarray(part.centroid) - self.about)
-        for side, body, slope in zip(sides, part.shapes, part.gradient):
-            self.gradient[side, :3] += sign * slope[:3]
-            self.gradient[side, 3:] += sign * (slope[3:] + np.cross(body.position - self.about, slope[:3]))
 
 
 def union_overlap(
@@ -79,13 +95,18 @@ def union_overlap(
     return of_pairs(a, b, {pair: each for pair, each in pairs.items() if each.status != "separated"})
 
 
+def of_pair(common: Overlap) -> UnionOverlap:
+    """As `union_overlap` of two shapes, from their overlap."""
+    found = UnionOverlap()
+    found._add(1, common, (0, 1))
+    return found
+
+
 def of_pairs(a: Sequence[Placed], b: Sequence[Placed], pairs: Mapping[tuple[int, int], Overlap]) -> UnionOverlap:
     """As `union_overlap`, from the overlaps of a[i] and b[j] by (i, j): of all pairs that are not separated."""
     solid = {pair: each for pair, each in pairs.items() if each}
-    about = np.asarray(next(iter(solid.values())).centroid) if solid else np.zeros(3)
     for method in (_inclusion_exclusion, _cells):
-        found = UnionOverlap(about)
-        found.volume_error = sum(each.volume_error for each in pairs.values() if not each)
+        found = UnionOverlap(volume_error=sum(each.volume_error for each in pairs.values() if not each))
         if method(found, a, b, solid):
             break
     return found
