@@ -10,11 +10,13 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 
+import numpy as np
+
 from overlapper.comparison import Move
 from overlapper.regression import Still, Verdict
 from overlapper.viewer import Recording
 
-LIMIT = 5  # moves of a cause; what more there is, the terminal counts
+LIMIT = 3  # moves of a cause; what more there is, the terminal counts
 
 
 def save(verdict: Verdict, name: str, path: Path) -> Path:
@@ -28,6 +30,7 @@ def save(verdict: Verdict, name: str, path: Path) -> Path:
         "step": str(step),
         "verdicts": "\n".join(_section(*each) for each in sections.items()),
         "recording": _recording(stills, verdict.expected.tolerance),
+        "camera": _camera(stills),
     }
     page = Path(__file__).with_suffix(".html").read_text(encoding="utf-8")
     for mark, text in texts.items():
@@ -52,6 +55,21 @@ def _recording(stills: Sequence[Still], tolerance: float) -> str:
     with tempfile.TemporaryDirectory() as folder:
         page = recording.save(Path(folder) / "page.html").read_bytes()
     return base64.b64encode(gzip.compress(page, compresslevel=6, mtime=0)).decode()
+
+
+def _camera(stills: Sequence[Still]) -> str:
+    """Where the recording is to be seen from, in its own words, so that what is bounded of both frames is in sight."""
+    bounds = [placed.bounds for still in stills for placed in still.placed if np.isfinite(placed.bounds).all()]
+    if not bounds:
+        return ""
+    lower, upper = np.min([each[0] for each in bounds], axis=0), np.max([each[1] for each in bounds], axis=0)
+    at = (lower + upper) / 2
+    # The recording's camera sees 35 degrees, which a ball fills from 1.66 times its diameter.
+    back = np.array([0.60, -0.68, 0.42])
+    start = at + 1.66 * float(np.linalg.norm(upper - lower)) * back
+    return "&" + "&".join(
+        f"{name}={','.join(f'{value:.6g}' for value in point)}" for name, point in (("from", start), ("at", at))
+    )
 
 
 def _section(cause: str, moves: Sequence[Move]) -> str:

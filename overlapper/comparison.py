@@ -190,4 +190,4 @@ def _text(value: float) -> str:
 
 
 def _numbers(values: NDArray[np.float64]) -> str:
-    return "(" + ", ".join(f"{value:.6g}" for value in values) + ")"
+    return "(" + ", ".join(f"{value:.5g}" for value in values) + ")"
