@@ -47,6 +47,9 @@ def test_the_page_tells_the_verdicts_and_holds_both_frames(verdict, tmp_path):
     text = page.read_text(encoding="utf-8")
     assert "<h1>cubes &lt;of mine&gt; has moved</h1>" in text
     assert "<td>(0, 0, 0.15)</td><td>(0, 0, 0.17)</td><td>0.02</td><td>0.0001</td><td>200</td>" in text
+    assert (
+        "&from=1.45597,-1.6501,1.10418&at=0,0,0.085" in text
+    )  # of both frames: table and cubes reach from -0.1 to 0.27
     assert re.search(r'(src|href)="http', text) is None
     assert len(text) < 1_000_000
 
@@ -54,7 +57,8 @@ def test_the_page_tells_the_verdicts_and_holds_both_frames(verdict, tmp_path):
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not to be had here")
 def test_one_pane_shows_what_was_recorded_and_the_other_what_is_today(verdict, tmp_path):
     page = before_after.save(verdict, "cubes", tmp_path / "page.html")
-    panes = asyncio.run(asyncio.wait_for(texts_in_frames(page, tmp_path / "profile", until="dm³"), timeout=120))
+    # A pane names its time together with its table, and after the tree of objects, which is there while both are empty.
+    panes = asyncio.run(asyncio.wait_for(texts_in_frames(page, tmp_path / "profile", until=".000 s"), timeout=120))
     # 20 cm by 20 cm by 5 cm, and by 3 cm; the tree, which has the largest of both, comes after the table.
     assert [re.search(r"\S+ dm³", pane)[0] for pane in panes] == ["2 dm³", "1.2 dm³"]
 
