@@ -14,7 +14,7 @@ from overlapper.union import UnionOverlap, of_pair, of_pairs
 
 if TYPE_CHECKING:
     from overlapper import Placed
-    from overlapper.simulation import Contact
+    from overlapper.contacts import Contact
 
 
 @dataclass(frozen=True, slots=True)

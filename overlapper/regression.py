@@ -14,12 +14,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Hull, Placed, Shape, _core
+from overlapper import Batch, Hull, Overlaps, Placed, Shape
 from overlapper.comparison import Differences, Move, compare_measures, compare_poses, loose_budgets, poses, shape_label
+from overlapper.contacts import Contacts
 from overlapper.expected import DRIFT, MEASURES, ROUNDING, Budget, Expected, Key, read_expected
 from overlapper.scene import Scene, SceneError, Step, broken, load_scene
 from overlapper.shape_text import alike, shape_of, text_of
-from overlapper.simulation import Bodies, Concave, Contact
+from overlapper.simulation import Bodies, Concave
 from overlapper.table import Row, key, placements, rows
 from overlapper.table_file import origin
 
@@ -38,7 +39,7 @@ class Frame:
     step: int
     time: float
     bodies: Bodies
-    contacts: list[Contact]
+    contacts: Contacts
 
 
 def run(
@@ -210,18 +211,14 @@ class Still:
         """A row for each shape, as if it were alone."""
         return [{"step": step, **row, "status": "alone"} for row in placements(self, "A").values()]
 
-    def contacts(self, tolerance: float) -> list[Contact]:
+    def contacts(self, tolerance: float) -> Contacts:
         """The pairs of shapes of different bodies that overlap or touch."""
         # Pairs of static bodies are in it, too: whether they may be left out is the simulator's business.
-        pairs = _core.candidate_pairs(self.shapes, self.positions, self.orientations)
-        bodies = np.array(self.keys).reshape(-1, 3)[:, 0]
-        pairs = pairs[bodies[pairs[:, 0]] != bodies[pairs[:, 1]]]
-        overlaps = _core.overlap_pairs(self.shapes, self.positions, self.orientations, pairs, tolerance)
-        return [
-            Contact(*self.keys[int(i)], *self.keys[int(j)], overlap)
-            for (i, j), overlap in zip(pairs, overlaps)
-            if overlap.status != "separated"
-        ]
+        batch, where = Batch(self.shapes), (self.positions, self.orientations)
+        keys = np.array(self.keys, dtype=np.int64).reshape(-1, 3)
+        bodies, pairs = keys[:, 0], batch.candidate_pairs(*where)
+        found = batch.overlaps(*where, pairs[bodies[pairs[:, 0]] != bodies[pairs[:, 1]]], tolerance)
+        return Contacts(keys, found[found.status != Overlaps.SEPARATED])
 
 
 def _stills(scene: Scene, steps: Sequence[int]) -> dict[int, Still]:

@@ -18,7 +18,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Overlap, Placed, Shape, _core
+from overlapper import Batch, Overlaps, Placed, Shape, overlaps
+from overlapper.contacts import Contact, Contacts
 from overlapper.decomposition import check_threshold
 from overlapper.quaternion import composed, rotated
 
@@ -42,28 +43,11 @@ try:
 except ImportError as error:
     raise ImportError("overlapper.simulation needs pybullet: pip install 'overlapper[sim]'") from error
 
-__all__ = ["Bodies", "Concave", "Contact", "Decomposed", "Report", "Skipped", "SkippedShapeWarning"]
+__all__ = ["Bodies", "Concave", "Contact", "Contacts", "Decomposed", "Report", "Skipped", "SkippedShapeWarning"]
 
 
 class SkippedShapeWarning(UserWarning):
     """A shape of the simulation is not modelled: its overlaps are not found."""
-
-
-@dataclass(frozen=True, slots=True)
-class Contact:
-    """Two shapes of different bodies that overlap or touch; `overlap.status` says which.
-
-    Bodies and links are pybullet's indices, link -1 is the base, shapes are counted within their link. bodyA < bodyB;
-    `overlap.shapes[0]` is A's, so that `overlap.normal` points from B to A as pybullet's contactNormalOnB does.
-    """
-
-    bodyA: int
-    linkA: int
-    shapeA: int
-    bodyB: int
-    linkB: int
-    shapeB: int
-    overlap: Overlap
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,41 +115,40 @@ class Bodies:
         self._bodies: dict[int, Body] = {}
         self._unidentified = 0
         self._rows: dict[int, int] = {}  # in a .bullet file, of the bodies whose poses have no other source
-        self._examined: list[Overlap] = []
         self._arrange()
         self._refresh()
+        self._examined = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
 
     def update(self) -> None:
         """Read the shapes of bodies that are new, then the poses of all. Call it once per step."""
         self._refresh()
 
-    def overlaps(self, tolerance: float = 1e-3, method: Literal["auto", "paper"] = "auto") -> list[Contact]:
+    def overlaps(
+        self, tolerance: float = 1e-3, method: Literal["auto", "paper"] = "auto", threads: int | None = 1
+    ) -> Contacts:
         """Pairs of shapes that overlap or touch, sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB).
 
         Pairs within a body are left out, and pairs of static shapes: bases of mass 0, with the links that only fixed
-        joints tie to them. `tolerance` and `method` are those of `overlapper.overlap`.
+        joints tie to them. `tolerance`, `method` and `threads` are those of `overlapper.overlaps`. What is found is
+        kept for the next call: pairs of which neither shape has moved by a bit cost nothing.
         """
-        pairs = self._candidate_pairs()
-        overlaps = _core.overlap_pairs(self._shapes, self._positions, self._orientations, pairs, tolerance, method)
-        contacts = [
-            Contact(*self._keys[int(i)], *self._keys[int(j)], overlap)
-            for (i, j), overlap in zip(pairs, overlaps)
-            if overlap.status != "separated"
-        ]
-        self._examined = overlaps
-        return contacts
+        found = self._batch.overlaps(
+            self._positions, self._orientations, self._candidate_pairs(), tolerance, threads, method
+        )
+        self._examined = found
+        return Contacts(self._key_rows, found[found.status != Overlaps.SEPARATED])
 
     def report(self) -> Report:
         """How much of the scene was read, and how much of it the last `overlaps()` looked at."""
-        owners, static = self._owners, self._static[self._owners] & self._fixed
+        owners, static, examined = self._owners, self._static[self._owners] & self._fixed, self._examined
         return Report(
             bodies=len(self._bodies),
             shapes=sum(body.shape_count for body in self._bodies.values()) + self._unidentified,
             shapes_read=len(self._keys),
             pairs_possible=_pairs_between(owners) - _pairs_between(owners[static]),
-            pairs_examined=len(self._examined),
-            pairs_overlapping=sum(map(bool, self._examined)),
-            facets_touched=sum(overlap.facets_touched for overlap in self._examined),
+            pairs_examined=len(examined),
+            pairs_overlapping=int((examined.status == Overlaps.OVERLAPPING).sum()),
+            facets_touched=int(examined.facets_touched.sum()),
         )
 
     @property
@@ -276,7 +259,9 @@ class Bodies:
         shaped = {id: body.parts for id, body in self._bodies.items() if body.parts}
         parts = [part for each in shaped.values() for part in each]
         self._keys = [(id, part.link, part.index) for id, each in shaped.items() for part in each]
+        self._key_rows = np.array(self._keys, dtype=np.int64).reshape(-1, 3)
         self._shapes = [part.shape for part in parts]
+        self._batch = Batch(self._shapes)
         self._local_positions = np.array([part.position for part in parts]).reshape(-1, 3)
         self._local_orientations = np.array([part.orientation for part in parts]).reshape(-1, 4)
         self._links = {id: sorted({part.link for part in each} - {BASE}) for id, each in shaped.items()}
@@ -318,7 +303,7 @@ class Bodies:
             raise ValueError(f"body {body} ({self._bodies[body].name}) has no finite pose: the simulation has diverged")
 
     def _candidate_pairs(self) -> NDArray[np.int32]:
-        pairs: NDArray[np.int32] = _core.candidate_pairs(self._shapes, self._positions, self._orientations)
+        pairs: NDArray[np.int32] = self._batch.candidate_pairs(self._positions, self._orientations)
         first, second = pairs.T
         static = self._static[self._owners] & self._fixed
         apart = self._owners[first] != self._owners[second]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from overlapper.contacts import Contact
     from overlapper.links import LinkContact
     from overlapper.reference import Comparison
-    from overlapper.simulation import Contact
 
 Value = int | float | str | None
 Row = dict[str, Value]

@@ -486,17 +486,12 @@ def iou(a: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy
     Intersection over union of two shapes: common volume over the volume of their union, from 0 to 1.
     """
 
-def overlap_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike, tolerance: float = 0.001, method: Literal['auto', 'paper'] = 'auto') -> list[Overlap]:
-    """
-    overlap() of each pair (p, 2) of the shapes at positions (k, 3) and orientations (k, 4), in one call.
-    """
-
 class Overlaps:
     """
     What many pairs of shapes share: an array per quantity, a row per pair. SI units, world coordinates.
 
-    The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again;
-    `overlaps[mask]`, a slice or an array of indices picks rows.
+    The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again
+    unless it took long and its Batch has not been asked since; `overlaps[mask]`, a slice or an array of indices picks rows.
     """
 
     @property
@@ -565,6 +560,9 @@ class Overlaps:
     @property
     def tolerance(self) -> float: ...
 
+    @property
+    def method(self) -> Literal['auto', 'paper']: ...
+
     def __len__(self) -> int: ...
 
     def __getitem__(self, row: Any) -> Any: ...
@@ -582,14 +580,14 @@ class Batch:
 
     def __init__(self, shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace]) -> None: ...
 
-    def overlaps(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1) -> Overlaps:
+    def overlaps(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto') -> Overlaps:
         """
         What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
         gradient as arrays.
 
         `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs` (p, 2)
         indexes them and has a row each in the answer; without it there is a row for each pair that overlaps or touches, found by
-        a sweep over boxes and sorted. `tolerance` is that of `overlap`, whose answers these are to the last bit. The work is
+        a sweep over boxes and sorted. `tolerance` and `method` are those of `overlap`, whose answers these are to the last bit. The work is
         spread over `threads`, None being all that there are; their number does not change a bit of the answer.
 
         Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
@@ -603,14 +601,14 @@ class Batch:
         two half-spaces are no pair.
         """
 
-def overlaps(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1) -> Overlaps:
+def overlaps(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto') -> Overlaps:
     """
     What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
     gradient as arrays.
 
     `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs` (p, 2)
     indexes them and has a row each in the answer; without it there is a row for each pair that overlaps or touches, found by
-    a sweep over boxes and sorted. `tolerance` is that of `overlap`, whose answers these are to the last bit. The work is
+    a sweep over boxes and sorted. `tolerance` and `method` are those of `overlap`, whose answers these are to the last bit. The work is
     spread over `threads`, None being all that there are; their number does not change a bit of the answer.
 
     Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.

@@ -93,7 +93,6 @@ def answers(seed):
     found["candidate_pairs"] = pairs
     found["overlaps"] = overlaps(shapes, positions, orientations, tolerance=TOLERANCE, threads=2)
     found["Batch"] = Batch(shapes).overlaps(positions, orientations, pairs, TOLERANCE)
-    found["overlap_pairs"] = _core.overlap_pairs(list(shapes), positions, orientations, pairs, TOLERANCE)
     found["random_polytope"] = Placed(random_polytope(9, rng=rng))
     return {name: bits(value) for name, value in found.items()}
 
@@ -203,7 +202,7 @@ def interrupted_batch():
     press = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     press.start()  # it can only fire inside of the call, as nothing comes before it
     try:
-        _core.overlap_pairs(balls, positions, orientations, pairs, 1e-2, "paper")
+        overlaps(balls, positions, orientations, pairs, 1e-2, method="paper")
     except KeyboardInterrupt:
         return True
     return False
@@ -234,7 +233,7 @@ def refusals_of_huge_arrays():
     calls = (
         lambda: Hull(huge),
         lambda: overlap(huge, Sphere(1)),
-        lambda: _core.overlap_pairs(*batch, pairs),
+        lambda: overlaps(*batch, pairs),
         lambda: _core.candidate_pairs(batch[0], huge, batch[2]),
     )
     names = []

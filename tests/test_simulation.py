@@ -770,6 +770,46 @@ def test_shapes_that_only_touch_are_contacts_without_volume(client):
     assert bodies.report().pairs_overlapping == 0
 
 
+def test_contacts_are_a_sequence_and_arrays_at_once(client):
+    for x in range(4):
+        box(client, position=[0.9 * x, 0, 0])
+    contacts = Bodies(client).overlaps()
+    assert len(contacts) == 3 and contacts and contacts != [] and contacts == list(contacts)
+    assert contacts[0] is contacts[-3] is next(iter(contacts)) and contacts[2] in contacts
+    with pytest.raises(IndexError):
+        contacts[3]
+    assert_array_equal(contacts.keys, [[k, -1, 0, k + 1, -1, 0] for k in range(3)])
+    for row, contact in enumerate(contacts):
+        assert contact.overlap.volume == contacts.overlaps.volume[row] == pytest.approx(0.1, rel=1e-12)
+        assert_array_equal(contact.overlap.gradient, contacts.overlaps.gradient[row])
+    for picked in (contacts[1:], contacts[[1, 2]], contacts[contacts.keys[:, 0] > 0]):
+        assert [(c.bodyA, c.bodyB) for c in picked] == [(1, 2), (2, 3)] and len(picked.overlaps) == 2
+    assert not contacts[:0] and contacts[:0] == []
+
+
+def test_contacts_of_a_step_keep_what_they_say_when_the_simulation_goes_on(client):
+    ball = body(client, p.GEOM_SPHERE, radius=0.5, position=[0, 0, 0.3])
+    box(client, mass=0)
+    bodies = Bodies(client)
+    looked_at, kept = bodies.overlaps(0.01), bodies.overlaps(0.01)
+    volume, corners = looked_at.overlaps.volume[0], looked_at[0].overlap.vertices
+    p.resetBasePositionAndOrientation(ball, [0, 0, 0.5], [0, 0, 0, 1], physicsClientId=client)
+    bodies.update()
+    assert bodies.overlaps(0.01).overlaps.volume[0] < volume
+    assert_array_equal(kept[0].overlap.vertices, corners)
+    assert kept[0].overlap.volume == kept.overlaps.volume[0] == volume
+
+
+def test_the_article_s_method_and_threads_are_asked_for_by_step(client):
+    for x in range(3):
+        box(client, position=[0.9 * x, 0.1 * x, 0])
+    bodies = Bodies(client)
+    by_article = bodies.overlaps(method="paper", threads=2)
+    assert by_article.overlaps.method == by_article[0].overlap.method == "paper"
+    assert bodies.overlaps(threads=2)[0].overlap.method == "auto"
+    assert_allclose(by_article.overlaps.volume, bodies.overlaps().overlaps.volume, rtol=1e-9)
+
+
 def test_normal_and_depth_are_those_of_get_contact_points(client):
     a = body(client, p.GEOM_SPHERE, radius=0.5, position=[0.2, 0.1, 0.6])
     b = box(client, position=[0, 0, -0.3], mass=0)

@@ -13,7 +13,7 @@ import pyarrow.parquet
 import pytest
 
 from overlapper import Box, Placed, overlap
-from overlapper.simulation import Contact
+from overlapper.contacts import Contact
 from overlapper.table import COLUMNS, rows
 from overlapper.table_file import TABLES, CsvTable, ParquetTable, read_csv, read_table
 

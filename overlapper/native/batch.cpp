@@ -24,22 +24,24 @@ struct Known {
   Vec3 axis;  ///< unit, from b to a: the bodies were apart along it; {0, 0, 0} if they were not
 };
 
-Overlaps::Row row_of(const Overlap& overlap) {
+Overlaps::Row row_of(Overlap overlap) {
   Overlaps::Row row;
   row.status = overlap.status();
   if (row.status == Status::kSeparated) return row;
   row.normal = overlap.contact().normal;
   row.volume_error = overlap.volume_error();
-  if (row.status == Status::kTouching) return row;
-  row.widened = overlap.widened();
-  row.facets_touched = overlap.facets_touched();
-  row.volume = overlap.volume();
-  row.area = overlap.area();
-  row.depth = overlap.contact().depth;
-  row.centroid = overlap.centroid();
-  const auto gradient = overlap.gradient();
-  std::copy(gradient[0].begin(), gradient[0].end(), row.gradient.begin());
-  std::copy(gradient[1].begin(), gradient[1].end(), row.gradient.begin() + 6);
+  if (row.status == Status::kOverlapping) {
+    row.widened = overlap.widened();
+    row.facets_touched = overlap.facets_touched();
+    row.volume = overlap.volume();
+    row.area = overlap.area();
+    row.depth = overlap.contact().depth;
+    row.centroid = overlap.centroid();
+    const auto gradient = overlap.gradient();
+    std::copy(gradient[0].begin(), gradient[0].end(), row.gradient.begin());
+    std::copy(gradient[1].begin(), gradient[1].end(), row.gradient.begin() + 6);
+  }
+  if (!overlap.clipped()) row.source = std::make_shared<Overlap>(std::move(overlap));
   return row;
 }
 
@@ -111,6 +113,7 @@ void Overlaps::append(IndexPair pair, const Row& row) {
   centroid.push_back(row.status == Status::kOverlapping ? row.centroid : Vec3{kNaN, kNaN, kNaN});
   normal.push_back(row.normal);
   gradient.push_back(row.gradient);
+  source.push_back(row.source);
 }
 
 void Overlaps::reserve(size_t rows) {
@@ -122,27 +125,31 @@ void Overlaps::reserve(size_t rows) {
   centroid.reserve(rows);
   normal.reserve(rows);
   gradient.reserve(rows);
+  source.reserve(rows);
 }
 
-Overlap Overlaps::overlap(size_t row) const {
+std::shared_ptr<Overlap> Overlaps::overlap(size_t row) const {
+  if (auto known = source[row].lock()) return known;
   std::vector<Placed> bodies;
   for (int i : pairs[row]) {
     const PoseNumbers& p = (*poses)[i];
     bodies.push_back(make_placed((*shapes)[i], {p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}));
   }
-  return Overlap(std::move(bodies), tolerance, Method::kAuto);
+  return std::make_shared<Overlap>(std::move(bodies), tolerance, method);
 }
 
 Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
   Overlaps chosen;
   chosen.examined = examined;
   chosen.tolerance = tolerance;
+  chosen.method = method;
   chosen.shapes = shapes;
   chosen.poses = poses;
   chosen.reserve(rows.size());
   for (std::int64_t i : rows)
-    chosen.append(pairs[i], {static_cast<Status>(status[i]), widened[i] != 0, facets_touched[i], volume[i],
-                             volume_error[i], area[i], depth[i], centroid[i], normal[i], gradient[i]});
+    chosen.append(pairs[i],
+                  {static_cast<Status>(status[i]), widened[i] != 0, facets_touched[i], volume[i], volume_error[i],
+                   area[i], depth[i], centroid[i], normal[i], gradient[i], source[i].lock()});
   return chosen;
 }
 
@@ -160,6 +167,7 @@ struct Batch::Memory {
   std::vector<char> done;                      ///< of the call under way
   bool sorted = false;                         ///< `known` is, by pair
   double tolerance = 0;
+  Method method = Method::kAuto;
 
   std::vector<int> before;  ///< of the call under way, per pair: its row in the last call, or -1
 
@@ -170,8 +178,8 @@ struct Batch::Memory {
 
   void place(std::span<const double> positions, std::span<const double> orientations);
   void recall(std::span<const IndexPair> pairs);
-  bool answer(size_t i, double with_tolerance);
-  void keep(double of_tolerance);
+  bool answer(size_t i, double with_tolerance, Method by_method);
+  void keep(double of_tolerance, Method of_method);
 };
 
 /// Poses that are the same to the last bit leave the body as it is.
@@ -211,28 +219,30 @@ void Batch::Memory::recall(std::span<const IndexPair> pairs) {
 }
 
 /// Fills row i; false if that took long.
-bool Batch::Memory::answer(size_t i, double with_tolerance) {
+bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   Known& pair = next_known[i];
   if (before[i] >= 0) {
     const Known& last = known[before[i]];
     pair.axis = last.axis;
-    if (last.version == pair.version && tolerance == with_tolerance) {
+    if (last.version == pair.version && tolerance == with_tolerance && method == by_method) {
       next_rows[i] = rows[before[i]];
       done[i] = true;
       return true;
     }
   }
   const Body &a = bodies[pair.pair[0]], &b = bodies[pair.pair[1]];
-  const bool separated = apart(a, b, pair.axis);
-  next_rows[i] = separated ? Overlaps::Row{} : row_of(Overlap({a.placed, b.placed}, with_tolerance, Method::kAuto));
+  // The article's method has its own way of telling.
+  const bool separated = by_method == Method::kAuto && apart(a, b, pair.axis);
+  next_rows[i] = separated ? Overlaps::Row{} : row_of(Overlap({a.placed, b.placed}, with_tolerance, by_method));
   done[i] = true;
   return separated;
 }
 
-void Batch::Memory::keep(double of_tolerance) {
+void Batch::Memory::keep(double of_tolerance, Method of_method) {
   known.swap(next_known);
   rows.swap(next_rows);
   tolerance = of_tolerance;
+  method = of_method;
   sorted = std::is_sorted(known.begin(), known.end(), [](const Known& a, const Known& b) { return a.pair < b.pair; });
 }
 
@@ -270,7 +280,7 @@ std::vector<IndexPair> Batch::candidate_pairs(std::span<const double> positions,
 }
 
 Overlaps Batch::overlaps(std::span<const double> positions, std::span<const double> orientations,
-                         std::optional<std::span<const IndexPair>> given, double tolerance, int threads,
+                         std::optional<std::span<const IndexPair>> given, double tolerance, Method method, int threads,
                          const std::function<bool()>& go_on, bool& finished) {
   if (!(tolerance > 0 && tolerance < 1))
     throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
@@ -279,11 +289,12 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   if (!given) memory->sweep.run(memory->enclosures, memory->candidates);
   const std::span<const IndexPair> pairs = given ? *given : std::span<const IndexPair>(memory->candidates);
   memory->recall(pairs);
-  finished =
-      for_each_in_parallel(pairs.size(), threads, [&](size_t i, int) { return memory->answer(i, tolerance); }, go_on);
+  finished = for_each_in_parallel(
+      pairs.size(), threads, [&](size_t i, int) { return memory->answer(i, tolerance, method); }, go_on);
 
   Overlaps answer;
   answer.tolerance = tolerance;
+  answer.method = method;
   answer.shapes = shapes_;
   answer.poses = memory->poses;
   const auto listed = [&](size_t i) {
@@ -294,7 +305,7 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   answer.reserve(rows);
   for (size_t i = 0; i < pairs.size(); ++i)
     if (listed(i)) answer.append(pairs[i], memory->next_rows[i]);
-  if (finished) memory->keep(tolerance);
+  if (finished) memory->keep(tolerance, method);
   return answer;
 }
 

@@ -29,6 +29,7 @@ struct Overlaps {
     Vec3 centroid;  ///< meaningless unless overlapping
     Vec3 normal;    ///< {0, 0, 0} if separated
     std::array<double, 12> gradient{};
+    std::shared_ptr<Overlap> source;  ///< if it took more than clipping
   };
 
   std::vector<IndexPair> pairs;
@@ -40,8 +41,12 @@ struct Overlaps {
   std::vector<Vec3> normal;
   std::vector<std::array<double, 12>> gradient;
 
+  /// What a row was taken from, while the batch that has it remembers; none where that is quickly made again.
+  std::vector<std::weak_ptr<Overlap>> source;
+
   size_t examined = 0;  ///< pairs that were looked at, with or without a row
   double tolerance = 0;
+  Method method = Method::kAuto;
   std::shared_ptr<const std::vector<Shape>> shapes;
   std::shared_ptr<const std::vector<PoseNumbers>> poses;
 
@@ -49,7 +54,7 @@ struct Overlaps {
   void append(IndexPair pair, const Row& row);
   void reserve(size_t rows);
   /// The pair of that row with all that can be asked of it.
-  Overlap overlap(size_t row) const;
+  std::shared_ptr<Overlap> overlap(size_t row) const;
   Overlaps select(std::span<const std::int64_t> rows) const;
 };
 
@@ -69,7 +74,7 @@ class Batch {
   /// `threads` nor on earlier calls. When `go_on`, asked every 50 ms, says no, `finished` becomes false and only pairs
   /// that were done have rows.
   Overlaps overlaps(std::span<const double> positions, std::span<const double> orientations,
-                    std::optional<std::span<const IndexPair>> pairs, double tolerance, int threads,
+                    std::optional<std::span<const IndexPair>> pairs, double tolerance, Method method, int threads,
                     const std::function<bool()>& go_on, bool& finished);
 
  private:

@@ -29,6 +29,7 @@ class Overlap {
   Method method() const { return method_; }
   Status status() const { return status_; }
   bool pair() const { return bodies_.size() == 2; }
+  bool clipped() const { return measured_by_clipping_; }  ///< so that its measures are quickly had again
 
   /// m³; 0 unless overlapping.
   double volume() const;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "overlap.h"
 #include "shape.h"
 
 /// numpy and the core, both ways.
@@ -128,6 +129,8 @@ void array_property(Class& cls, const char* name, Getter getter, const char* doc
 Shape to_shape(nb::handle value, const std::string& name);
 /// The same, placed at the origin unless it is a Placed.
 Placed to_placed(nb::handle value, const std::string& name);
+/// "auto" or "paper".
+Method to_method(nb::handle value);
 /// A number as printed in a repr.
 std::string number(double value);
 

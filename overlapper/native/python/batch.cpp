@@ -1,5 +1,7 @@
 #include "batch.h"
 
+#include <nanobind/stl/shared_ptr.h>
+
 #include <thread>
 
 #include "python/arrays.h"
@@ -62,12 +64,13 @@ bool go_on() {
 }
 
 nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orientations, nb::handle pairs,
-                          nb::handle tolerance_given, nb::handle threads_given) {
+                          nb::handle tolerance_given, nb::handle threads_given, nb::handle method_name) {
   const size_t k = batch.shapes().size();
   const auto [position_array, p] = to_poses(positions, "positions", k, 3);
   const auto [orientation_array, q] = to_poses(orientations, "orientations", k, 4);
   const double tolerance = to_double(tolerance_given, "tolerance");
   const int threads = to_threads(threads_given);
+  const Method method = to_method(method_name);
   std::optional<Pairs> given;
   std::optional<std::span<const IndexPair>> span;
   if (!pairs.is_none()) {
@@ -78,7 +81,7 @@ nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orienta
   Overlaps found;
   {
     const nb::gil_scoped_release release;
-    found = batch.overlaps(p, q, span, tolerance, threads, go_on, finished);
+    found = batch.overlaps(p, q, span, tolerance, method, threads, go_on, finished);
   }
   nb::object answer = nb::cast(std::move(found));
   if (finished) return answer;
@@ -144,7 +147,7 @@ void define_columns(nb::class_<Overlaps>& cls) {
                "(p,) True where the volume was computed again in wider arithmetic.");
 }
 
-Overlap overlap_of_row(const Overlaps& overlaps, size_t row) {
+std::shared_ptr<Overlap> overlap_of_row(const Overlaps& overlaps, size_t row) {
   const nb::gil_scoped_release release;
   return overlaps.overlap(row);
 }
@@ -154,8 +157,8 @@ void define_overlaps_class(nb::module_& m) {
       m, "Overlaps",
       R"(What many pairs of shapes share: an array per quantity, a row per pair. SI units, world coordinates.
 
-The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again;
-`overlaps[mask]`, a slice or an array of indices picks rows.)");
+The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again
+unless it took long and its Batch has not been asked since; `overlaps[mask]`, a slice or an array of indices picks rows.)");
   define_columns(cls);
   for (const auto& [name, status] : {std::pair{"SEPARATED", Status::kSeparated},
                                      {"TOUCHING", Status::kTouching},
@@ -163,6 +166,9 @@ The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all t
     cls.attr(name) = static_cast<int>(status);
   cls.def_ro("examined", &Overlaps::examined, "How many pairs were looked at: those given, or those whose boxes meet.");
   cls.def_ro("tolerance", &Overlaps::tolerance);
+  cls.def_prop_ro(
+      "method", [](const Overlaps& o) { return o.method == Method::kAuto ? "auto" : "paper"; },
+      nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
   cls.def("__len__", &Overlaps::size);
   cls.def(
       "__getitem__",
@@ -191,7 +197,7 @@ gradient as arrays.
 
 `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs` (p, 2)
 indexes them and has a row each in the answer; without it there is a row for each pair that overlaps or touches, found by
-a sweep over boxes and sorted. `tolerance` is that of `overlap`, whose answers these are to the last bit. The work is
+a sweep over boxes and sorted. `tolerance` and `method` are those of `overlap`, whose answers these are to the last bit. The work is
 spread over `threads`, None being all that there are; their number does not change a bit of the answer.
 
 Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
@@ -209,9 +215,10 @@ answers are those of a first call to the last bit. Threads that ask at the same 
       "__init__", [](Batch* self, nb::handle shapes) { new (self) Batch(to_shapes(shapes)); }, "shapes"_a.none(),
       nb::sig("def __init__(self, shapes: " OVERLAPPER_SHAPES ") -> None"));
   cls.def("overlaps", &batch_overlaps, "positions"_a.none(), "orientations"_a.none(), "pairs"_a.none() = nb::none(),
-          "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1,
+          "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1, "method"_a.none() = "auto",
           nb::sig("def overlaps(self, " OVERLAPPER_POSES ", pairs: numpy.typing.ArrayLike | None = None, "
-                  "tolerance: float = 0.001, threads: int | None = 1) -> Overlaps"),
+                  "tolerance: float = 0.001, threads: int | None = 1, "
+                  "method: typing.Literal['auto', 'paper'] = 'auto') -> Overlaps"),
           kOverlapsDoc);
   cls.def(
       "candidate_pairs", &candidates, "positions"_a.none(), "orientations"_a.none(),
@@ -228,15 +235,15 @@ void define_batch(nb::module_& m) {
   m.def(
       "overlaps",
       [](nb::handle shapes, nb::handle positions, nb::handle orientations, nb::handle pairs, nb::handle tolerance,
-         nb::handle threads) {
+         nb::handle threads, nb::handle method) {
         Batch batch(to_shapes(shapes));
-        return batch_overlaps(batch, positions, orientations, pairs, tolerance, threads);
+        return batch_overlaps(batch, positions, orientations, pairs, tolerance, threads, method);
       },
       "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none(), "pairs"_a.none() = nb::none(),
-      "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1,
+      "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1, "method"_a.none() = "auto",
       nb::sig("def overlaps(shapes: " OVERLAPPER_SHAPES ", " OVERLAPPER_POSES
-              ", pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1) "
-              "-> Overlaps"),
+              ", pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, "
+              "method: typing.Literal['auto', 'paper'] = 'auto') -> Overlaps"),
       kOverlapsDoc);
   m.def(
       "candidate_pairs",

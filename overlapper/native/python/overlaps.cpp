@@ -1,5 +1,3 @@
-#include <chrono>
-
 #include "canonical_order.h"
 #include "minkowski.h"
 #include "overlap.h"
@@ -10,14 +8,6 @@ namespace {
 
 const char* status_name(Status status) {
   return status == Status::kSeparated ? "separated" : status == Status::kTouching ? "touching" : "overlapping";
-}
-
-Method to_method(nb::handle value) {
-  if (!nb::isinstance<nb::str>(value)) throw nb::type_error("method must be 'auto' or 'paper'");
-  const std::string name = nb::cast<std::string>(value);
-  if (name == "auto") return Method::kAuto;
-  if (name == "paper") return Method::kPaper;
-  fail("method", "must be 'auto' or 'paper', not '" + name + "'");
 }
 
 bool solid(const Overlap& o) { return o.status() == Status::kOverlapping; }
@@ -327,73 +317,19 @@ distance is negative. Raises ValueError for two half-spaces.)");
       "Intersection over union of two shapes: common volume over the volume of their union, from 0 to 1.");
 }
 
-std::vector<Placed> place_all(nb::list shapes, nb::handle positions, nb::handle orientations) {
-  const Doubles p = to_doubles(positions, "positions", "an array of shape (k, 3)");
-  const Doubles q = to_doubles(orientations, "orientations", "an array of shape (k, 4)");
-  const size_t k = shapes.size();
-  if (p.ndim() != 2 || p.shape(0) != k || p.shape(1) != 3)
-    fail("positions", "must have the shape (k, 3), one row per shape");
-  if (q.ndim() != 2 || q.shape(0) != k || q.shape(1) != 4)
-    fail("orientations", "must have the shape (k, 4), one row per shape");
-  std::vector<Placed> placed;
-  placed.reserve(k);
-  for (size_t i = 0; i < k; ++i) {
-    const double *x = p.data() + 3 * i, *r = q.data() + 4 * i;
-    placed.push_back(make_placed(to_shape(shapes[i], "shapes[" + std::to_string(i) + "]"), {x[0], x[1], x[2]},
-                                 {r[0], r[1], r[2], r[3]}));
-  }
-  return placed;
-}
-
-/// Goes on with the pairs for a tenth of a second, while other Python threads run; then Ctrl-C is looked for.
-void overlap_for_a_while(const std::vector<Placed>& placed, const int* pairs, size_t count, double tolerance,
-                         Method method, std::vector<Overlap>& overlaps) {
-  const nb::gil_scoped_release release;
-  const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
-  while (overlaps.size() < count && std::chrono::steady_clock::now() < end) {
-    const int* pair = pairs + 2 * overlaps.size();
-    overlaps.emplace_back(std::vector<Placed>{placed[pair[0]], placed[pair[1]]}, tolerance, method);
-  }
-}
-
-nb::list overlap_pairs(nb::list shapes, nb::handle positions, nb::handle orientations, nb::handle pairs,
-                       nb::handle tolerance_given, nb::handle method_name) {
-  const std::vector<Placed> placed = place_all(shapes, positions, orientations);
-  const Method method = to_method(method_name);
-  const double tolerance = to_double(tolerance_given, "tolerance");
-  const auto index = nb::cast<nb::ndarray<const int, nb::c_contig, nb::device::cpu>>(
-      nb::module_::import_("numpy").attr("ascontiguousarray")(pairs, "dtype"_a = "int32"));
-  if (index.ndim() != 2 || index.shape(1) != 2) fail("pairs", "must have the shape (p, 2)");
-  std::vector<Overlap> overlaps;
-  overlaps.reserve(index.shape(0));
-  for (size_t i = 0; i < 2 * index.shape(0); ++i)
-    if (index.data()[i] < 0 || index.data()[i] >= static_cast<int>(placed.size()))
-      fail("pairs", "must index the shapes");
-  while (overlaps.size() < index.shape(0)) {
-    overlap_for_a_while(placed, index.data(), index.shape(0), tolerance, method, overlaps);
-    if (PyErr_CheckSignals() != 0) throw nb::python_error();
-  }
-  nb::list list;
-  for (Overlap& o : overlaps) list.append(nb::cast(std::move(o)));
-  return list;
-}
-
-void define_overlap_pairs(nb::module_& m) {
-  m.def("overlap_pairs", &overlap_pairs, "shapes"_a, "positions"_a, "orientations"_a, "pairs"_a,
-        "tolerance"_a.none() = 1e-3, "method"_a.none() = "auto",
-        nb::sig("def overlap_pairs(shapes: list[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace], positions: "
-                "numpy.typing.ArrayLike, "
-                "orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike, tolerance: float = 0.001, "
-                "method: typing.Literal['auto', 'paper'] = 'auto') -> list[Overlap]"),
-        "overlap() of each pair (p, 2) of the shapes at positions (k, 3) and orientations (k, 4), in one call.");
-}
-
 }  // namespace
+
+Method to_method(nb::handle value) {
+  if (!nb::isinstance<nb::str>(value)) throw nb::type_error("method must be 'auto' or 'paper'");
+  const std::string name = nb::cast<std::string>(value);
+  if (name == "auto") return Method::kAuto;
+  if (name == "paper") return Method::kPaper;
+  fail("method", "must be 'auto' or 'paper', not '" + name + "'");
+}
 
 void define_overlaps(nb::module_& m) {
   define_overlap(m);
   define_functions(m);
-  define_overlap_pairs(m);
 }
 
 }  // namespace overlapper::python

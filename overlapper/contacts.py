@@ -1,0 +1,79 @@
+"""The pairs of shapes of a scene that overlap or touch, one by one or as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, SupportsIndex, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import Overlap, Overlaps
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Two shapes of different bodies that overlap or touch; `overlap.status` says which.
+
+    Bodies and links are pybullet's indices, link -1 is the base, shapes are counted within their link. bodyA < bodyB;
+    `overlap.shapes[0]` is A's, so that `overlap.normal` points from B to A as pybullet's contactNormalOnB does.
+    """
+
+    bodyA: int
+    linkA: int
+    shapeA: int
+    bodyB: int
+    linkB: int
+    shapeB: int
+    overlap: Overlap
+
+
+class Contacts(Sequence[Contact]):
+    """Contacts sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB); each is made when it is looked at, and kept.
+
+    `overlaps` has volumes, centroids, normals, depths, gradients and more as arrays, a row per contact, which cost
+    nothing more. A slice, a mask or an array of indices picks contacts: `contacts[contacts.overlaps.depth > 1e-3]`.
+    """
+
+    __slots__ = ("_keys", "_made", "overlaps")
+
+    def __init__(self, keys: NDArray[np.int64], overlaps: Overlaps) -> None:
+        """`keys` (k, 3) are body, link and shape of what the pairs of `overlaps` index."""
+        self.overlaps = overlaps
+        self._keys = keys
+        self._made: list[Contact | None] = [None] * len(overlaps)
+
+    @property
+    def keys(self) -> NDArray[np.int64]:
+        """(n, 6) integers bodyA, linkA, shapeA, bodyB, linkB, shapeB of each contact."""
+        return self._keys[self.overlaps.pairs].reshape(-1, 6)
+
+    def __len__(self) -> int:
+        return len(self._made)
+
+    @overload
+    def __getitem__(self, which: int) -> Contact: ...
+    @overload
+    def __getitem__(self, which: slice | Sequence[int] | NDArray[Any]) -> Contacts: ...
+    def __getitem__(self, which: Any) -> Contact | Contacts:
+        if not isinstance(which, SupportsIndex) or isinstance(which, np.ndarray):
+            return Contacts(self._keys, self.overlaps[which])
+        row = range(len(self))[which]
+        made = self._made[row]
+        if made is None:
+            (bodyA, linkA, shapeA), (bodyB, linkB, shapeB) = self._keys[self.overlaps.pairs[row]].tolist()
+            made = Contact(bodyA, linkA, shapeA, bodyB, linkB, shapeB, self.overlaps[row])
+            self._made[row] = made
+        return made
+
+    def __iter__(self) -> Iterator[Contact]:
+        return map(self.__getitem__, range(len(self)))
+
+    def __eq__(self, other: object) -> bool:
+        return list(self) == list(other) if isinstance(other, (list, Contacts)) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"Contacts({len(self)}, {int((self.overlaps.status == Overlaps.OVERLAPPING).sum())} of them overlapping)"
