@@ -82,7 +82,7 @@ def _facing(overlap: Overlap, bodies: list[RationalBody]) -> list[OwnedPlane]:
     normal = exact(overlap.normal)
     for body, sign in zip(bodies, (-1, 1)):
         if isinstance(body.shape, HalfSpace):
-            normal = sign * (body.axes @ exact(body.shape.normal))
+            normal = sign * (body.axes @ exact(body.shape.given_normal))
     if any(body.support(sign * normal) is None for body, sign in zip(bodies, (-1, 1))):
         return []
     return [_supporting(bodies, -normal, 0), _supporting(bodies, normal, 1)]
@@ -106,7 +106,7 @@ def _nearest(body: RationalBody, point: Exact) -> Exact:
     if body.contains(point[None])[0]:
         return point
     if isinstance(body.shape, HalfSpace):
-        normal = body.axes @ exact(body.shape.normal)
+        normal = body.axes @ exact(body.shape.given_normal)
         outside = normal @ point - support_above(body, normal)
         foot: Exact = point - normal * (outside / (normal @ normal))
         return foot
@@ -238,7 +238,7 @@ class BodyPlanes:
                 scale = np.array([Fraction(1, 2 ** max(map(int.bit_length, normal))) for normal in normals])
                 return normals * scale[:, None], offsets * scale
             case HalfSpace() as half:
-                return exact(half.normal)[None], exact([half.offset])
+                return exact(half.given_normal)[None], exact([half.given_offset])
             case _:
                 return np.empty((0, 3), object), np.empty(0, object)
 

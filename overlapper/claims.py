@@ -107,17 +107,16 @@ class Touching:
         return Fraction(0), self.volume_bound()
 
     def volume_bound(self) -> Fraction:
-        """The inradius times the surface of a box around a body.
+        """The inradius times the surface of a box around the common part.
 
         The inner parallel bodies of a convex set have less surface than the set, and that has less than a box around
         it; the volume is the integral of their surfaces over depths from 0 to the inradius.
         """
-        surfaces = []
-        for body in (RationalBody(shape) for shape in self.shapes if not isinstance(shape.shape, HalfSpace)):
-            x, y, z = (support_above(body, axis) + support_above(body, -axis) for axis in AXES)
-            surfaces.append(2 * (x * y + y * z + z * x))
-        require(bool(surfaces), "one of the bodies must be bounded")
-        return max(self.inradius, Fraction(0)) * min(surfaces)
+        bounded = [RationalBody(shape) for shape in self.shapes if not isinstance(shape.shape, HalfSpace)]
+        require(bool(bounded), "one of the bodies must be bounded")
+        upper, lower = ([min(support_above(body, way) for body in bounded) for way in ways] for ways in (AXES, -AXES))
+        x, y, z = (max(a + b, Fraction(0)) for a, b in zip(upper, lower))
+        return max(self.inradius, Fraction(0)) * 2 * (x * y + y * z + z * x)
 
 
 def support_above(body: RationalBody, direction: Exact) -> Fraction:

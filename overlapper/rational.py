@@ -1,7 +1,8 @@
 """Placed shapes in rational arithmetic: a double is a rational number, so all that it says can be taken exactly.
 
-Only what defines a shape is used: radii, lengths, half extents, vertices, normal and offset, position, quaternion. A
-quaternion stands for the exact rotation of its direction. Facets of a hull are a suggestion that is checked.
+Only what defines a shape is used: radii, lengths, half extents, corners of hulls, normals and offsets as given,
+position, quaternion. A quaternion stands for the exact rotation of its direction. The triangles of a hull are a
+suggestion that is checked.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ def primitive(row: Iterable[Fraction]) -> tuple[int, ...]:
     return tuple(x // divisor for x in numbers)
 
 
-def is_closed(triangles: NDArray[np.intp]) -> bool:
+def is_closed(triangles: NDArray[np.signedinteger]) -> bool:
     """Whether triangles (k, 3) of indices have no border: every directed edge is met by its reverse as often."""
     edges = Counter((int(t[i - 1]), int(t[i])) for t in triangles for i in range(3))
     return bool(edges) and all(count == edges[end, start] for (start, end), count in edges.items())
@@ -78,20 +79,6 @@ def fans(rings: Iterable[NDArray[np.int32]]) -> NDArray[np.intp]:
     """Triangles (k, 3) of polygons, all of a polygon at its first corner."""
     triangles = [(ring[0], *pair) for ring in rings for pair in pairwise(ring[1:])]
     return np.array(triangles, np.intp).reshape(-1, 3)
-
-
-def bulging(ring: list[int], points: Exact) -> list[tuple[int, int, int]]:
-    """Triangles of a polygon whose corners lie in a plane but for rounding: those of the hull, seen from outside."""
-    start, end = points[ring[-1]], points[ring[0]]
-    apex = 1
-    normal = cross(end - start, points[ring[apex]] - start)
-    if not ((points[ring] - start) @ normal).any():
-        return [(ring[0], *pair) for pair in pairwise(ring[1:])]
-    for i in range(2, len(ring) - 1):
-        if normal @ (points[ring[i]] - start) > 0:
-            apex, normal = i, cross(end - start, points[ring[i]] - start)
-    parts = [part for part in (ring[: apex + 1], ring[apex:]) if len(part) > 2]
-    return [(ring[-1], ring[0], ring[apex]), *(triangle for part in parts for triangle in bulging(part, points))]
 
 
 class RationalBody:
@@ -110,7 +97,7 @@ class RationalBody:
             case Box() as box:
                 return base + exact(box.half_extents) @ [abs(x), abs(y), abs(z)], none
             case Hull() as hull:
-                return base + max(exact(hull.vertices) @ [x, y, z]), none
+                return base + max(exact(hull.corners) @ [x, y, z]), none
             case Sphere() as ball:
                 return base, Fraction(ball.radius) ** 2 * (x * x + y * y + z * z)
             case Capsule() as capsule:
@@ -120,10 +107,10 @@ class RationalBody:
                 tip = Fraction(cylinder.length) / 2 * abs(z)
                 return base + tip, Fraction(cylinder.radius) ** 2 * (x * x + y * y)
             case HalfSpace() as half:
-                normal, local = exact(half.normal), np.array([x, y, z])
+                normal, local = exact(half.given_normal), np.array([x, y, z])
                 if any(cross(normal, local)) or local @ normal < 0:
                     return None
-                return base + Fraction(half.offset) * (local @ normal) / (normal @ normal), none
+                return base + Fraction(half.given_offset) * (local @ normal) / (normal @ normal), none
 
     def is_below(self, direction: Exact, offset: Fraction) -> bool:
         """Whether the body lies in { x : direction . x <= offset }: the squares are compared, no root is taken."""
@@ -152,7 +139,7 @@ class RationalBody:
             case Cylinder() as cylinder:
                 inside = (abs(z) + margin <= Fraction(cylinder.length) / 2) & holds(x * x + y * y, cylinder.radius)
             case HalfSpace() as half:
-                row = np.array([primitive([*exact(half.normal), Fraction(half.offset)])], object)
+                row = np.array([primitive([*exact(half.given_normal), Fraction(half.given_offset)])], object)
                 inside = self._below(row[:, :3], row[:, 3], local, margin)
         return np.asarray(inside, bool)
 
@@ -176,14 +163,13 @@ class RationalBody:
         area lie on the edges of others. The converse is not said: a hull may be larger than its facets.
         """
         assert isinstance(self.shape, Hull)
-        vertices = exact(self.shape.vertices)
-        triangles = np.array([t for ring in self.shape.facets for t in bulging(ring.tolist(), vertices)])
+        vertices, triangles = exact(self.shape.corners), self.shape.triangles
         a, b, c = (vertices[corner] for corner in triangles.T)
         normals = cross(b - a, c - a)
         solid = np.array([any(normal) for normal in normals])
         normals, offsets = normals[solid], (normals * a).sum(axis=1)[solid]
         mean = vertices.sum(axis=0) / Fraction(len(vertices))
         if not is_closed(triangles) or any(normals @ mean >= offsets):
-            raise ValueError("facets of a hull must be a closed surface around the mean of its vertices")
+            raise ValueError("triangles of a hull must be a closed surface around the mean of its corners")
         rows = np.array(sorted({primitive(row) for row in np.column_stack([normals, offsets])}), object)
         return rows[:, :3], rows[:, 3]

@@ -158,7 +158,8 @@ class HalfSpace:
     """
     The closed half-space { x : normal · x <= offset }.
 
-    `normal` may have any length but 0; both it and `offset` are divided by it.
+    `normal` may have any length but 0. The half-space is what the two say as given, without rounding; the attributes
+    `normal` and `offset` are both divided by the length, which rounds.
     """
 
     def __init__(self, normal: numpy.typing.ArrayLike, offset: float) -> None: ...
@@ -170,6 +171,14 @@ class HalfSpace:
     @property
     def offset(self) -> float:
         """m along the unit normal"""
+
+    @property
+    def given_normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(3,) as given, of any length"""
+
+    @property
+    def given_offset(self) -> float:
+        """As given, along the normal as given."""
 
     @property
     def volume(self) -> float:
@@ -207,7 +216,9 @@ class Hull:
 
     @property
     def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
-        """(n, 3) the corners only, m"""
+        """
+        (n, 3) the corners only, m; without those that mere rounding lifts off a facet
+        """
 
     @property
     def facets(self) -> list[numpy.typing.NDArray[numpy.int32]]:
@@ -219,6 +230,18 @@ class Hull:
     def halfspaces(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
         """
         (k, 4) rows [n, b], one per facet: n · x + b <= 0 inside, n unit (scipy's form).
+        """
+
+    @property
+    def corners(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (n, 3) all corners of the hull of the points as given, without rounding, m
+        """
+
+    @property
+    def triangles(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, None), writable=False)]:
+        """
+        (k, 3) indices of the corners of its surface before coplanar triangles are merged, counter-clockwise from outside.
         """
 
     @property

@@ -122,6 +122,21 @@ def test_hard_families_are_proved(name):
         proved(overlap(*families.make(name, seed).placed, tolerance=0.1))
 
 
+def test_a_half_space_is_what_its_numbers_say_as_given():
+    """Its normal divided by its length is another one."""
+    case = families.make("half_spaces", 10008)
+    lower, upper = proved(overlap(*case.placed))
+    assert lower <= case.truth.volume <= upper
+
+
+def test_a_hull_has_the_corners_that_rounding_alone_lifts_off_a_facet():
+    case = families.make("nearly_touching", 10133)
+    hull = Hull(case.bodies[1])
+    assert len(hull.vertices) < len(hull.corners) == len(case.bodies[1])
+    lower, upper = proved(overlap(*case.placed))
+    assert lower <= case.truth.volume <= upper
+
+
 def test_what_the_paper_method_finds_is_bounded_by_the_certificate():
     """That method may lose planes, never invent a common part."""
     bodies = IN_COMMON["cubes"]

@@ -4,6 +4,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -41,6 +42,21 @@ inline Matrix to_numpy(std::span<const Vec3> rows) {
 
 inline Indices to_numpy(std::span<const int> values) {
   return to_numpy<Indices>(std::vector<int>(values.begin(), values.end()), {values.size()});
+}
+
+/// Rows of points, counted from elsewhere.
+inline Matrix to_numpy(std::span<const Vec3> rows, Vec3 origin) {
+  std::vector<Vec3> moved;
+  moved.reserve(rows.size());
+  for (Vec3 v : rows) moved.push_back(v + origin);
+  return to_numpy(std::span<const Vec3>(moved));
+}
+
+inline IndexMatrix to_numpy(std::span<const std::array<int, 3>> rows) {
+  std::vector<int> values;
+  values.reserve(3 * rows.size());
+  for (const auto& row : rows) values.insert(values.end(), row.begin(), row.end());
+  return to_numpy<IndexMatrix>(std::move(values), {rows.size(), 3});
 }
 
 inline Matrix to_numpy(const Mat3& m) { return to_numpy(std::vector<Vec3>{m.row0, m.row1, m.row2}); }

@@ -208,7 +208,8 @@ As in pybullet, `length` lies between the centres of the caps; it may be 0.)");
   nb::class_<HalfSpace> half(m, "HalfSpace",
                              R"(The closed half-space { x : normal · x <= offset }.
 
-`normal` may have any length but 0; both it and `offset` are divided by it.)");
+`normal` may have any length but 0. The half-space is what the two say as given, without rounding; the attributes
+`normal` and `offset` are both divided by the length, which rounds.)");
   half.def(
       "__init__",
       [](HalfSpace* self, nb::handle normal, nb::handle offset) {
@@ -219,6 +220,11 @@ As in pybullet, `length` lies between the centres of the caps; it may be 0.)");
   array_property(
       half, "normal", [](const HalfSpace& h) { return to_numpy(h.plane.normal); }, "(3,) unit, out of the solid");
   half.def_prop_ro("offset", [](const HalfSpace& h) { return h.plane.offset; }, "m along the unit normal");
+  array_property(
+      half, "given_normal", [](const HalfSpace& h) { return to_numpy(h.given_normal); },
+      "(3,) as given, of any length");
+  half.def_prop_ro(
+      "given_offset", [](const HalfSpace& h) { return h.given_offset; }, "As given, along the normal as given.");
   define_common(half);
   define_pickle(half, [](const HalfSpace& h) {
     const Vec3 n = h.given_normal;
@@ -234,13 +240,8 @@ ValueError for fewer than four points, for points that are not finite and for po
       "__init__", [](Hull* self, nb::handle vertices) { new (self) Hull(make_hull(to_rows(vertices, "vertices"))); },
       "vertices"_a.none(), nb::sig("def __init__(self, vertices: numpy.typing.ArrayLike) -> None"));
   array_property(
-      hull, "vertices",
-      [](const Hull& h) {
-        std::vector<Vec3> vertices;
-        for (Vec3 v : h.data->vertices) vertices.push_back(v + h.data->origin);
-        return to_numpy(vertices);
-      },
-      "(n, 3) the corners only, m");
+      hull, "vertices", [](const Hull& h) { return to_numpy(h.data->vertices, h.data->origin); },
+      "(n, 3) the corners only, m; without those that mere rounding lifts off a facet");
   hull.def_prop_ro(
       "facets", [](const Hull& h) { return polygons(h.data->ring, h.data->ring_start); },
       nb::sig("def facets(self) -> list[numpy.typing.NDArray[numpy.int32]]"),
@@ -253,6 +254,13 @@ ValueError for fewer than four points, for points that are not finite and for po
         return halfspace_rows(planes);
       },
       "(k, 4) rows [n, b], one per facet: n · x + b <= 0 inside, n unit (scipy's form).");
+  array_property(
+      hull, "corners", [](const Hull& h) { return to_numpy(h.data->corners, h.data->origin); },
+      "(n, 3) all corners of the hull of the points as given, without rounding, m");
+  array_property(
+      hull, "triangles", [](const Hull& h) { return to_numpy(h.data->triangles); },
+      "(k, 3) indices of the corners of its surface before coplanar triangles are merged, counter-clockwise from "
+      "outside.");
   define_common(hull);
   hull.def("__getstate__", &hull_state, nb::sig("def __getstate__(self) -> tuple[object, ...]"));
   hull.def(
