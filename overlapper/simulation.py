@@ -56,7 +56,7 @@ class Report:
 
     `shapes` counts those of the scene, `shapes_read` those modelled, `pairs_possible` the pairs of modelled shapes of
     different bodies that are not both static. The rest is of the last `overlaps()`: pairs whose boxes meet, pairs that
-    overlap, facets that took part.
+    overlap, those of them that were measured again in wider arithmetic (see `Overlap.widened`), facets that took part.
     """
 
     bodies: int
@@ -65,13 +65,15 @@ class Report:
     pairs_possible: int
     pairs_examined: int
     pairs_overlapping: int
+    pairs_widened: int
     facets_touched: int
 
     def __str__(self) -> str:
+        widened = f"{self.pairs_widened:,} of them" if self.pairs_widened else "none of them"
         return (
             f"{self.bodies:,} bodies, {self.shapes_read:,} of {self.shapes:,} shapes read\n"
-            f"{self.pairs_examined:,} of {self.pairs_possible:,} pairs examined, {self.pairs_overlapping:,} overlap, "
-            f"{self.facets_touched:,} facets touched"
+            f"{self.pairs_examined:,} of {self.pairs_possible:,} pairs examined, {self.facets_touched:,} facets touched\n"
+            f"{self.pairs_overlapping:,} overlap, {widened} measured again in wider arithmetic"
         )
 
 
@@ -148,6 +150,7 @@ class Bodies:
             pairs_possible=_pairs_between(owners) - _pairs_between(owners[static]),
             pairs_examined=len(examined),
             pairs_overlapping=int((examined.status == Overlaps.OVERLAPPING).sum()),
+            pairs_widened=int(examined.widened.sum()),
             facets_touched=int(examined.facets_touched.sum()),
         )
 

@@ -133,7 +133,7 @@ def _sum(before: Report | None, now: Report) -> Report:
     """Bodies and shapes as they are now, pairs and facets of all steps."""
     if before is None:
         return now
-    counts = ("pairs_possible", "pairs_examined", "pairs_overlapping", "facets_touched")
+    counts = ("pairs_possible", "pairs_examined", "pairs_overlapping", "pairs_widened", "facets_touched")
     return replace(now, **{name: getattr(before, name) + getattr(now, name) for name in counts})
 
 

@@ -875,9 +875,20 @@ def test_the_report_counts_what_was_looked_at(client):
     assert report.pairs_possible == 10
     assert report.pairs_examined == report.pairs_overlapping == 4 + 3
     assert report.facets_touched > 0
-    read, examined = str(report).splitlines()
+    read, examined, overlapping = str(report).splitlines()
     assert read == "5 bodies, 5 of 5 shapes read"
-    assert examined.startswith("7 of 10 pairs examined, 7 overlap, ")
+    assert examined.startswith("7 of 10 pairs examined, ")
+    assert overlapping == "7 overlap, none of them measured again in wider arithmetic"
+
+
+def test_the_report_counts_overlaps_too_thin_for_doubles(client):
+    for x in (0, 0.5, 1.5 - 1e-13):
+        box(client, position=[x, 0, 0])
+    bodies = Bodies(client)
+    _, second = sorted(contact.overlap.volume for contact in bodies.overlaps())
+    assert second == pytest.approx(0.5)
+    assert bodies.report().pairs_widened == 1
+    assert str(bodies.report()).splitlines()[2] == "2 overlap, 1 of them measured again in wider arithmetic"
 
 
 # --- names and colours
