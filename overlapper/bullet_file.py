@@ -61,12 +61,14 @@ class Leaf:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collider:
-    """A link's body for collisions: the address of its shape, and where it is.
+    """A link's body for collisions: the address of its shape, its collision filter, and where it is.
 
     `position` (3,) and `rotation` (3, 3) are those of the inertial frame in the world, in double precision.
     """
 
     shape: int
+    group: int
+    mask: int
     position: NDArray[np.float64]
     rotation: NDArray[np.float64]
 
@@ -217,6 +219,8 @@ def _collider(record: Any) -> Collider:
     transform = record["m_worldTransform"]
     return Collider(
         int(record["m_collisionShape"]),
+        int(record["m_collisionFilterGroup"]),
+        int(record["m_collisionFilterMask"]),
         transform["m_origin"]["m_floats"][:3],
         transform["m_basis"]["m_el"]["m_floats"][:, :3],
     )

@@ -115,12 +115,16 @@ def run(
     concave_threshold: Annotated[
         float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
     ] = 0.05,
+    pairs: Annotated[
+        Literal["simulated", "all"] | None,
+        typer.Option(help="Pairs that the simulator lets collide, or all of different bodies; by default PAIRS."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
     """Simulate a scene and measure what its bodies have in common in every step.
 
     A scene is a Python file with STEPS, the number of steps, and build(client), which fills a pybullet client and may
-    return a function step(i) that is called before each step.
+    return a function step(i) that is called before each step. PAIRS in it may be "all", or a list of pairs of bodies.
 
     Examples:
 
@@ -143,11 +147,12 @@ def run(
         "method": method,
         "concave": concave,
         "concave_threshold": concave_threshold,
+        "pairs": pairs,
     }
     summary, finished = _measure(scene, steps, out, html, check is not None, per, geometry)
     files = {name: str(path) for name, path in (("out", out), ("html", html)) if path}
     if as_json:
-        print(json.dumps(summary.as_dict() | {"finished": finished} | geometry | files))
+        print(json.dumps(geometry | summary.as_dict() | {"finished": finished} | files))
     else:
         _show(summary, finished, files)
     if not finished:

@@ -14,10 +14,11 @@ from overlapper import Overlap, Overlaps
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Two shapes of different bodies that overlap or touch; `overlap.status` says which.
+    """Two shapes that overlap or touch; `overlap.status` says which.
 
-    Bodies and links are pybullet's indices, link -1 is the base, shapes are counted within their link. bodyA < bodyB;
-    `overlap.shapes[0]` is A's, so that `overlap.normal` points from B to A as pybullet's contactNormalOnB does.
+    Bodies and links are pybullet's indices, link -1 is the base, shapes are counted within their link. A is the lesser
+    of the two; `overlap.shapes[0]` is A's, so that `overlap.normal` points from B to A as pybullet's contactNormalOnB
+    does.
     """
 
     bodyA: int

@@ -85,7 +85,7 @@ class Body:
     name: str
     link_names: dict[int, str]
     colors: dict[int, Color]
-    fixed_links: frozenset[int]  # the base, and what only fixed joints tie to it
+    parents: dict[int, int]  # of each link
     shape_count: int
     parts: tuple[Part, ...]
     skipped: tuple[Skipped, ...]
@@ -165,8 +165,7 @@ def read_body(
     name = name or f"body {id}"
     joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
     link_names = {BASE: base or "base"} | {joint[0]: joint[12].decode(errors="replace") for joint in joints}
-    welds = {joint[0]: joint[16] for joint in joints if joint[2] == pybullet.JOINT_FIXED}
-    fixed_links = frozenset(link for link in link_names if _is_tied_to_base(link, welds))
+    parents = {joint[0]: joint[16] for joint in joints}
     leaves = _leaves(client, id, file, saved) if saved else {}
     parts: list[Part] = []
     skipped: list[Skipped] = []
@@ -187,14 +186,7 @@ def read_body(
         soft = _body_type(client, id) == SOFT_BODY
         skipped.append(Skipped(id, BASE, name, "a soft body is not modelled" if soft else "saveBullet leaves it out"))
     colors = _colors(client, id, link_names)
-    return Body(name, link_names, colors, fixed_links, shape_count, tuple(parts), tuple(skipped), tuple(decomposed))
-
-
-def _is_tied_to_base(link: int, welds: Mapping[int, int]) -> bool:
-    """Whether only fixed joints, given as child and parent, are between a link and the base."""
-    while link in welds:
-        link = welds[link]
-    return link == BASE
+    return Body(name, link_names, colors, parents, shape_count, tuple(parts), tuple(skipped), tuple(decomposed))
 
 
 def _colors(client: int, id: int, links: Mapping[int, str]) -> dict[int, Color]:

@@ -1,7 +1,9 @@
 """What a scene is, and how it is found: by name or by path.
 
 A scene is a Python file with a docstring that says what is hard about it, `STEPS`, and `build(client)`, which fills the
-pybullet client and may return `step(i)`, called before every stepSimulation.
+pybullet client and may return `step(i)`, called before every stepSimulation. `PAIRS`, if it is there, says which pairs
+are looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
+apart.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 Step = Callable[[int], object]
 
@@ -32,6 +35,7 @@ class Scene:
     difficulty: str
     steps: int
     build: Callable[[int], Step | None]
+    pairs: Any = "simulated"
 
     @property
     def expected(self) -> Path:
@@ -94,7 +98,10 @@ def load_scene(name_or_path: str | Path) -> Scene:
         raise SceneError(f"{path} must have STEPS, a whole number of steps from 1, but STEPS is {steps!r}")
     if not callable(build):
         raise SceneError(f"{path} must have a function build(client)")
-    return Scene(path.stem, path, (module.__doc__ or "").strip(), steps, build)
+    pairs = getattr(module, "PAIRS", "simulated")
+    if isinstance(pairs, str) and pairs not in ("simulated", "all"):
+        raise SceneError(f"{path} has PAIRS = {pairs!r}, which must be 'simulated', 'all' or a list of pairs")
+    return Scene(path.stem, path, (module.__doc__ or "").strip(), steps, build, pairs)
 
 
 def _find(name_or_path: str | Path) -> Path:

@@ -2,8 +2,8 @@
 
 Shapes are read once, poses at every step. Surfaces are the nominal ones: Bullet itself lays a margin of 1 mm around
 convex hulls (mesh shapes, and the `<cylinder>` of a URDF, which Bullet makes a 32-gon hull), so that pybullet reports
-hulls 1 mm nearer than they are here, and MJCF capsules thinner than 4 cm wrongly. Which bodies the simulator
-lets collide (groups, masks, pair filters) is not asked: these are overlaps of geometry.
+hulls 1 mm nearer than they are here, and MJCF capsules thinner than 4 cm wrongly. Pairs are those that the simulator
+lets collide.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from __future__ import annotations
 import uuid
 import warnings
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from overlapper.quaternion import composed, rotated
 try:
     import pybullet
 
+    from overlapper.bullet_file import BulletFile
     from overlapper.extraction import (
         BASE,
         Array,
@@ -40,10 +41,25 @@ try:
         save,
         saved_bodies,
     )
+    from overlapper.filters import Colliders, CollisionRules, Who, pair_codes
+    from overlapper.recorder import Recorder
 except ImportError as error:
     raise ImportError("overlapper.simulation needs pybullet: pip install 'overlapper[sim]'") from error
 
-__all__ = ["Bodies", "Concave", "Contact", "Contacts", "Decomposed", "Report", "Skipped", "SkippedShapeWarning"]
+__all__ = [
+    "Among",
+    "Bodies",
+    "Concave",
+    "Contact",
+    "Contacts",
+    "Decomposed",
+    "Recorder",
+    "Report",
+    "Skipped",
+    "SkippedShapeWarning",
+]
+
+Among = Literal["simulated", "all"] | Iterable[tuple[Who, Who]]
 
 
 class SkippedShapeWarning(UserWarning):
@@ -54,9 +70,10 @@ class SkippedShapeWarning(UserWarning):
 class Report:
     """How little of a scene had to be modelled.
 
-    `shapes` counts those of the scene, `shapes_read` those modelled, `pairs_possible` the pairs of modelled shapes of
-    different bodies that are not both static. The rest is of the last `overlaps()`: pairs whose boxes meet, pairs that
-    overlap, those of them that were measured again in wider arithmetic (see `Overlap.widened`), facets that took part.
+    `shapes` counts those of the scene, `shapes_read` those modelled. The rest is of the last `overlaps()`:
+    `pairs_possible` are the pairs of modelled shapes it was asked about, by default those that the simulator lets
+    collide, then follow pairs whose boxes meet, pairs that overlap, those of them that were measured again in wider
+    arithmetic (see `Overlap.widened`), and facets that took part.
     """
 
     bodies: int
@@ -95,59 +112,92 @@ class Bodies:
     It takes up to minutes the first time, and needs the extra `concave`. A mesh whose surface is open bounds no volume
     and is skipped; with concave="enclose" CoACD lays walls around it. With concave="skip" all concave meshes are.
 
+    Pairs are those that pybullet lets collide, by static bases, groups and masks; a `recorder`, set up before the scene
+    is built, adds what pybullet cannot be asked for: pair filters, the filter mode and self-collision. `pairs` and
+    `overlaps` take other choices. Groups and masks are read again with new bodies, when a base becomes static or
+    ceases to be, and when a recorder hears of a change.
+
     Bodies that come, go or take over the id of another are noticed by `update()`, which marks every body with a user
     data entry. New bodies are read from a temporary .bullet file; if two stand at the same point, the
     friction of all is set and restored to tell them apart. Bodies that another process adds to a shared simulation are
     noticed after `pybullet.syncBodyInfo()`.
 
-    ValueError if `physicsClientId` is not connected or the simulation has diverged; RuntimeError if the physics server
-    writes where this process cannot read.
+    ValueError if `physicsClientId` is not connected, the recorder is of another client or the simulation has diverged;
+    RuntimeError if the physics server writes where this process cannot read.
     """
 
     def __init__(
-        self, physicsClientId: int = 0, *, concave: Concave = "decompose", concave_threshold: float = 0.05
+        self,
+        physicsClientId: int = 0,
+        *,
+        concave: Concave = "decompose",
+        concave_threshold: float = 0.05,
+        recorder: Recorder | None = None,
     ) -> None:
         if concave not in get_args(Concave):
             raise ValueError(f"concave must be one of {', '.join(map(repr, get_args(Concave)))}, not {concave!r}")
         check_threshold(concave_threshold)
+        if recorder and recorder.physicsClientId != physicsClientId:
+            raise ValueError(f"recorder is of client {recorder.physicsClientId}, not of {physicsClientId}")
         self.physicsClientId = physicsClientId
         self._concave: Concave = concave
         self._threshold = concave_threshold
+        self._recorder = recorder
         self._mark = f"overlapper {uuid.uuid4()}"
         self._bodies: dict[int, Body] = {}
         self._unidentified = 0
         self._rows: dict[int, int] = {}  # in a .bullet file, of the bodies whose poses have no other source
+        self._filters: dict[tuple[int, int], tuple[int, int]] = {}  # group and mask by body and link
+        self._noted = (0, 0)  # of the recorder, changes and masks set
+        self._static: list[bool] = []
+        self._asked: str | int = "simulated"  # of the last overlaps(); how many, if it was a list
         self._arrange()
+        self._rules = self._current_rules()
         self._refresh()
         self._examined = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
 
     def update(self) -> None:
-        """Read the shapes of bodies that are new, then the poses of all. Call it once per step."""
+        """Read the shapes of new bodies and changed filters, then all poses. Call it once per step."""
         self._refresh()
 
     def overlaps(
-        self, tolerance: float = 1e-3, method: Literal["auto", "paper"] = "auto", threads: int | None = 1
+        self,
+        tolerance: float = 1e-3,
+        method: Literal["auto", "paper"] = "auto",
+        threads: int | None = 1,
+        pairs: Among = "simulated",
     ) -> Contacts:
         """Pairs of shapes that overlap or touch, sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB).
 
-        Pairs within a body are left out, and pairs of static shapes: bases of mass 0, with the links that only fixed
-        joints tie to them. `tolerance`, `method` and `threads` are those of `overlapper.overlaps`. What is found is
-        kept for the next call: pairs of which neither shape has moved by a bit cost nothing.
+        `tolerance`, `method` and `threads` are those of `overlapper.overlaps`, `pairs` is what `Bodies.pairs` is asked
+        for. What is found is kept for the next call: pairs of which neither shape has moved by a bit cost nothing.
         """
-        found = self._batch.overlaps(
-            self._positions, self._orientations, self._candidate_pairs(), tolerance, threads, method
-        )
+        among: Among = pairs if isinstance(pairs, str) else list(pairs)
+        candidates = self.pairs(among)
+        self._asked = among if isinstance(among, str) else len(self._codes(among))
+        found = self._batch.overlaps(self._positions, self._orientations, candidates, tolerance, threads, method)
         self._examined = found
         return Contacts(self._key_rows, found[found.status != Overlaps.SEPARATED])
 
+    def pairs(self, among: Among = "simulated") -> NDArray[np.int32]:
+        """(n, 2) pairs of shapes whose boxes meet, as places in `keys`: each once, the lesser first, sorted.
+
+        "simulated" are those that the simulator lets collide, "all" those of different bodies, whatever it does. Any
+        other choice is a list of pairs of bodies, links (body, link) or shapes (body, link, shape), as
+        [(robot, table), ((robot, 8), (robot, 3))]; it may name two links of one body, and no filter is asked.
+        A body paired with itself stands for all pairs of its links. ValueError if there is no such body or link.
+        """
+        pairs: NDArray[np.int32] = self._batch.candidate_pairs(self._positions, self._orientations)
+        return np.asarray(pairs[self._chosen(pairs, among)])
+
     def report(self) -> Report:
         """How much of the scene was read, and how much of it the last `overlaps()` looked at."""
-        owners, static, examined = self._owners, self._static[self._owners] & self._fixed, self._examined
+        examined = self._examined
         return Report(
             bodies=len(self._bodies),
             shapes=sum(body.shape_count for body in self._bodies.values()) + self._unidentified,
             shapes_read=len(self._keys),
-            pairs_possible=_pairs_between(owners) - _pairs_between(owners[static]),
+            pairs_possible=self._pairs_possible(),
             pairs_examined=len(examined),
             pairs_overlapping=int((examined.status == Overlaps.OVERLAPPING).sum()),
             pairs_widened=int(examined.widened.sum()),
@@ -214,11 +264,12 @@ class Bodies:
         # After a syncBodyInfo, pybullet would show the user data of a removed body on the one that inherits its id.
         pybullet.syncUserData(physicsClientId=client)
         ids = body_ids(client)
-        skipped = []
-        if ids != self._bodies.keys() or not all(map(self._is_marked, ids)):
-            skipped = self._read()
+        fresh = ids != self._bodies.keys() or not all(map(self._is_marked, ids))
+        skipped = self._read() if fresh else []
+        if fresh:
             self._arrange()
         self._pose()
+        self._follow_filters(fresh)
         for each in skipped:
             message = f"{each.name} (body {each.body}, link {each.link}) is left out: {each.reason}"
             # The caller of update() or of Bodies() is three calls up.
@@ -240,6 +291,7 @@ class Bodies:
         unidentified, self._rows = (self._unidentified if ids else 0), {}
         if fresh or hidden:
             file, rows = saved_bodies(client, ids)
+            self._take_filters(file, rows)
             unidentified = len(file.bodies) - len(rows)
             self._rows = {id: rows[id] for id in hidden if id in rows}
         for id in fresh:
@@ -250,6 +302,33 @@ class Bodies:
         grown, self._unidentified = unidentified > self._unidentified, unidentified
         skipped = [each for id in fresh for each in self._bodies[id].skipped]
         return skipped + (self._skipped_unidentified() if grown else [])
+
+    def _take_filters(self, file: BulletFile, rows: Mapping[int, int]) -> None:
+        self._filters = {
+            (id, link): (collider.group, collider.mask)
+            for id, row in rows.items()
+            for link, collider in file.bodies[row].colliders.items()
+        }
+
+    def _follow_filters(self, fresh: bool) -> None:
+        """Read groups and masks again if they may have changed since, and take over what the recorder has noted."""
+        client = self.physicsClientId
+        # changeDynamics gives a base the group of static or of moving bodies as it becomes one.
+        static = [pybullet.getDynamicsInfo(id, BASE, client)[0] == 0 for id in self._links]
+        noted = (self._recorder.changes, self._recorder.masks_set) if self._recorder else (0, 0)
+        changed = static != self._static or noted[1] != self._noted[1]
+        if changed and not fresh:
+            self._take_filters(*saved_bodies(client, sorted(self._bodies)))
+        if changed or fresh or noted != self._noted:
+            self._rules = self._current_rules()
+        self._static, self._noted = static, noted
+
+    def _current_rules(self) -> CollisionRules:
+        filters = [self._filters.get(each, (1, -1)) for each in self._collider_rows]
+        group, mask = np.array(filters, dtype=int).reshape(-1, 2).T
+        owners = np.array([id for id, _ in self._collider_rows], dtype=int)
+        parents = {id: body.parents for id, body in self._bodies.items()}
+        return CollisionRules(Colliders(self._collider_rows, owners, group, mask, parents), self._recorder)
 
     def _skipped_unidentified(self) -> list[Skipped]:
         if not self._unidentified:
@@ -269,14 +348,13 @@ class Bodies:
         self._local_orientations = np.array([part.orientation for part in parts]).reshape(-1, 4)
         self._links = {id: sorted({part.link for part in each} - {BASE}) for id, each in shaped.items()}
         colliders = [(id, link) for id, links in self._links.items() for link in [BASE, *links]]
-        rows = {collider: row for row, collider in enumerate(colliders)}
-        self._colliders = np.array([rows[id, link] for id, link, _ in self._keys], dtype=int)
-        order = {id: row for row, id in enumerate(shaped)}
-        self._owners = np.array([order[id] for id, _, _ in self._keys], dtype=int)
-        self._fixed = np.array([link in self._bodies[id].fixed_links for id, link, _ in self._keys], dtype=bool)
+        self._collider_rows = {collider: row for row, collider in enumerate(colliders)}
+        self._colliders = np.array([self._collider_rows[id, link] for id, link, _ in self._keys], dtype=int)
+        self._owners = np.array([id for id, _, _ in self._keys], dtype=int)
+        self._listed: tuple[list[tuple[Who, Who]], NDArray[np.int64]] | None = None
 
     def _pose(self) -> None:
-        """Place the shapes where their colliders are now, and ask which bases cannot move."""
+        """Place the shapes where their colliders are now."""
         client = self.physicsClientId
         rows: list[tuple[float, ...]] = []
         file = save(client) if self._rows.keys() & self._links.keys() else None
@@ -291,9 +369,6 @@ class Bodies:
                 # Without forward kinematics the poses of links lag one step behind.
                 states = pybullet.getLinkStates(id, links, computeForwardKinematics=1, physicsClientId=client)
                 rows += [state[0] + state[1] for state in states]
-        # changeDynamics may turn a static body into a moving one.
-        static = [pybullet.getDynamicsInfo(id, BASE, client)[0] == 0 for id in self._links]
-        self._static = np.array(static, dtype=bool)
 
         poses = np.array(rows).reshape(-1, 7)[self._colliders]
         orientations = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
@@ -305,19 +380,36 @@ class Bodies:
             body = self._keys[int(np.argmin(finite))][0]
             raise ValueError(f"body {body} ({self._bodies[body].name}) has no finite pose: the simulation has diverged")
 
-    def _candidate_pairs(self) -> NDArray[np.int32]:
-        pairs: NDArray[np.int32] = self._batch.candidate_pairs(self._positions, self._orientations)
+    def _chosen(self, pairs: NDArray[np.int32], among: Among) -> NDArray[np.bool_]:
+        """Which of these pairs of shapes are asked for."""
         first, second = pairs.T
-        static = self._static[self._owners] & self._fixed
-        apart = self._owners[first] != self._owners[second]
-        return np.asarray(pairs[apart & ~(static[first] & static[second])])
+        if among == "all":
+            return np.asarray(self._owners[first] != self._owners[second])
+        if among != "simulated":
+            return np.isin(first * np.int64(len(self._keys)) + second, self._codes(among))
+        a, b = self._colliders[first], self._colliders[second]
+        return np.asarray((a != b) & self._rules.allow(a, b))
+
+    def _codes(self, among: Iterable[tuple[Who, Who]]) -> NDArray[np.int64]:
+        """The pairs of a list, as `pair_codes` has them; kept for the next step."""
+        if isinstance(among, str):
+            raise ValueError(f"pairs must be 'simulated', 'all' or a list of pairs, not {among!r}")
+        asked = list(among)
+        if not self._listed or self._listed[0] != asked:
+            links = {id: body.link_names for id, body in self._bodies.items()}
+            self._listed = asked, pair_codes(asked, self._keys, links)
+        return self._listed[1]
+
+    def _pairs_possible(self) -> int:
+        """How many pairs of shapes the last `overlaps()` was asked for, wherever they are."""
+        if isinstance(self._asked, int):
+            return self._asked
+        if self._asked == "simulated":
+            return self._rules.count(np.bincount(self._colliders, minlength=len(self._collider_rows)))
+        of_each = np.unique(self._owners, return_counts=True)[1]
+        return int(len(self._owners) ** 2 - (of_each**2).sum()) // 2
 
 
 def _distinct(names: Mapping[int, str]) -> dict[int, str]:
     number = Counter(names.values())
     return {id: name if number[name] == 1 else f"{name}#{id}" for id, name in names.items()}
-
-
-def _pairs_between(owners: NDArray[Any]) -> int:
-    """Number of pairs of shapes with different owners."""
-    return int(len(owners) ** 2 - (np.bincount(owners) ** 2).sum()) // 2

@@ -18,6 +18,7 @@ TWO_CUBES = '''
 import pybullet as p
 
 STEPS = 8
+PAIRS = "all"  # a filter keeps them where they are
 
 
 def build(client):
@@ -102,6 +103,7 @@ CROSSES = '''
 import pybullet as p
 
 STEPS = 2
+PAIRS = "all"  # a filter keeps them where they are
 
 
 def build(client):
@@ -113,6 +115,24 @@ def build(client):
         p.createMultiBody(x, cross, basePosition=[x, 0, 0], physicsClientId=client)
     p.setCollisionFilterPair(0, 1, -1, -1, 0, physicsClientId=client)
 '''
+
+
+FILTERED = '''"""Two cubes that a pair filter keeps apart, and a third."""
+import pybullet as p
+STEPS = 1
+def build(client):
+    cube = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.5] * 3, physicsClientId=client)
+    for x in (0, 0.9, 1.8):
+        p.createMultiBody(1, cube, basePosition=[x, 0, 0], physicsClientId=client)
+    p.setCollisionFilterPair(0, 1, -1, -1, 0, physicsClientId=client)
+'''
+
+
+def test_pairs_are_those_that_the_scene_lets_collide_or_all(tmp_path):
+    (tmp_path / "filtered.py").write_text(FILTERED)
+    for options, count in (((), 1), (("--pairs", "all"), 2)):
+        answer = json.loads(overlapper("run", "filtered.py", "--json", *options).stdout)
+        assert len(answer["pairs"]) == answer["report"]["pairs_overlapping"] == count
 
 
 def test_links_as_a_whole_are_measured_where_their_shapes_overlap_each_other(tmp_path):
@@ -139,6 +159,7 @@ CUP = '''
 import pybullet as p
 
 STEPS = 1
+PAIRS = "all"  # a filter keeps them where they are
 
 
 def build(client):
@@ -306,7 +327,7 @@ main()
 def test_rows_before_a_failure_are_on_disk(tmp_path, ending):
     (tmp_path / "fails.py").write_text(FAILS_LATE)
     sentence = refusal("run", "fails.py", "--out", f"fails.{ending}", "--html", "fails.html")
-    assert "fails before step 6 at line 16: AssertionError: no more" in sentence
+    assert "fails before step 6 at line 17: AssertionError: no more" in sentence
     assert [row["step"] for row in read_table(tmp_path / f"fails.{ending}")] == [1, 2, 3, 4, 5]
     assert (tmp_path / "fails.html").stat().st_size > 0
 
@@ -379,7 +400,7 @@ def test_scenes_that_cannot_be_run_are_told_with_exit_code_2_after_all_others(tw
     code, said, complaints = checked("guarded")
     assert code == 2
     assert "guarded/one.py: moved" in said
-    assert "overlapper: the scene guarded/deeper/two.py fails before step 6 at line 16: AssertionError" in complaints
+    assert "overlapper: the scene guarded/deeper/two.py fails before step 6 at line 17: AssertionError" in complaints
 
 
 @pytest.mark.parametrize(

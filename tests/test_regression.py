@@ -17,6 +17,7 @@ TWO_CUBES = '''
 import pybullet as p
 
 STEPS = 6
+PAIRS = "all"  # a filter keeps them where they are
 
 
 def build(client):
@@ -68,6 +69,10 @@ def test_a_run_can_be_shorter_than_the_scene_or_show_some_steps_of_it(scene_file
     [
         ("STEPS = 0\ndef build(client): pass", "STEPS is 0"),
         ("STEPS = 5", r"must have a function build\(client\)"),
+        (
+            "STEPS = 5\nPAIRS = 'some'\ndef build(client): pass",
+            "PAIRS = 'some', which must be 'simulated', 'all' or a list",
+        ),
         ("STEPS = 5\ndef build(client:", "cannot be loaded at line 2: SyntaxError"),
         (
             "\nimport nothing_like_it",

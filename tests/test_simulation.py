@@ -844,26 +844,6 @@ def test_static_bodies_are_no_pair_until_one_is_released(client):
     assert len(bodies.overlaps()) == 1
 
 
-def test_links_of_a_fixed_robot_move_but_those_tied_to_its_base_by_fixed_joints_do_not(client, tmp_path):
-    link = '<link name="{}">' + INERTIAL.format("0 0 0", "0 0 0")
-    link += '<collision><geometry><box size="1 1 1"/></geometry></collision></link>'
-    joint = '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{0}"/><axis xyz="0 0 1"/></joint>'
-    text = "".join(map(link.format, ("base", "welded", "turning", "tool")))
-    for name, kind, parent in (
-        ("welded", "fixed", "base"),
-        ("turning", "continuous", "welded"),
-        ("tool", "fixed", "turning"),
-    ):
-        text += joint.format(name, kind, parent)
-    (tmp_path / "robot.urdf").write_text(f'<robot name="robot">{text}</robot>')
-    table = box(client, mass=0)
-    robot = p.loadURDF(str(tmp_path / "robot.urdf"), useFixedBase=True, physicsClientId=client)
-    bodies = Bodies(client)
-    names = [bodies.names[c.bodyB, c.linkB] for c in bodies.overlaps() if (c.bodyA, c.bodyB) == (table, robot)]
-    assert names == ["robot/turning", "robot/tool"]
-    assert bodies.report().pairs_possible == bodies.report().pairs_examined == 2
-
-
 def test_the_report_counts_what_was_looked_at(client):
     body(client, p.GEOM_PLANE, mass=0)
     for x in range(4):

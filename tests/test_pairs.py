@@ -1,0 +1,359 @@
+"""The pairs that are looked at are those that pybullet makes contacts of, or those of the user's list."""
+
+import numpy as np
+import pybullet as p
+import pybullet_data
+import pytest
+from pybullet_utils.bullet_client import BulletClient
+
+from overlapper.simulation import Bodies, Recorder
+
+SELF = p.URDF_USE_SELF_COLLISION
+LINK = (
+    '<link name="l{}"><inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/>'
+    '</inertial><collision><geometry><box size="1 1 1"/></geometry></collision></link>'
+)
+JOINT = (
+    '<joint name="j{0}" type="{2}"><parent link="l{1}"/><child link="l{0}"/><origin xyz=".1 0 0"/>'
+    '<axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
+)
+
+
+@pytest.fixture
+def client():
+    client = p.connect(p.DIRECT)
+    yield client
+    p.disconnect(client)
+
+
+@pytest.fixture
+def recorder(client):
+    with Recorder(client) as recorder:
+        yield recorder
+
+
+def box(client, mass=1, position=(0, 0, 0), **options):
+    shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.5] * 3, physicsClientId=client)
+    return p.createMultiBody(mass, shape, -1, position, physicsClientId=client, **options)
+
+
+def chain(client, folder, joints=("revolute",) * 3, **options):
+    """A robot of cubes that all overlap each other."""
+    links = "".join(map(LINK.format, range(len(joints) + 1)))
+    text = links + "".join(JOINT.format(i + 1, i, kind) for i, kind in enumerate(joints))
+    (folder / "chain.urdf").write_text(f'<robot name="chain">{text}</robot>')
+    return p.loadURDF(str(folder / "chain.urdf"), physicsClientId=client, **options)
+
+
+def in_contact(client):
+    """The pairs of links of which pybullet reports contacts."""
+    p.performCollisionDetection(client)
+    found = p.getContactPoints(physicsClientId=client)
+    return {tuple(sorted([(each[1], each[3]), (each[2], each[4])])) for each in found}
+
+
+def overlapping(bodies, **options):
+    return {((c.bodyA, c.linkA), (c.bodyB, c.linkB)) for c in bodies.overlaps(**options) if c.overlap}
+
+
+def agree(client, bodies):
+    """What is found, once it is sure that pybullet finds the same."""
+    found = overlapping(bodies)
+    assert found == in_contact(client)
+    return found
+
+
+def anew(client, body, position):
+    """Bullet asks its filters when boxes begin to meet."""
+    p.resetBasePositionAndOrientation(body, [99, 0, 0], [0, 0, 0, 1], physicsClientId=client)
+    p.performCollisionDetection(client)
+    p.resetBasePositionAndOrientation(body, position, [0, 0, 0, 1], physicsClientId=client)
+
+
+# --- what pybullet can be asked for
+
+
+def test_static_bodies_meet_moving_ones_only(client):
+    table, floor, ball = box(client, 0), box(client, 0, [0.5, 0, 0]), box(client, 1, [0, 0.5, 0])
+    rigid = box(client, 0, [0, 0, 0.5], useMaximalCoordinates=True)
+    assert agree(client, Bodies(client)) == {((other, -1), (ball, -1)) for other in (table, floor)} | {
+        ((ball, -1), (rigid, -1))
+    }
+
+
+def test_a_base_that_is_fixed_or_released_is_noticed(client):
+    box(client, 0)
+    cube = box(client, 1, [0.5, 0, 0])
+    bodies = Bodies(client)
+    assert len(agree(client, bodies)) == 1
+    for mass, pairs in ((0, 0), (2, 1)):
+        p.changeDynamics(cube, -1, mass=mass, physicsClientId=client)
+        bodies.update()
+        assert len(agree(client, bodies)) == pairs
+
+
+@pytest.mark.parametrize("joints", [("fixed", "revolute", "fixed"), ("revolute", "fixed", "continuous")])
+@pytest.mark.parametrize("fixed", [True, False])
+def test_links_of_a_robot_meet_a_table_as_in_pybullet(client, tmp_path, joints, fixed):
+    box(client, 0)
+    chain(client, tmp_path, joints, useFixedBase=fixed)
+    assert len(agree(client, Bodies(client))) == 4 - fixed
+
+
+def test_merged_links_are_one_link_of_many_shapes(client, tmp_path):
+    table = box(client, 0)
+    robot = chain(client, tmp_path, ("fixed", "revolute", "fixed"), flags=p.URDF_MERGE_FIXED_LINKS)
+    bodies = Bodies(client)
+    assert bodies.keys == [(table, -1, 0), (robot, -1, 0), (robot, -1, 1), (robot, 0, 0), (robot, 0, 1)]
+    assert overlapping(bodies) == in_contact(client) == {((table, -1), (robot, link)) for link in (-1, 0)}
+    assert bodies.report().pairs_possible == 4
+
+
+def test_groups_and_masks_are_those_of_pybullet(client):
+    """All small groups and masks at once, in every combination of two bodies."""
+    filters = [(group, mask) for group in range(4) for mask in range(4)]
+    bodies = [box(client, 1, [0.01 * i, 0, 0]) for i in range(len(filters))]
+    for body, (group, mask) in zip(bodies, filters):
+        p.setCollisionFilterGroupMask(body, -1, group, mask, physicsClientId=client)
+    found = agree(client, Bodies(client))
+    assert 0 < len(found) < len(filters) * (len(filters) - 1) // 2
+
+
+def test_masks_of_mjcf_models_are_honoured(client, tmp_path):
+    geoms = [("1", "1"), ("2", "1"), ("2", "2"), ("0", "0")]
+    ball = '<body pos="{} 0 0"><freejoint/><geom type="sphere" size=".5" contype="{}" conaffinity="{}"/></body>'
+    text = "".join(ball.format(0.1 * i, *each) for i, each in enumerate(geoms))
+    (tmp_path / "balls.xml").write_text(f"<mujoco><worldbody>{text}</worldbody></mujoco>")
+    balls = p.loadMJCF(str(tmp_path / "balls.xml"), physicsClientId=client)
+    assert len(balls) == len(geoms)
+    assert 0 < len(agree(client, Bodies(client))) < 6
+
+
+def test_masks_of_a_model_apply_without_a_recorder(client):
+    p.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
+    p.loadURDF("cube_collisionfilter.urdf", physicsClientId=client)
+    box(client)
+    assert agree(client, Bodies(client)) == set()
+
+
+def test_masks_that_change_are_noticed_with_the_next_new_body_or_at_once_by_a_recorder(client):
+    first, second = box(client), box(client, 1, [0.5, 0, 0])
+    with Recorder(client) as recorder:
+        told, untold = Bodies(client, recorder=recorder), Bodies(client)
+        p.setCollisionFilterGroupMask(first, -1, 0, 0, physicsClientId=client)
+        p.setCollisionFilterGroupMask(second, -1, 0, 0, physicsClientId=client)
+        told.update(), untold.update()
+        assert agree(client, told) == set() and len(untold.overlaps()) == 1
+    box(client, 1, [99, 0, 0])
+    untold.update()
+    assert untold.overlaps() == []
+
+
+# --- what only a recorder knows
+
+
+def test_the_filter_mode_is_noted(client, recorder):
+    p.setPhysicsEngineParameter(collisionFilterMode=0, physicsClientId=client)
+    for i, (group, mask) in enumerate([(1, 1), (1, 2), (2, 1), (3, 3)]):
+        body = box(client, 1, [0.01 * i, 0, 0])
+        p.setCollisionFilterGroupMask(body, -1, group, mask, physicsClientId=client)
+    bodies = Bodies(client, recorder=recorder)
+    strict = agree(client, bodies)
+    p.setPhysicsEngineParameter(1 / 240, 50, collisionFilterMode=1, physicsClientId=client)
+    for body in range(4):
+        anew(client, body, [0.01 * body, 0, 0])
+    bodies.update()
+    assert strict < agree(client, bodies)
+
+
+def test_pair_filters_override_masks_and_static_bodies(client, recorder):
+    a, b, c = box(client), box(client, 1, [0.5, 0, 0]), box(client, 1, [0.25, 0, 0])
+    tables = box(client, 0, [0, 9, 0]), box(client, 0, [0.5, 9, 0])
+    p.setCollisionFilterGroupMask(c, -1, 0, 0, physicsClientId=client)
+    bodies = Bodies(client, recorder=recorder)
+    assert agree(client, bodies) == {((a, -1), (b, -1))}
+    p.setCollisionFilterPair(b, a, -1, -1, 0, physicsClientId=client)
+    p.setCollisionFilterPair(a, c, -1, -1, 1, physicsClientId=client)
+    p.setCollisionFilterPair(*tables, -1, -1, enableCollision=1, physicsClientId=client)
+    bodies.update()
+    assert agree(client, bodies) == {((a, -1), (c, -1)), ((tables[0], -1), (tables[1], -1))}
+
+
+@pytest.mark.parametrize(
+    "flags",
+    [
+        0,
+        SELF,
+        SELF | p.URDF_USE_SELF_COLLISION_EXCLUDE_PARENT,
+        SELF | p.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS,
+        SELF | p.URDF_USE_SELF_COLLISION_INCLUDE_PARENT,
+        SELF | p.URDF_USE_SELF_COLLISION_INCLUDE_PARENT | p.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS,
+        p.URDF_USE_SELF_COLLISION_INCLUDE_PARENT,
+    ],
+)
+def test_self_collision_is_as_the_flags_say(client, recorder, tmp_path, flags):
+    robot = chain(client, tmp_path, flags=flags)
+    bodies = Bodies(client, recorder=recorder)
+    found = agree(client, bodies)
+    # Which pair filters may switch off, but not on.
+    p.setCollisionFilterPair(robot, robot, 2, 0, 0, physicsClientId=client)
+    p.setCollisionFilterPair(robot, robot, -1, 0, 1, physicsClientId=client)
+    bodies.update()
+    assert agree(client, bodies) == found - {((robot, 0), (robot, 2))}
+
+
+def test_branches_of_a_robot_meet_even_where_no_link_meets_its_ancestors(client, recorder):
+    shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.5] * 3, physicsClientId=client)
+    count = 4
+    robot = p.createMultiBody(
+        1,
+        shape,
+        linkMasses=[1] * count,
+        linkCollisionShapeIndices=[shape] * count,
+        linkVisualShapeIndices=[-1] * count,
+        linkPositions=[[0.1, 0, 0]] * count,
+        linkOrientations=[[0, 0, 0, 1]] * count,
+        linkInertialFramePositions=[[0, 0, 0]] * count,
+        linkInertialFrameOrientations=[[0, 0, 0, 1]] * count,
+        linkParentIndices=[0, 1, 0, 3],
+        linkJointTypes=[p.JOINT_REVOLUTE] * count,
+        linkJointAxis=[[0, 1, 0]] * count,
+        flags=SELF | p.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS,
+        physicsClientId=client,
+    )
+    found = agree(client, Bodies(client, recorder=recorder))
+    assert found == {((robot, a), (robot, b)) for a in (0, 1) for b in (2, 3)}
+
+
+def test_what_was_noted_of_a_body_goes_as_pybullet_forgets_it(client, recorder, tmp_path):
+    first, second = box(client), box(client, 1, [0.5, 0, 0])
+    p.setCollisionFilterPair(first, second, -1, -1, 0, physicsClientId=client)
+    robot = chain(client, tmp_path, flags=SELF, basePosition=[9, 0, 0])
+    bodies = Bodies(client, recorder=recorder)
+    assert len(agree(client, bodies)) == 3
+    # A pair filter outlives its bodies, self-collision does not.
+    p.removeBody(second, physicsClientId=client), p.removeBody(robot, physicsClientId=client)
+    ids = chain(client, tmp_path, basePosition=[9, 0, 0]), box(client, 1, [0.5, 0, 0])
+    assert set(ids) == {second, robot}
+    for body, position in zip(ids, ([9, 0, 0], [0.5, 0, 0])):
+        anew(client, body, position)
+    bodies.update()
+    assert agree(client, bodies) == (set() if ids[1] == second else {((first, -1), (ids[1], -1))})
+    p.resetSimulation(client)
+    box(client), box(client, 1, [0.5, 0, 0])
+    bodies.update()
+    assert len(agree(client, bodies)) == 1
+
+
+def test_a_recorder_hears_its_own_client_and_bullet_client_too(recorder):
+    other = BulletClient(p.DIRECT)
+    with Recorder(other._client) as theirs:
+        for _ in range(2):
+            other.createMultiBody(1, other.createCollisionShape(p.GEOM_SPHERE, radius=1))
+        other.setCollisionFilterPair(0, 1, -1, -1, 0)
+        assert theirs.pair_filters == {((0, -1), (1, -1)): False} and recorder.pair_filters == {}
+        assert Bodies(other._client, recorder=theirs).overlaps() == []
+        assert len(Bodies(other._client).overlaps()) == 1
+        with pytest.raises(ValueError, match=f"recorder is of client {recorder.physicsClientId}, not of"):
+            Bodies(other._client, recorder=recorder)
+    other.disconnect()
+
+
+def test_pybullet_is_as_it_was_when_the_last_recorder_is_closed(client):
+    before = p.setCollisionFilterPair
+    first, second = Recorder(client), Recorder(client)
+    first.close()
+    assert p.setCollisionFilterPair is not before
+    assert p.setCollisionFilterPair.__doc__ == before.__doc__
+    second.close(), second.close()
+    assert p.setCollisionFilterPair is before
+
+
+def test_an_error_of_pybullet_stays_one_and_is_not_noted(client, recorder):
+    with pytest.raises(p.error):
+        p.loadURDF("no_such_file.urdf", flags=SELF, physicsClientId=client)
+    assert recorder.changes == 0
+
+
+# --- the user's own choice
+
+
+def test_all_pairs_of_different_bodies_are_those_of_geometry(client):
+    bodies = [box(client, 0), box(client, 0, [0.5, 0, 0]), box(client)]
+    p.setCollisionFilterGroupMask(bodies[2], -1, 0, 0, physicsClientId=client)
+    found = Bodies(client)
+    assert found.overlaps() == [] and found.report().pairs_possible == 0
+    assert len(found.overlaps(pairs="all")) == found.report().pairs_possible == 3
+
+
+def test_a_list_of_bodies_links_and_shapes_is_taken_at_its_word(client, tmp_path):
+    table, robot, cube = box(client, 0), chain(client, tmp_path), box(client, 0, [0.2, 0, 0])
+    bodies = Bodies(client)
+
+    def pairs(*asked):
+        found = overlapping(bodies, pairs=asked)
+        assert bodies.report().pairs_possible == len(found)
+        return found
+
+    assert pairs((cube, table)) == {((table, -1), (cube, -1))}
+    assert pairs(((robot, 2), table), ((robot, 2), (robot, 0))) == {
+        ((table, -1), (robot, 2)),
+        ((robot, 0), (robot, 2)),
+    }
+    assert pairs((robot, robot)) == {((robot, a), (robot, b)) for a in range(-1, 3) for b in range(a + 1, 3)}
+    assert len(pairs((robot, table), (table, robot), ((robot, 1, 0), (table, -1, 0)))) == 4
+    assert pairs() == pairs((table, table)) == set()
+    p.removeBody(cube, physicsClientId=client)
+    bodies.update()
+    with pytest.raises(ValueError, match=f"pairs names body {cube}, which is not in the simulation"):
+        bodies.pairs([(cube, table)])
+    with pytest.raises(ValueError, match=f"pairs names link 3 of body {robot}, which it does not have"):
+        bodies.pairs([((robot, 3), table)])
+    with pytest.raises(ValueError, match="pairs must be 'simulated', 'all' or a list of pairs, not 'most'"):
+        bodies.pairs("most")
+
+
+def test_shapes_of_one_link_are_a_pair_only_by_name(client):
+    shape = p.createCollisionShapeArray(
+        shapeTypes=[p.GEOM_SPHERE] * 2,
+        radii=[1, 1],
+        halfExtents=[[1, 1, 1]] * 2,
+        lengths=[1, 1],
+        collisionFramePositions=[[0, 0, 0], [1, 0, 0]],
+        physicsClientId=client,
+    )
+    body = p.createMultiBody(1, shape, physicsClientId=client)
+    bodies = Bodies(client)
+    assert bodies.pairs([(body, body)]).tolist() == []
+    assert bodies.pairs([((body, -1, 1), (body, -1, 0))]).tolist() == [[0, 1]]
+
+
+def test_possible_pairs_are_counted_as_they_would_be_found(client, recorder, tmp_path):
+    """Against bodies all of which overlap each other, so that every pair is examined."""
+    for i, (group, mask) in enumerate([(1, -1), (2, 1), (2, 2), (4, 3), (0, 0)]):
+        shape = p.createCollisionShapeArray(
+            shapeTypes=[p.GEOM_SPHERE] * (i + 1),
+            radii=[1] * (i + 1),
+            halfExtents=[[1, 1, 1]] * (i + 1),
+            lengths=[1] * (i + 1),
+            collisionFramePositions=[[0.01 * j, 0, 0] for j in range(i + 1)],
+            physicsClientId=client,
+        )
+        body = p.createMultiBody(i % 3, shape, physicsClientId=client)
+        p.setCollisionFilterGroupMask(body, -1, group, mask, physicsClientId=client)
+    robot = chain(client, tmp_path, flags=SELF)
+    other = chain(client, tmp_path, useFixedBase=True)
+    p.setCollisionFilterPair(robot, robot, -1, 2, 0, physicsClientId=client)
+    p.setCollisionFilterPair(other, robot, 1, 0, 0, physicsClientId=client)
+    p.setCollisionFilterPair(4, 3, -1, -1, 1, physicsClientId=client)
+    p.setCollisionFilterPair(4, 3, 7, -1, 1, physicsClientId=client)  # of a link that is not there
+    bodies = Bodies(client, recorder=recorder)
+    for among in ("simulated", "all", [(robot, robot), (0, robot), (3, 4), (4, 3)]):
+        found = len(bodies.overlaps(pairs=among))
+        assert bodies.report().pairs_possible == bodies.report().pairs_examined == found > 0
+
+
+def test_only_pairs_whose_boxes_meet_are_candidates(client):
+    box(client), box(client, 1, [0.5, 0, 0]), box(client, 1, [9, 0, 0])
+    pairs = Bodies(client).pairs()
+    assert pairs.tolist() == [[0, 1]] and pairs.dtype == np.int32
