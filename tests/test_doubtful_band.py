@@ -7,8 +7,9 @@ import exact
 import numpy as np
 import pytest
 from families import make
+from rules import UNPROVED, answer, complaints
 
-from overlapper import overlap
+from overlapper import Placed, Sphere, overlap
 
 
 def slender_and_apart():
@@ -82,3 +83,40 @@ def test_slender_bodies_with_a_solid_in_common_overlap(order):
 @pytest.mark.parametrize("seed", range(8))
 def test_features_in_exact_contact_still_touch(seed):
     assert overlap(*make("touching", seed).placed).status == "touching"
+
+
+@pytest.mark.parametrize(
+    ("family", "seed"),
+    [
+        ("tiny_in_huge", 16),
+        ("tiny_in_huge", 10005),
+        ("combined", 10095),
+        ("combined", 10118),
+        ("slender_groups", 2),
+        ("slender_groups", 10033),
+        ("slender_groups", 10046),
+        ("parallel_edges", 10130),
+        ("scaled", 10127),
+    ],
+)
+def test_the_thinnest_cases_keep_the_rules(family, seed):
+    case = make(family, seed)
+    assert not [*complaints(case, answer(case.placed), UNPROVED)]
+
+
+def test_a_hull_at_the_edge_of_one_1e15_times_as_large_has_its_volume():
+    tiny = np.array([[5.74e-10, -7.55e-11, 3.15e-10], [-6.6e-10, 1.06e-10, 1.31e-11], [-5.76e-10, 1.75e-10, 2.92e-10]])
+    tiny = np.vstack([tiny, [-1.18e-10, 8.99e-10, -1.19e-11]])
+    huge = [[0, 0, 0], [-154091.0, -583472.0, 793339.0], [-279018.0, -339652.0, 735711.0], [592518.0, 232501.0, 777584.0]]
+    exactly = exact.common(exact.hull(tiny), exact.hull(np.array(huge))).volume
+    found = overlap(tiny, huge)
+    assert found.status == "overlapping" and found.widened
+    assert abs(Fraction(found.volume) - exactly) <= min(Fraction(found.volume_error), exactly * Fraction(1e-12))
+
+
+def test_a_ball_of_a_nanometre_on_one_of_a_thousand_kilometres_overlaps_it():
+    for depth, status in ((5e-10, "overlapping"), (-5e-10, "separated")):
+        found = overlap(Placed(Sphere(1e6), (-1e6, 0, 0)), Placed(Sphere(1e-9), (1e-9 - depth, 0, 0)), tolerance=0.01)
+        assert found.status == status
+        cap = np.pi * depth**2 * (3e-9 - depth) / 3 if depth > 0 else 0
+        assert abs(found.volume - cap) <= found.volume_error <= 0.02 * cap

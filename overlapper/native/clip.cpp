@@ -438,9 +438,10 @@ std::optional<ClippedPair> clip_in_order(const Placed& a, const Placed& b) {
   const Pose pose = relative_pose(a.pose, b.pose);
   const double radius_a = radius(a.shape), radius_b = radius(b.shape), apart = norm(pose.translation);
   const double reach = std::max(radius_a + lost_far_away(a), apart + radius_b + lost_far_away(b));
-  // Twice what two rotations, a translation and a dot product may lose, each of the last bits of a quaternion's length
-  // included.
-  const double sign_rounding = 4 * rounding(reach);
+  double flatness = 0;
+  for (const Placed* body : {&a, &b})
+    if (const Hull* hull = std::get_if<Hull>(&body->shape)) flatness = std::max(flatness, hull->data->flatness);
+  const double sign_rounding = doubt(reach) + 4 * flatness;
   if (bounded(b.shape) && apart > radius_a + radius_b + sign_rounding) return ClippedPair{};
 
   thread_local Workspace workspace;
@@ -449,9 +450,6 @@ std::optional<ClippedPair> clip_in_order(const Placed& a, const Placed& b) {
   const Signs signs = Tracer(workspace, sign_rounding).trace();
   if (signs == Signs::kSeparated) return ClippedPair{};
   if (signs == Signs::kUncertain) return std::nullopt;
-  double flatness = 0;
-  for (const Placed* body : {&a, &b})
-    if (const Hull* hull = std::get_if<Hull>(&body->shape)) flatness = std::max(flatness, hull->data->flatness);
   // One so thin that rounding might hide it is left to those who look closer.
   std::optional<ClippedPair> common = Sums(workspace).measures(rounding(reach) + flatness, 4 * sign_rounding);
   if (!common) return std::nullopt;

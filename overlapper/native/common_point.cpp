@@ -150,7 +150,7 @@ std::array<OwnedPlane, 4> surrounding_simplex(std::span<const Placed> bodies, st
 
 DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double> reach,
                          std::span<const OwnedPlane> planes, std::span<const OwnedPlane> hints) {
-  DeepestBall best{{}, -kInfinity, kInfinity, 0, false, {}};
+  DeepestBall best{{}, -kInfinity, kInfinity, 0, false, false, {}};
   const std::array<OwnedPlane, 4> simplex = surrounding_simplex(bodies, planes);
   best.cuts.assign(simplex.begin(), simplex.end());
   Basis basis(simplex);
@@ -168,10 +168,11 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double>
     const double made_from = std::max(basis.magnitude(reach), worst.owner >= 0 ? reach[worst.owner] : 0);
     const double rounding_here = rounding(std::max(made_from, norm(centre)));
     best.upper = std::min(best.upper, radius + rounding_here);
-    best.apart =
-        radius < -rounding_here && basis.certified_radius(centre, largest_reach + norm(centre)) < -rounding_here;
+    const double certain = doubt(std::max(made_from, norm(centre)));
+    best.apart = radius < -certain && basis.certified_radius(centre, largest_reach + norm(centre)) < -certain;
     const double slack = -signed_distance(worst.plane, centre);
-    if (slack > best.lower) best.lower = slack, best.centre = centre, best.rounding = rounding_here;
+    if (slack > best.lower)
+      best.lower = slack, best.centre = centre, best.rounding = rounding_here, best.sure = slack > certain;
     // Newton's method starts from any inner point; a share of the depth is enough.
     const bool deep = best.lower > best.rounding && best.lower >= best.upper / 4;
     const bool optimal = best.upper - best.lower <= 2 * best.rounding;
@@ -265,75 +266,82 @@ double best_step(std::span<const Vec3> rows, Vec3 direction) {
   return low;
 }
 
+/// The point that is moved by transposed(axes) * way.
+Vec3 moved(Vec3 point, const Mat3& axes, Vec3 way) { return point + apply_transposed(axes, way); }
+WideVector moved(const WideVector& point, const Mat3& axes, Vec3 way) {
+  return point + apply_transposed(axes, wide(way));
+}
+
 /// Newton's method for the analytic centre of the planes, from a point strictly inside all of them. Works in the frame
 /// of the last step, so that slacks of any ratio meet as numbers near one.
+template <class AnyPlane>
 class AnalyticCentre {
  public:
-  explicit AnalyticCentre(Vec3 inside) { frame_.origin = inside; }
+  using Point = decltype(AnyPlane::normal);
 
-  void settle(std::span<const OwnedPlane> planes) {
+  explicit AnalyticCentre(const Point& inside) { frame_.origin = inside; }
+
+  void settle(std::span<const Owned<AnyPlane>> planes) {
     for (int step = 0; step < kMaxSteps; ++step) {
       std::vector<Vec3> a;
       Vec3 nearest{1, 0, 0};
       double closest = kInfinity;
-      for (const OwnedPlane& p : planes) {
-        const double slack = -signed_distance(p.plane, frame_.origin);
-        if (slack < closest) closest = slack, nearest = p.plane.normal;
+      for (const Owned<AnyPlane>& p : planes) {
+        const double slack = -rounded(signed_distance(p.plane, frame_.origin));
+        if (slack < closest) closest = slack, nearest = rounded(p.plane.normal);
       }
       // In axes along the nearest plane's normal, the large entries of a sliver's rows fall into one column.
       const Mat3 axes = axes_along(nearest);
-      for (const OwnedPlane& p : planes) {
-        const double slack = std::max(-signed_distance(p.plane, frame_.origin), std::numeric_limits<double>::min());
-        a.push_back(axes * p.plane.normal / slack);
+      for (const Owned<AnyPlane>& p : planes) {
+        const double slack = -rounded(signed_distance(p.plane, frame_.origin));
+        a.push_back(rounded(axes * p.plane.normal) / std::max(slack, std::numeric_limits<double>::min()));
       }
       const Orthogonalised frame = orthogonalise(a);
       frame_.axes = transposed(axes) * frame.inverse_r;
       Vec3 newton;
       for (Vec3 q : frame.rows) newton -= q;
       if (norm(newton) < 0.25) return;
-      frame_.origin += frame_.axes * (best_step(frame.rows, newton) * newton);
+      frame_.origin = moved(frame_.origin, axes, frame.inverse_r * (best_step(frame.rows, newton) * newton));
     }
   }
 
-  const Frame& frame() const { return frame_; }
-  void restart(Vec3 inside) { frame_.origin = inside; }
+  const FrameAbout<Point>& frame() const { return frame_; }
+  void restart(const Point& inside) { frame_.origin = inside; }
 
  private:
   static constexpr int kMaxSteps = 64;
-  Frame frame_;
+  FrameAbout<Point> frame_;
 };
 
 }  // namespace
 
-Vec3 dual_in_frame(const Frame& frame, const Plane& plane) {
-  return apply_transposed(frame.axes, plane.normal) / -signed_distance(plane, frame.origin);
-}
-
-Frame round_frame(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, const DeepestBall& ball) {
-  std::vector<OwnedPlane> cuts(ball.cuts);
-  Vec3 safe = ball.centre;
-  // A cut may pass through the ball's centre by rounding only; such a plane would stop Newton's method before it
-  // starts.
-  AnalyticCentre centre(safe);
+template <class Body>
+FrameAbout<PointOf<Body>> round_frame(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> planes,
+                                      std::vector<Owned<PlaneOf<Body>>> cuts, const PointOf<Body>& inside) {
+  using Cut = Owned<PlaneOf<Body>>;
+  PointOf<Body> safe = inside;
+  // A cut may pass through the point by rounding only; such a plane would stop Newton's method before it starts.
+  AnalyticCentre<PlaneOf<Body>> centre(safe);
   constexpr int kMaxRounds = 64;
   for (int round = 0; round < kMaxRounds; ++round) {
     centre.settle(cuts);
-    const Frame& frame = centre.frame();
+    const FrameAbout<PointOf<Body>>& frame = centre.frame();
     // The plane that is nearest in the metric of the frame, or violated.
-    OwnedPlane worst{{}, -1};
+    Cut worst{{}, -1};
     double eccentricity = kEccentricity;
-    const auto consider = [&](const OwnedPlane& p) {
-      const double slack = -signed_distance(p.plane, frame.origin);
-      const double length = slack > 0 ? norm(apply_transposed(frame.axes, p.plane.normal)) / slack : kInfinity;
+    const auto consider = [&](const Cut& p) {
+      const double slack = -rounded(signed_distance(p.plane, frame.origin));
+      const double length = slack > 0 ? norm(rounded(apply_transposed(frame.axes, p.plane.normal))) / slack : kInfinity;
       if (length > eccentricity) eccentricity = length, worst = p;
     };
-    for (const OwnedPlane& p : planes) consider(p);
+    for (const Cut& p : planes) consider(p);
     for (int i = 0; i < static_cast<int>(bodies.size()); ++i)
       if (smooth(bodies[i].shape)) consider({bodies[i].tightest(frame.origin), i});
     if (eccentricity == kEccentricity) return frame;
     if (round == kMaxRounds - 1) break;
     cuts.push_back(worst);
-    const double slack = -signed_distance(worst.plane, frame.origin), safe_slack = -signed_distance(worst.plane, safe);
+    const double slack = -rounded(signed_distance(worst.plane, frame.origin));
+    const double safe_slack = -rounded(signed_distance(worst.plane, safe));
     if (slack > 0) continue;
     // Back towards the safe point, to the middle of what the new plane leaves.
     const double reach = safe_slack / (safe_slack - slack);
@@ -342,5 +350,10 @@ Frame round_frame(std::span<const Placed> bodies, std::span<const OwnedPlane> pl
   // Not seen to happen: the axes stay, about the point known to be inside.
   return {safe, centre.frame().axes};
 }
+
+template Frame round_frame<Placed>(std::span<const Placed>, std::span<const OwnedPlane>, std::vector<OwnedPlane>,
+                                   const Vec3&);
+template FrameAbout<WideVector> round_frame<WideBody>(std::span<const WideBody>, std::span<const Owned<WidePlane>>,
+                                                      std::vector<Owned<WidePlane>>, const WideVector&);
 
 }  // namespace overlapper

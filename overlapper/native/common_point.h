@@ -5,14 +5,23 @@
 
 #include "shape.h"
 #include "vec.h"
+#include "wide_body.h"
 
 namespace overlapper {
 
+/// The numbers that a body answers in, doubles or double-doubles.
+template <class Body>
+using PlaneOf = decltype(std::declval<const Body&>().tightest({}));
+template <class Body>
+using PointOf = decltype(PlaneOf<Body>::normal);
+
 /// A plane of body number `owner`.
-struct OwnedPlane {
-  Plane plane;
+template <class AnyPlane>
+struct Owned {
+  AnyPlane plane;
   int owner;
 };
+using OwnedPlane = Owned<Plane>;
 
 /// The largest ball in the common set of the bodies, as far as it had to be known. Its radius r solves the linear
 /// programme max r with dot(n, x) + r <= offset for every supporting plane (n, offset) of every body, four unknowns, of
@@ -24,7 +33,8 @@ struct DeepestBall {
   double lower;                  ///< least slack at the centre, negative outside
   double upper;                  ///< no point has more slack than this
   double rounding;               ///< of `lower`
-  bool apart;                    ///< `upper` is below zero by more than its rounding
+  bool sure;                     ///< `lower` is above zero beyond doubt()
+  bool apart;                    ///< `upper` is below zero beyond doubt()
   std::vector<OwnedPlane> cuts;  ///< the planes asked for; they bound the common set
 };
 
@@ -38,16 +48,24 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double>
 /// kEccentricity and no dual point is longer than kEccentricity, be it a sliver of any thickness. The origin is the
 /// analytic centre of the planes that matter, and the axes are its Dikin ellipsoid (Nesterov and Nemirovskii 1994,
 /// section 2), so that the dual points of those planes sum to zero and their second moments to the identity.
-struct Frame {
-  Vec3 origin;
+template <class Point>
+struct FrameAbout {
+  Point origin;
   Mat3 axes;
 };
+using Frame = FrameAbout<Vec3>;
 inline constexpr double kEccentricity = 16;
 
-/// From a ball that lies inside; `planes` as above.
-Frame round_frame(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, const DeepestBall& ball);
+/// From a point strictly inside all bodies and the cuts, planes that bound the common set; `planes` as above. For
+/// Placed and for WideBody, whose planes say what rounding to doubles would hide: a sliver as thin as that.
+template <class Body>
+FrameAbout<PointOf<Body>> round_frame(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> planes,
+                                      std::vector<Owned<PlaneOf<Body>>> cuts, const PointOf<Body>& inside);
 
 /// The dual point, in the coordinates y, of a plane that has the frame's origin inside.
-Vec3 dual_in_frame(const Frame& frame, const Plane& plane);
+template <class AnyPlane, class Point>
+Vec3 dual_in_frame(const FrameAbout<Point>& frame, const AnyPlane& plane) {
+  return rounded(apply_transposed(frame.axes, plane.normal)) / -rounded(signed_distance(plane, frame.origin));
+}
 
 }  // namespace overlapper

@@ -65,4 +65,8 @@ Penetration penetration(const Placed& a, const Placed& b);
 /// 16 roundings of at most half an ulp.
 inline double rounding(double magnitude) { return 16 * 0x1p-53 * magnitude; }
 
+/// A sum beyond this has the sign that doubles give it: two rotations, a translation and a dot product, each of the
+/// last bits of a quaternion's length included, may lose half as much. Within, wider arithmetic decides.
+inline double doubt(double magnitude) { return 4 * rounding(magnitude); }
+
 }  // namespace overlapper

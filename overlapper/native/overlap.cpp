@@ -11,7 +11,6 @@
 #include "minkowski.h"
 #include "paper.h"
 #include "predicates.h"
-#include "wide_ball.h"
 #include "wide_gap.h"
 
 namespace overlapper {
@@ -23,11 +22,13 @@ double magnitude(const Placed& relative) {
     return norm(relative.pose.translation) + std::abs(half->plane.offset);
   const Bounds box = bounds(relative);
   double reach = norm(max(abs(box.lower), abs(box.upper)));
-  // A hull whose points were counted from far away has had that distance rotated and added.
+  // A hull whose points were counted from far away has had that distance rotated and added, and the planes of facets
+  // that are not quite flat miss their corners.
   if (const Hull* hull = std::get_if<Hull>(&relative.shape)) {
     const Vec3 origin = hull->data->origin;
     const bool turned = relative.orientation.w != 1;
     if (norm2(origin) > 0 && (turned || norm2(relative.position) > 0)) reach += norm(origin) + norm(relative.position);
+    reach += hull->data->flatness / rounding(1);
   }
   return reach;
 }
@@ -55,13 +56,20 @@ bool bounds_space(std::span<const Placed> bodies) {
   return true;
 }
 
-std::vector<OwnedPlane> gather_planes(std::span<const Placed> bodies) {
-  std::vector<OwnedPlane> planes;
-  std::vector<Plane> local;
+void append_planes(const Placed& body, std::vector<Plane>& planes) {
+  append_planes(body.shape, planes);
+  for (Plane& plane : planes) plane = body.pose * plane;
+}
+void append_planes(const WideBody& body, std::vector<WidePlane>& planes) { body.append_planes(planes); }
+
+template <class Body>
+std::vector<Owned<PlaneOf<Body>>> gather_planes(std::span<const Body> bodies) {
+  std::vector<Owned<PlaneOf<Body>>> planes;
+  std::vector<PlaneOf<Body>> own;
   for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
-    local.clear();
-    append_planes(bodies[i].shape, local);
-    for (const Plane& plane : local) planes.push_back({bodies[i].pose * plane, i});
+    own.clear();
+    append_planes(bodies[i], own);
+    for (const PlaneOf<Body>& plane : own) planes.push_back({plane, i});
   }
   return planes;
 }
@@ -97,6 +105,8 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
     return;
   }
   if (pair()) clipped_ = clip(bodies_[0], bodies_[1]);
+  // What is too thin for clipping to measure may be too thin to be more than touching.
+  if (clipped_ && clipped_->status == Status::kOverlapping && !clipped_->measured) clipped_.reset();
   status_ = clipped_ ? clipped_->status : search().status;
   measured_by_clipping_ = clipped_ && clipped_->measured;
 }
@@ -133,12 +143,12 @@ const Overlap::Search& Overlap::search() const {
   std::vector<OwnedPlane> hints;
   if (pair() && (bounded(relative[0].shape) || bounded(relative[1].shape))) {
     const Distance d = overlapper::distance(relative[0], relative[1]);
-    if (d.gap > rounding(std::max(search.reach[0], search.reach[1]))) return kept.emplace(std::move(search));
+    if (d.gap > doubt(std::max(search.reach[0], search.reach[1]))) return kept.emplace(std::move(search));
     hints = facing_planes(relative, d);
   }
-  search.planes = gather_planes(relative);
+  search.planes = gather_planes<Placed>(relative);
   search.ball = deepest_ball(relative, search.reach, search.planes, hints);
-  if (search.ball.lower > search.ball.rounding) {
+  if (search.ball.sure) {
     search.status = Status::kOverlapping;
   } else if (!search.ball.apart) {
     search.status = Status::kTouching;
@@ -149,22 +159,32 @@ const Overlap::Search& Overlap::search() const {
   return kept.emplace(std::move(search));
 }
 
-/// Where doubles see neither a gap nor a common ball, of slender bodies and of bodies of very different size there may
-/// still be either.
-void Overlap::settle_in_wide_arithmetic(Search& search) const {
-  const auto& [order, relative, reference] = arrangement();
-  const double reach = *std::max_element(search.reach.begin(), search.reach.end());
-  double least_size = std::numeric_limits<double>::infinity();
+std::vector<WideBody> Overlap::wide_bodies() const {
   std::vector<WideBody> bodies;
+  for (const Placed& body : arrangement().relative) bodies.emplace_back(body, wide(arrangement().reference));
+  return bodies;
+}
+
+/// How far rounding in double-double may move a plane of bodies that reach so far.
+double wide_noise(double reach) { return 0x1p-96 * reach; }
+
+/// Where doubles are not sure of a gap or of a common ball. The sizes that count are the same for a mirror image, for
+/// other axes and for another order.
+void Overlap::settle_in_wide_arithmetic(Search& search) const {
+  const std::vector<Placed>& relative = arrangement().relative;
+  const double reach = *std::max_element(search.reach.begin(), search.reach.end()), noise = wide_noise(reach);
+  double least_size = std::numeric_limits<double>::infinity(), largest_size = 0;
   for (const Placed& body : relative) {
-    bodies.emplace_back(body, wide(reference));
     if (!bounded(body.shape)) continue;
     const Bounds box = bounds(body);
-    least_size = std::min(least_size, norm(box.upper - box.lower));
+    const double size = norm(box.upper - box.lower);
+    least_size = std::min(least_size, size);
+    largest_size = std::max(largest_size, size);
   }
   if (!std::isfinite(least_size)) return;
+  const std::vector<WideBody> bodies = wide_bodies();
   // Nearer or thinner than the rounding of their coordinates, bodies touch, but not by 1e-12 of the smaller one's size.
-  const double margin = std::min(rounding(reach), 0x1p-41 * least_size), noise = 0x1p-96 * reach;
+  const double margin = std::max(4 * noise, std::min(rounding(largest_size / 2), 0x1p-41 * least_size));
   WideVector apart;
   if (pair()) {
     const WideGap gap = wide_gap(bodies[0], bodies[1], noise);
@@ -174,16 +194,11 @@ void Overlap::settle_in_wide_arithmetic(Search& search) const {
     }
     apart = wide(gap.normal);
   }
-  const WideBall found = wide_deepest_ball(bodies, apart, margin, reach, noise);
-  if (found.upper < -margin) search.status = Status::kSeparated;
-  // What is thinner cannot be put into a frame in doubles about this reference.
-  const double thick = 64 * rounding(reach);
-  if (found.lower <= thick) return;
-  search.status = Status::kOverlapping;
-  search.ball.centre = rounded(found.centre);
-  search.ball.lower = found.lower;
-  search.ball.upper = found.upper;
-  search.ball.rounding = rounding(reach);
+  search.wide_ball = wide_deepest_ball(bodies, apart, margin, reach, noise);
+  if (search.wide_ball->upper < -margin) search.status = Status::kSeparated;
+  if (search.wide_ball->lower > margin) search.status = Status::kOverlapping;
+  search.ball.upper = search.wide_ball->upper;
+  search.ball.rounding = noise;
 }
 
 double Overlap::volume() const {
@@ -248,37 +263,58 @@ const Region& Overlap::grown() const {
   std::optional<Region>& kept = lazy().region;
   if (kept) return *kept;
   const Search& found = search();
-  const double most = rounding(*std::max_element(found.reach.begin(), found.reach.end()));
+  const double reach = *std::max_element(found.reach.begin(), found.reach.end());
+  if (found.wide_ball) return kept.emplace(grown_about(*found.wide_ball, reach));
   const Arrangement& about = arrangement();
+  const Frame frame = round_frame<Placed>(about.relative, found.planes, found.ball.cuts, found.ball.centre);
   return kept.emplace(
-      owned_as_given(grow(about.relative, found.planes, found.ball, tolerance_, most, about.reference)));
+      owned_as_given(grow<Placed>(about.relative, found.planes, frame, tolerance_, rounding(reach), about.reference)));
+}
+
+Region Overlap::grown_about(const WideBall& ball, double reach) const {
+  const std::vector<WideBody> bodies = wide_bodies();
+  const std::vector<Owned<WidePlane>> planes = gather_planes<WideBody>(bodies);
+  const FrameAbout<WideVector> frame = round_frame<WideBody>(bodies, planes, ball.cuts, ball.centre);
+  return owned_as_given(grow<WideBody>(bodies, planes, frame, tolerance_, wide_noise(reach), arrangement().reference));
 }
 
 const Quantities& Overlap::measured() const {
   std::optional<Quantities>& kept = lazy().quantities;
   if (kept) return *kept;
-  if (pair() && method_ == Method::kAuto) {
-    const Arrangement& at = arrangement();
-    const std::vector<double>& reach = search().reach;
-    kept = closed_form(at.relative[0], at.relative[1], rounding(std::max(reach[0], reach[1])), at.reference);
+  if (method_ == Method::kPaper) return kept.emplace(measure(grown()));
+  const Search& found = search();
+  if (found.wide_ball) {
+    kept = measure(grown());
+    kept->widened = true;
+    return *kept;
+  }
+  const Arrangement& at = arrangement();
+  const double reach = *std::max_element(found.reach.begin(), found.reach.end());
+  if (pair()) {
+    kept = closed_form(at.relative[0], at.relative[1], rounding(reach), at.reference);
     if (kept) {
       for (Quantities::Pull& pull : kept->pulls) pull.owner = at.order[pull.owner];
       return *kept;
     }
   }
-  const Region& region = grown();
-  Quantities found = measure(region);
-  const bool enough = found.volume_error <= kEnough * found.volume;
-  if (!enough && method_ == Method::kAuto && std::none_of(bodies_.begin(), bodies_.end(), smooth_body)) {
-    if (auto wide = overlapper::widened(arrangement().relative, region)) {
-      found = measure(owned_as_given(std::move(*wide)));
-      found.widened = true;
-    } else {
-      // The point about which the region was grown is not inside after all: all that is sure is how much could be.
-      found.volume_error += found.volume + touching_volume(search().ball);
-    }
+  kept = measure(grown());
+  if (std::any_of(bodies_.begin(), bodies_.end(), smooth_body)) return *kept;
+  const auto enough = [&] { return kept->volume_error <= kEnough * kept->volume; };
+  const auto keep_better = [&](const Region& region) {
+    Quantities again = measure(region);
+    again.widened = true;
+    if (!kept->widened || again.volume_error < kept->volume_error) kept = std::move(again);
+  };
+  if (!enough())
+    if (auto wide = overlapper::widened(at.relative, grown())) keep_better(owned_as_given(std::move(*wide)));
+  if (!enough()) {
+    // The point about which the region was grown may not be inside after all, or its frame not be round.
+    const double noise = wide_noise(reach);
+    const WideBall ball = wide_deepest_ball(wide_bodies(), {}, 4 * noise, reach, noise);
+    if (ball.lower > 0) keep_better(grown_about(ball, reach));
+    else kept->volume_error += kept->volume + touching_volume(found.ball);
   }
-  return kept.emplace(std::move(found));
+  return *kept;
 }
 
 const Region& Overlap::region() const {

@@ -10,6 +10,7 @@
 #include "region.h"
 #include "shape.h"
 #include "surface.h"
+#include "wide_ball.h"
 
 namespace overlapper {
 
@@ -78,6 +79,7 @@ class Overlap {
     std::vector<double> reach;       ///< per relative body: how large the numbers are that describe it
     std::vector<OwnedPlane> planes;  ///< of all bodies
     DeepestBall ball{};
+    std::optional<WideBall> wide_ball;  ///< where it had to be looked for in double-double
   };
 
   struct Lazy {
@@ -95,6 +97,8 @@ class Overlap {
   const Arrangement& arrangement() const;
   const Search& search() const;
   void settle_in_wide_arithmetic(Search& search) const;
+  std::vector<WideBody> wide_bodies() const;
+  Region grown_about(const WideBall& ball, double reach) const;
   const Region& grown() const;
   const Quantities& measured() const;
   double touching_volume(const DeepestBall& ball) const;

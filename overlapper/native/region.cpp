@@ -14,27 +14,37 @@ namespace overlapper {
 namespace {
 
 /// The dual hull of a region while it grows.
+template <class Body>
 struct Growth {
-  std::span<const Placed> bodies;
-  Frame frame;
-  ExpandingHull hull;
-  std::vector<OwnedPlane> planes;  ///< parallel to hull.points
-  std::vector<double> inner;       ///< per hull facet, parallel to hull.facets
+  using Cut = Owned<PlaneOf<Body>>;
 
-  void add(const OwnedPlane& plane) {
+  std::span<const Body> bodies;
+  FrameAbout<PointOf<Body>> frame;
+  ExpandingHull hull;
+  std::vector<Cut> planes;    ///< parallel to hull.points
+  std::vector<double> inner;  ///< per hull facet, parallel to hull.facets
+
+  void add(const Cut& plane) {
     hull.add(dual_in_frame(frame, plane.plane));
     planes.push_back(plane);
   }
 
+  double slack(const Cut& plane) const { return -rounded(signed_distance(plane.plane, frame.origin)); }
+
+  PointOf<Body> direction_to(Vec3 vertex) const {
+    if constexpr (std::is_same_v<Body, Placed>) return frame.axes * vertex;
+    else return frame.axes * wide(vertex);
+  }
+
   /// The plane of the smooth bodies through which the ray from the origin to `vertex` leaves first. `reach` is the
   /// distance of the vertex over that of the exit.
-  std::optional<OwnedPlane> first_exit(Vec3 vertex, double& reach) const {
-    std::optional<OwnedPlane> first;
+  std::optional<Cut> first_exit(Vec3 vertex, double& reach) const {
+    std::optional<Cut> first;
     reach = 0;
-    const Vec3 direction = frame.axes * vertex;
+    const PointOf<Body> direction = direction_to(vertex);
     for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
       if (!smooth(bodies[i].shape)) continue;
-      const Plane plane = bodies[i].ray_exit(frame.origin, direction);
+      const PlaneOf<Body> plane = bodies[i].ray_exit(frame.origin, direction);
       const double ratio = dot(dual_in_frame(frame, plane), vertex);
       if (ratio > reach) reach = ratio, first = {plane, i};
     }
@@ -67,15 +77,39 @@ struct Growth {
   }
 };
 
+double farthest_vertex(const Polytope& polytope) {
+  double farthest = 0;
+  for (Vec3 y : polytope.vertices) farthest = std::max(farthest, norm(y));
+  return farthest;
+}
+
+/// A dual point rounded once moves its plane, as seen from the origin, by an ulp at the distance of the vertices.
+double rounding_of_dual(double slack, Vec3 dual, double farthest) {
+  return slack * kWideRounding * std::max(1.0, norm(dual) * farthest);
+}
+
+/// The region's reference and frame, for one about `reference`.
+void set_frame(Region& region, const Frame& frame, Vec3 reference) {
+  region.reference = reference;
+  region.frame = frame;
+}
+void set_frame(Region& region, const FrameAbout<WideVector>& frame, Vec3 reference) {
+  const WideVector origin = wide(reference) + frame.origin;
+  region.reference = rounded(origin);
+  region.frame = {tail(origin), frame.axes};
+}
+
 }  // namespace
 
-Region grow(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, const DeepestBall& ball,
-            double tolerance, double rounding, Vec3 reference) {
-  Growth growth{bodies, round_frame(bodies, planes, ball), {}, {}, {}};
+template <class Body>
+Region grow(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> planes,
+            const FrameAbout<PointOf<Body>>& frame, double tolerance, double rounding, Vec3 reference) {
+  constexpr bool kWide = std::is_same_v<Body, WideBody>;
+  Growth<Body> growth{bodies, frame, {}, {}, {}};
   std::vector<double> negligible;
-  for (const OwnedPlane& p : planes) {
+  for (const auto& p : planes) {
     growth.add(p);
-    negligible.push_back(4 * rounding / -signed_distance(p.plane, growth.frame.origin));
+    negligible.push_back(4 * rounding / growth.slack(p) + (kWide ? kWideRounding : 0));
   }
   const bool solid = growth.hull.build(negligible);
   assert(solid);
@@ -83,23 +117,27 @@ Region grow(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, 
   growth.refine(tolerance);
 
   Region region;
-  region.reference = reference;
-  region.frame = growth.frame;
+  set_frame(region, frame, reference);
   region.polytope = polar_dual(growth.hull);
   region.facets_touched = growth.hull.inserted();
-  for (int p : region.polytope.plane) {
-    const OwnedPlane& owned = growth.planes[p];
-    region.facets.push_back(
-        {owned.plane.normal, -signed_distance(owned.plane, region.frame.origin), rounding, owned.owner});
+  const double farthest = kWide ? farthest_vertex(region.polytope) : 0;
+  for (int f = 0; f < region.polytope.facets(); ++f) {
+    const auto& owned = growth.planes[region.polytope.plane[f]];
+    const double slack = growth.slack(owned);
+    const double of_dual = kWide ? rounding_of_dual(slack, region.polytope.dual[f], farthest) : 0;
+    region.facets.push_back({overlapper::rounded(owned.plane.normal), slack, rounding + of_dual, owned.owner});
   }
   for (int f = 0; f < static_cast<int>(growth.hull.facets.size()); ++f)
     if (!growth.hull.facets[f].removed()) region.inner.push_back(growth.inner[f]);
   return region;
 }
 
+template Region grow<Placed>(std::span<const Placed>, std::span<const OwnedPlane>, const Frame&, double, double, Vec3);
+template Region grow<WideBody>(std::span<const WideBody>, std::span<const Owned<WidePlane>>,
+                               const FrameAbout<WideVector>&, double, double, Vec3);
+
 std::optional<Region> widened(std::span<const Placed> bodies, const Region& region) {
-  double reach = 0;
-  for (Vec3 y : region.polytope.vertices) reach = std::max(reach, norm(y));
+  const double reach = farthest_vertex(region.polytope);
   const std::vector<WideDual> duals = wide_duals(bodies, region.reference, region.frame, reach);
   ExpandingHull hull;
   std::vector<double> negligible;
@@ -114,11 +152,9 @@ std::optional<Region> widened(std::span<const Placed> bodies, const Region& regi
   wide.reference = region.reference;
   wide.frame = region.frame;
   wide.polytope = polar_dual(hull);
-  double farthest = 0;
-  for (Vec3 y : wide.polytope.vertices) farthest = std::max(farthest, norm(y));
+  const double farthest = farthest_vertex(wide.polytope);
   for (int p : wide.polytope.plane) {
-    // A dual point rounded once moves its plane, as seen from the origin, by an ulp at the distance of the vertices.
-    const double rounding = duals[p].slack * kWideRounding * std::max(1.0, norm(duals[p].point) * farthest);
+    const double rounding = rounding_of_dual(duals[p].slack, duals[p].point, farthest);
     wide.facets.push_back({duals[p].normal, duals[p].slack, rounding, duals[p].owner});
   }
   wide.facets_touched = region.facets_touched;

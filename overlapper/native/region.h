@@ -32,11 +32,12 @@ struct Region {
   Vec3 to_world(Vec3 y) const { return reference + (frame.origin + frame.axes * y); }
 };
 
-/// Grows the dual hull of the bodies' common set, which holds `ball`, until vertices reach out of smooth bodies by no
-/// more than the fraction `tolerance`. Bodies and planes relative to `reference`; `rounding` is how far a plane may be
-/// off, in m.
-Region grow(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, const DeepestBall& ball,
-            double tolerance, double rounding, Vec3 reference);
+/// Grows the dual hull of the bodies' common set, whose round frame is given, until vertices reach out of smooth bodies
+/// by no more than the fraction `tolerance`. Bodies, planes and frame relative to `reference`; `rounding` is how far a
+/// plane may be off, in m. For Placed and for WideBody.
+template <class Body>
+Region grow(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> planes,
+            const FrameAbout<PointOf<Body>>& frame, double tolerance, double rounding, Vec3 reference);
 
 /// The region of polytopes and half-spaces once more in the same frame, from dual points that are right to the last
 /// bit: planes, poses and the distance from the origin are taken in double-double, and unmerged facets from their

@@ -10,6 +10,7 @@
 #include "expanding_hull.h"
 #include "polytope.h"
 #include "predicates.h"
+#include "wide.h"
 
 namespace overlapper {
 namespace {
@@ -417,12 +418,14 @@ Plane supporting_plane(const std::vector<Vec3>& vertices, std::span<const int> r
   const Vec3 apex = vertices[ring[0]];
   Vec3 normal;
   if (ring.size() == 3) {
-    normal = accurate_normal(apex, vertices[ring[1]], vertices[ring[2]]);
+    normal = unit(accurate_normal(apex, vertices[ring[1]], vertices[ring[2]]));
   } else {
+    // On a slender facet the products of doubles nearly cancel.
+    WideVector sum;
     for (size_t i = 1; i + 1 < ring.size(); ++i)
-      normal += cross(vertices[ring[i]] - apex, vertices[ring[i + 1]] - apex);
+      sum = sum + wide_cross(wide_difference(vertices[ring[i]], apex), wide_difference(vertices[ring[i + 1]], apex));
+    normal = unit(rounded(sum));
   }
-  normal = unit(normal);
   double offset = -kInfinity;
   for (int v : ring) offset = std::max(offset, dot(normal, vertices[v]));
   return {normal, offset};
@@ -533,6 +536,10 @@ void complete(HullData& data) {
       data.flatness = std::max(data.flatness, -signed_distance(data.planes[f], data.vertices[v]));
     }
   }
+  for (const Edge& e : data.edges)
+    for (const auto& [facet, beside] : {std::pair(e.left, e.right), std::pair(e.right, e.left)})
+      for (int v : data.facet(beside))
+        data.flatness = std::max(data.flatness, signed_distance(data.planes[facet], data.vertices[v]));
   for (const auto& facets : around) data.facets_meet.push_back(well_spread(facets, data.planes));
   for (Vec3 v : data.vertices) data.radius = std::max(data.radius, norm(v));
 }

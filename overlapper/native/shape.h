@@ -95,7 +95,7 @@ struct HullData {
   std::vector<Edge> edges;                      ///< none if merging facets has left a ridge without its other side
   std::vector<std::array<int, 3>> facets_meet;  ///< per vertex: three of its facets, as far from a common line as any
   double radius = 0;                            ///< of a ball about the coordinates' origin that holds all vertices
-  double flatness = 0;                          ///< m: no vertex lies deeper than this inside the plane of its facet
+  double flatness = 0;  ///< m: how far vertices of a facet lie inside its plane, or those beside it outside, at most
 
   std::span<const int> facet(int f) const {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);

@@ -83,7 +83,22 @@ inline WideVector operator-(const WideVector& a, const WideVector& b) { return {
 inline DoubleDouble dot(const WideVector& a, const WideVector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline WideVector operator-(const WideVector& v) { return {-v.x, -v.y, -v.z}; }
 inline WideVector operator*(DoubleDouble s, const WideVector& v) { return {s * v.x, s * v.y, s * v.z}; }
+inline WideVector operator*(double s, const WideVector& v) { return DoubleDouble{s} * v; }
+inline double rounded(DoubleDouble a) { return a.head; }
 inline Vec3 rounded(const WideVector& v) { return {v.x.head, v.y.head, v.z.head}; }
+/// What is left when `rounded` is taken away, rounded.
+inline Vec3 tail(const WideVector& v) { return {v.x.tail, v.y.tail, v.z.tail}; }
+
+// Plain doubles are their own, so that code can be written for both.
+inline double rounded(double a) { return a; }
+inline Vec3 rounded(Vec3 v) { return v; }
+
+inline WideVector operator*(const Mat3& m, const WideVector& v) {
+  return {dot(wide(m.row0), v), dot(wide(m.row1), v), dot(wide(m.row2), v)};
+}
+inline WideVector apply_transposed(const Mat3& m, const WideVector& v) {
+  return v.x * wide(m.row0) + v.y * wide(m.row1) + v.z * wide(m.row2);
+}
 
 /// Its length; scaled by a power of two first, which keeps the squares in range.
 inline DoubleDouble norm(const WideVector& v) {

@@ -120,13 +120,13 @@ std::array<WidePlane, 4> surrounding_simplex(std::span<const WideBody> bodies, d
   return simplex;
 }
 
-WidePlane tightest(std::span<const WideBody> bodies, const WideVector& point) {
-  WidePlane worst{};
+Owned<WidePlane> tightest(std::span<const WideBody> bodies, const WideVector& point) {
+  Owned<WidePlane> worst{{}, -1};
   DoubleDouble outside{-kInfinity};
-  for (const WideBody& body : bodies) {
-    const WidePlane plane = body.tightest(point);
+  for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
+    const WidePlane plane = bodies[i].tightest(point);
     const DoubleDouble d = signed_distance(plane, point);
-    if (d > outside) outside = d, worst = plane;
+    if (d > outside) outside = d, worst = {plane, i};
   }
   return worst;
 }
@@ -135,23 +135,29 @@ WidePlane tightest(std::span<const WideBody> bodies, const WideVector& point) {
 
 WideBall wide_deepest_ball(std::span<const WideBody> bodies, const WideVector& hint, double margin, double reach,
                            double noise) {
-  Basis basis(surrounding_simplex(bodies, reach));
+  const std::array<WidePlane, 4> simplex = surrounding_simplex(bodies, reach);
+  Basis basis(simplex);
+  WideBall best{{}, -kInfinity, kInfinity, {}};
+  for (const WidePlane& plane : simplex) best.cuts.push_back({plane, -1});
+  const auto enter = [&](const Owned<WidePlane>& cut) {
+    best.cuts.push_back(cut);
+    return basis.exchange(cut.plane);
+  };
   if (norm(hint).head > 0) {
-    if (bounded(bodies[0].shape)) basis.exchange(supporting(bodies[0], -hint));
-    if (bounded(bodies[1].shape)) basis.exchange(supporting(bodies[1], hint));
+    if (bounded(bodies[0].shape)) enter({supporting(bodies[0], -hint), 0});
+    if (bounded(bodies[1].shape)) enter({supporting(bodies[1], hint), 1});
   }
-  WideBall best{{}, -kInfinity, kInfinity};
   constexpr int kMaxRounds = 512;
   for (int round = 0; round < kMaxRounds; ++round) {
     const WideVector centre = basis.centre();
     best.upper = std::min(best.upper, basis.most(centre, reach + norm(centre).head) + noise);
-    const WidePlane worst = tightest(bodies, centre);
-    const double slack = -signed_distance(worst, centre).head - noise;
+    const Owned<WidePlane> worst = tightest(bodies, centre);
+    const double slack = -signed_distance(worst.plane, centre).head - noise;
     if (slack > best.lower) best.lower = slack, best.centre = centre;
     const bool deep = best.lower > margin && best.lower >= best.upper / 4;
     const bool shallow = best.upper <= margin && best.lower >= -margin;
     if (deep || shallow || best.upper < -margin || best.upper - best.lower <= 4 * noise) break;
-    if (!basis.exchange(worst)) break;
+    if (!enter(worst)) break;
   }
   return best;
 }

@@ -1,8 +1,9 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
-#include "wide_body.h"
+#include "common_point.h"
 
 namespace overlapper {
 
@@ -10,8 +11,9 @@ namespace overlapper {
 /// its radius above `margin`, or below -margin?
 struct WideBall {
   WideVector centre;
-  double lower;  ///< least slack at the centre
-  double upper;  ///< no point has more
+  double lower;                        ///< least slack at the centre
+  double upper;                        ///< no point has more
+  std::vector<Owned<WidePlane>> cuts;  ///< the planes asked for; they bound the common set
 };
 
 /// `hint` is a direction in which a pair may be apart, or {0, 0, 0}. `reach` is how large the coordinates are, and

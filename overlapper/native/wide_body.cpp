@@ -161,13 +161,11 @@ WidePlane WideBody::tightest(const WideVector& point) const {
   return in_world(std::visit(of_simple, shape));
 }
 
-Plane WideBody::ray_exit(Vec3 origin, Vec3 direction) const {
-  const WideVector o = local(wide(origin)), d = apply_transposed(rotation_, wide(direction));
-  if (const Sphere* sphere = std::get_if<Sphere>(&shape))
-    return in_world(overlapper::ray_exit(*sphere, o, d)).rounded();
-  if (const Capsule* capsule = std::get_if<Capsule>(&shape))
-    return in_world(overlapper::ray_exit(*capsule, o, d)).rounded();
-  return in_world(overlapper::ray_exit(std::get<Cylinder>(shape), o, d)).rounded();
+WidePlane WideBody::ray_exit(const WideVector& origin, const WideVector& direction) const {
+  const WideVector o = local(origin), d = apply_transposed(rotation_, direction);
+  if (const Sphere* sphere = std::get_if<Sphere>(&shape)) return in_world(overlapper::ray_exit(*sphere, o, d));
+  if (const Capsule* capsule = std::get_if<Capsule>(&shape)) return in_world(overlapper::ray_exit(*capsule, o, d));
+  return in_world(overlapper::ray_exit(std::get<Cylinder>(shape), o, d));
 }
 
 WideVector WideBody::farthest_corner(const WideVector& direction) const {
@@ -210,15 +208,18 @@ WideVector WideBody::support(const WideVector& direction) const {
   return core_support(direction) + DoubleDouble{core_radius(shape)} * unit(direction);
 }
 
-void WideBody::append_planes(std::vector<Plane>& planes) const {
+void WideBody::append_planes(std::vector<WidePlane>& planes) const {
   if (std::holds_alternative<Hull>(shape)) {
-    for (int t = 0; t < static_cast<int>(glances_.size()); ++t) planes.push_back(in_world(triangle_plane(t)).rounded());
+    for (int t = 0; t < static_cast<int>(glances_.size()); ++t) planes.push_back(in_world(triangle_plane(t)));
   } else if (std::holds_alternative<HalfSpace>(shape)) {
-    planes.push_back(tightest(Vec3{}));
+    planes.push_back(tightest(WideVector{}));
   } else {
-    std::vector<Plane> local_planes;
-    overlapper::append_planes(shape, local_planes);
-    for (const Plane& plane : local_planes) planes.push_back(in_world({wide(plane.normal), {plane.offset}}).rounded());
+    for (int i = 0; i < 3; ++i) {
+      for (double side : {-1.0, 1.0}) {
+        const WideVector normal = rotation_ * (side * axis(i));
+        planes.push_back({normal, dot(normal, support(normal))});
+      }
+    }
   }
 }
 

@@ -10,8 +10,6 @@ namespace overlapper {
 struct WidePlane {
   WideVector normal;  ///< unit
   DoubleDouble offset;
-
-  Plane rounded() const { return {overlapper::rounded(normal), offset.head}; }
 };
 
 /// How far `point` lies outside the plane; negative inside.
@@ -26,17 +24,14 @@ class WideBody {
  public:
   WideBody(const Placed& body, const WideVector& about);
 
-  /// In the answers of the oracle, rounding is that of the last step.
-  Plane ray_exit(Vec3 origin, Vec3 direction) const;
-  Plane tightest(Vec3 point) const { return tightest(wide(point)).rounded(); }
-
+  WidePlane ray_exit(const WideVector& origin, const WideVector& direction) const;
   WidePlane tightest(const WideVector& point) const;
   WideVector support(const WideVector& direction) const;
   WideVector core_support(const WideVector& direction) const;
   WideVector position() const { return translation_; }
 
   /// All planes of a polytope, of each triangle of its hull; for a smooth shape a few tangent planes that bound it.
-  void append_planes(std::vector<Plane>& planes) const;
+  void append_planes(std::vector<WidePlane>& planes) const;
 
   Shape shape;
 
