@@ -1,6 +1,7 @@
 """The examples run as a user runs them, stay short, and print what is true."""
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -137,3 +138,25 @@ def test_links_of_a_chain_share_less_than_their_hulls(run, tmp_path, monkeypatch
     assert 16.6 < whole < by_parts + 1e-3 < hulls[0] / 4
     assert pairs > 1 and error < 1e-9
     assert (tmp_path / "chain_links.html").is_file()
+
+
+def test_a_repository_of_ones_own_is_guarded_by_what_its_workflow_runs(tmp_path):
+    repository = shutil.copytree(EXAMPLES / "ci", tmp_path / "mine", ignore=shutil.ignore_patterns("out", "__pycache__"))
+    workflow = (repository / ".github" / "workflows" / "scenes.yml").read_text(encoding="utf-8")
+    (command,) = re.findall(r"- run: (pytest .*)", workflow)
+
+    def guard():
+        python = [sys.executable, "-m", *command.split(), "-p", "no:cacheprovider"]
+        return subprocess.run(python, cwd=repository, capture_output=True, text=True, timeout=120)
+
+    as_it_is = guard()
+    assert as_it_is.returncode == 0, as_it_is.stdout
+    assert "2 passed" in as_it_is.stdout
+    model = repository / "models" / "drawer.urdf"
+    model.write_text(model.read_text(encoding="utf-8").replace("0.5 0.396 0.015", "0.5 0.398 0.015"), encoding="utf-8")
+    thicker = guard()
+    assert thicker.returncode == 1
+    assert "1 failed, 1 passed" in thicker.stdout
+    assert "drawer" in thicker.stdout and "volume_m3" in thicker.stdout
+    assert 'failures="1"' in (repository / "out" / "scenes.xml").read_text(encoding="utf-8")
+    assert (repository / "out" / "drawer.moved.html").is_file()
