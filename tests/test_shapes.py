@@ -44,11 +44,13 @@ def assert_is_a_convex_polytope(hull, points):
     assert {(v, u) for u, v in edges} == set(edges)
     assert_allclose(np.linalg.norm(planes[:, :3], axis=1), 1, rtol=4 * EPS)
     assert (points @ planes[:, :3].T + planes[:, 3]).max() <= 64 * EPS * extent
-    for ring, (*normal, offset) in zip(hull.facets, planes, strict=True):
-        corners = vertices[ring]
-        assert_allclose(corners @ normal + offset, 0, atol=64 * EPS * extent)
-        turns = np.cross(np.roll(corners, -1, 0) - corners, np.roll(corners, -2, 0) - np.roll(corners, -1, 0)) @ normal
-        assert turns.min() > 0
+    lengths = np.array(list(map(len, hull.facets)))
+    for length in set(lengths):  # all facets of as many corners at once
+        corners = vertices[np.array([ring for ring in hull.facets if len(ring) == length])]
+        normals, offsets = planes[lengths == length, None, :3], planes[lengths == length, None, 3]
+        assert_allclose((corners * normals).sum(axis=2) + offsets, 0, atol=64 * EPS * extent)
+        sides = np.roll(corners, -1, 1) - corners
+        assert (np.cross(sides, np.roll(sides, -1, 1)) * normals).sum(axis=2).min() > 0
 
 
 # Attributes
