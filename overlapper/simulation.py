@@ -8,7 +8,6 @@ lets collide.
 
 from __future__ import annotations
 
-import uuid
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -18,15 +17,15 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Batch, Overlaps, Placed, Shape, overlaps
+from overlapper import Batch, Overlaps, Placed, Shape, _core, overlaps
 from overlapper.contacts import Contact, Contacts
 from overlapper.decomposition import check_threshold
-from overlapper.quaternion import composed, rotated
 
 try:
     import pybullet
 
     from overlapper.bullet_file import BulletFile
+    from overlapper.collider_poses import ColliderPoses
     from overlapper.extraction import (
         BASE,
         Array,
@@ -38,10 +37,10 @@ try:
         body_ids,
         hides_pose,
         read_body,
-        save,
         saved_bodies,
     )
     from overlapper.filters import Colliders, CollisionRules, Who, pair_codes
+    from overlapper.marks import Marks
     from overlapper.recorder import Recorder
 except ImportError as error:
     raise ImportError("overlapper.simulation needs pybullet: pip install 'overlapper[sim]'") from error
@@ -143,7 +142,7 @@ class Bodies:
         self._concave: Concave = concave
         self._threshold = concave_threshold
         self._recorder = recorder
-        self._mark = f"overlapper {uuid.uuid4()}"
+        self._marks = Marks(physicsClientId)
         self._bodies: dict[int, Body] = {}
         self._unidentified = 0
         self._rows: dict[int, int] = {}  # in a .bullet file, of the bodies whose poses have no other source
@@ -157,7 +156,10 @@ class Bodies:
         self._examined = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
 
     def update(self) -> None:
-        """Read the shapes of new bodies and changed filters, then all poses. Call it once per step."""
+        """Read the shapes of new bodies and changed filters, then all poses. Call it once per step.
+
+        Whether a base has become static, its mass 0, is asked when it has not moved since the last update.
+        """
         self._refresh()
 
     def overlaps(
@@ -261,22 +263,22 @@ class Bodies:
         client = self.physicsClientId
         if not pybullet.isConnected(client):
             raise ValueError(f"physicsClientId {client} is not connected to a physics server")
-        # After a syncBodyInfo, pybullet would show the user data of a removed body on the one that inherits its id.
-        pybullet.syncUserData(physicsClientId=client)
-        ids = body_ids(client)
-        fresh = ids != self._bodies.keys() or not all(map(self._is_marked, ids))
-        skipped = self._read() if fresh else []
-        if fresh:
-            self._arrange()
+        skipped, fresh = [], False
+        if not self._marks.are_as_remembered():
+            # After a syncBodyInfo, pybullet would show the user data of a removed body on the one that inherits its id.
+            pybullet.syncUserData(physicsClientId=client)
+            ids = body_ids(client)
+            fresh = ids != self._bodies.keys() or not all(map(self._marks.is_on, ids))
+            if fresh:
+                skipped = self._read()
+                self._arrange()
+            self._marks.remember(self._bodies)
         self._pose()
         self._follow_filters(fresh)
         for each in skipped:
             message = f"{each.name} (body {each.body}, link {each.link}) is left out: {each.reason}"
             # The caller of update() or of Bodies() is three calls up.
             warnings.warn(message, SkippedShapeWarning, stacklevel=3)
-
-    def _is_marked(self, id: int) -> bool:
-        return bool(pybullet.getUserDataId(id, self._mark, physicsClientId=self.physicsClientId) >= 0)
 
     def _read(self) -> list[Skipped]:
         """Read the bodies that are not marked yet, forget those that are gone; what is newly skipped."""
@@ -285,7 +287,7 @@ class Bodies:
         pybullet.syncBodyInfo(client)
         pybullet.syncUserData(physicsClientId=client)
         ids = sorted(body_ids(client))
-        known = {id: self._bodies[id] for id in ids if id in self._bodies and self._is_marked(id)}
+        known = {id: self._bodies[id] for id in ids if id in self._bodies and self._marks.is_on(id)}
         fresh = [id for id in ids if id not in known]
         hidden = [id for id in ids if hides_pose(client, id)]
         unidentified, self._rows = (self._unidentified if ids else 0), {}
@@ -297,7 +299,7 @@ class Bodies:
         for id in fresh:
             body = file.bodies[rows[id]] if id in rows else None
             known[id] = read_body(client, id, file, body, self._concave, self._threshold)
-            pybullet.addUserData(id, self._mark, "", physicsClientId=client)
+            self._marks.put(id)
         self._bodies = dict(sorted(known.items()))
         grown, self._unidentified = unidentified > self._unidentified, unidentified
         skipped = [each for id in fresh for each in self._bodies[id].skipped]
@@ -314,7 +316,7 @@ class Bodies:
         """Read groups and masks again if they may have changed since, and take over what the recorder has noted."""
         client = self.physicsClientId
         # changeDynamics gives a base the group of static or of moving bodies as it becomes one.
-        static = [pybullet.getDynamicsInfo(id, BASE, client)[0] == 0 for id in self._links]
+        static = self._poses.static.copy()
         noted = (self._recorder.changes, self._recorder.masks_set) if self._recorder else (0, 0)
         changed = static != self._static or noted[1] != self._noted[1]
         if changed and not fresh:
@@ -346,36 +348,22 @@ class Bodies:
         self._batch = Batch(self._shapes)
         self._local_positions = np.array([part.position for part in parts]).reshape(-1, 3)
         self._local_orientations = np.array([part.orientation for part in parts]).reshape(-1, 4)
-        self._links = {id: sorted({part.link for part in each} - {BASE}) for id, each in shaped.items()}
-        colliders = [(id, link) for id, links in self._links.items() for link in [BASE, *links]]
-        self._collider_rows = {collider: row for row, collider in enumerate(colliders)}
+        links = {id: sorted({part.link for part in each} - {BASE}) for id, each in shaped.items()}
+        self._poses = ColliderPoses(self.physicsClientId, links, self._rows)
+        self._collider_rows = {each: row for row, each in enumerate(sorted(self._poses.colliders))}
         self._colliders = np.array([self._collider_rows[id, link] for id, link, _ in self._keys], dtype=int)
+        frames = {each: row for row, each in enumerate(self._poses.colliders)}
+        self._frames = np.array([frames[id, link] for id, link, _ in self._keys], dtype=np.int64)
         self._owners = np.array([id for id, _, _ in self._keys], dtype=int)
         self._listed: tuple[list[tuple[Who, Who]], NDArray[np.int64]] | None = None
 
     def _pose(self) -> None:
         """Place the shapes where their colliders are now."""
-        client = self.physicsClientId
-        rows: list[tuple[float, ...]] = []
-        file = save(client) if self._rows.keys() & self._links.keys() else None
-        for id, links in self._links.items():
-            if file and id in self._rows:
-                colliders = file.bodies[self._rows[id]].colliders
-                rows += [(*colliders[link].position, *colliders[link].orientation) for link in (BASE, *links)]
-                continue
-            position, orientation = pybullet.getBasePositionAndOrientation(id, client)
-            rows.append(position + orientation)
-            if links:
-                # Without forward kinematics the poses of links lag one step behind.
-                states = pybullet.getLinkStates(id, links, computeForwardKinematics=1, physicsClientId=client)
-                rows += [state[0] + state[1] for state in states]
-
-        poses = np.array(rows).reshape(-1, 7)[self._colliders]
-        orientations = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
-        self._positions: Array = poses[:, :3] + rotated(orientations, self._local_positions)
-        self._orientations: Array = composed(orientations, self._local_orientations)
-        self._positions.flags.writeable = self._orientations.flags.writeable = False
-        finite = np.isfinite(poses).all(axis=1)
+        self._poses.read()
+        self._positions, self._orientations = _core.world_poses(
+            self._poses.frames, self._frames, self._local_positions, self._local_orientations
+        )
+        finite = np.isfinite(self._positions).all(axis=1) & np.isfinite(self._orientations).all(axis=1)
         if not finite.all():
             body = self._keys[int(np.argmin(finite))][0]
             raise ValueError(f"body {body} ({self._bodies[body].name}) has no finite pose: the simulation has diverged")

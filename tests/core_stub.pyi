@@ -644,3 +644,11 @@ def candidate_pairs(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | 
     (p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
     two half-spaces are no pair.
     """
+
+def world_poses(frames: Sequence[Any], which: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    (k, 3) positions in m and (k, 4) unit quaternions xyzw in the world of what is fixed to moving frames.
+
+    `frames` begin with position and quaternion (of any length but 0), as pybullet's answers do; thing i is fixed to frame
+    `which[i]` at `positions[i]` and `orientations[i]` of it.
+    """

@@ -107,7 +107,12 @@ def test_the_thinnest_cases_keep_the_rules(family, seed):
 def test_a_hull_at_the_edge_of_one_1e15_times_as_large_has_its_volume():
     tiny = np.array([[5.74e-10, -7.55e-11, 3.15e-10], [-6.6e-10, 1.06e-10, 1.31e-11], [-5.76e-10, 1.75e-10, 2.92e-10]])
     tiny = np.vstack([tiny, [-1.18e-10, 8.99e-10, -1.19e-11]])
-    huge = [[0, 0, 0], [-154091.0, -583472.0, 793339.0], [-279018.0, -339652.0, 735711.0], [592518.0, 232501.0, 777584.0]]
+    huge = [
+        [0, 0, 0],
+        [-154091.0, -583472.0, 793339.0],
+        [-279018.0, -339652.0, 735711.0],
+        [592518.0, 232501.0, 777584.0],
+    ]
     exactly = exact.common(exact.hull(tiny), exact.hull(np.array(huge))).volume
     found = overlap(tiny, huge)
     assert found.status == "overlapping" and found.widened

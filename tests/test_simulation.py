@@ -440,6 +440,37 @@ def test_a_body_that_takes_over_an_id_after_a_sync_is_noticed(client):
     assert [type(shape) for shape in bodies.shapes] == [Sphere]
 
 
+def test_a_body_that_takes_over_an_id_and_is_given_user_data_is_noticed(client):
+    old = box(client)
+    bodies = Bodies(client)
+    p.syncBodyInfo(client)
+    p.removeBody(old, physicsClientId=client)
+    assert body(client, p.GEOM_SPHERE, radius=0.3) == old
+    p.addUserData(old, "mine", "", physicsClientId=client)
+    bodies.update()
+    assert [type(shape) for shape in bodies.shapes] == [Sphere]
+
+
+def test_user_data_of_others_come_and_go(client):
+    ids = [box(client, position=[3 * x, 0, 0]) for x in range(3)]
+    theirs = [p.addUserData(id, f"before {k}", "", physicsClientId=client) for id in ids for k in range(id)]
+    bodies = Bodies(client)
+    shapes = bodies.shapes
+    for change in (
+        lambda: [p.removeUserData(each, client) for each in theirs],
+        lambda: [p.addUserData(id, "after", "", physicsClientId=client) for id in ids],
+        lambda: p.syncBodyInfo(client),
+        lambda: p.syncUserData(physicsClientId=client),
+        lambda: Bodies(client),
+    ):
+        change()
+        bodies.update()
+        assert bodies.shapes is shapes  # nothing was read again
+    p.removeBody(ids[1], physicsClientId=client)
+    bodies.update()
+    assert [key[0] for key in bodies.keys] == [ids[0], ids[2]]
+
+
 def test_two_readers_of_one_client_both_notice_a_replaced_body(client):
     old = box(client)
     readers = Bodies(client), Bodies(client)
@@ -842,6 +873,18 @@ def test_static_bodies_are_no_pair_until_one_is_released(client):
     p.changeDynamics(1, -1, mass=1, physicsClientId=client)
     bodies.update()
     assert len(bodies.overlaps()) == 1
+
+
+def test_a_body_that_has_become_static_is_noticed_when_it_rests(client):
+    box(client, mass=0)
+    moved = box(client, position=[0.8, 0, 0])
+    bodies = Bodies(client)
+    p.changeDynamics(moved, -1, mass=0, physicsClientId=client)
+    p.resetBasePositionAndOrientation(moved, [0.9, 0, 0], [0, 0, 0, 1], physicsClientId=client)
+    bodies.update()
+    assert len(bodies.overlaps()) == 1
+    bodies.update()
+    assert bodies.overlaps() == []
 
 
 def test_the_report_counts_what_was_looked_at(client):

@@ -153,5 +153,6 @@ std::string number(double value);
 void define_shapes(nb::module_& m);
 void define_overlaps(nb::module_& m);
 void define_batch(nb::module_& m);
+void define_poses(nb::module_& m);
 
 }  // namespace overlapper::python

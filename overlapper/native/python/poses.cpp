@@ -1,0 +1,107 @@
+#include "python/arrays.h"
+
+namespace overlapper::python {
+namespace {
+
+/// The numbers of row `row` of an array that Python gave.
+template <size_t n>
+std::array<double, n> row_of(const Doubles& array, size_t row) {
+  std::array<double, n> numbers{};
+  std::copy_n(array.data() + n * row, n, numbers.begin());
+  return numbers;
+}
+
+template <size_t n>
+void read(nb::handle given, std::array<double, n>& numbers) {
+  const nb::object sequence = nb::steal(PySequence_Fast(given.ptr(), "frames must be pairs of sequences of numbers"));
+  if (!sequence.is_valid()) throw nb::python_error();
+  if (PySequence_Fast_GET_SIZE(sequence.ptr()) != Py_ssize_t(n))
+    fail("frames", "must have positions of 3 numbers and quaternions of 4");
+  for (size_t i = 0; i < n; ++i) {
+    numbers[i] = PyFloat_AsDouble(PySequence_Fast_GET_ITEM(sequence.ptr(), Py_ssize_t(i)));
+    if (numbers[i] == -1 && PyErr_Occurred()) throw nb::python_error();
+  }
+}
+
+/// A frame in the world, its quaternion as given.
+struct Frame {
+  Vec3 position;
+  Quaternion orientation;
+};
+
+Frame to_frame(nb::handle given) {
+  const nb::object pair = nb::steal(PySequence_Fast(given.ptr(), "frames must be pairs of sequences of numbers"));
+  if (!pair.is_valid()) throw nb::python_error();
+  if (PySequence_Fast_GET_SIZE(pair.ptr()) < 2) fail("frames", "must have a position and a quaternion each");
+  std::array<double, 3> p{};
+  std::array<double, 4> q{};
+  read(PySequence_Fast_GET_ITEM(pair.ptr(), 0), p);
+  read(PySequence_Fast_GET_ITEM(pair.ptr(), 1), q);
+  return {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}};
+}
+
+Vec3 vector_part(Quaternion q) { return {q.x, q.y, q.z}; }
+
+Quaternion unit(Quaternion q) {
+  const double length = std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
+  return {q.x / length, q.y / length, q.z / length, q.w / length};
+}
+
+Vec3 rotated(Quaternion q, Vec3 v) {
+  const Vec3 axis = vector_part(q), twice = 2 * cross(axis, v);
+  return v + q.w * twice + cross(axis, twice);
+}
+
+/// Turns by `b`, then by `a`.
+Quaternion operator*(Quaternion a, Quaternion b) {
+  const Vec3 v = vector_part(a), u = vector_part(b), product = a.w * u + b.w * v + cross(v, u);
+  return {product.x, product.y, product.z, a.w * b.w - dot(v, u)};
+}
+
+nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handle positions_given,
+                      nb::handle orientations_given) {
+  std::vector<Frame> frames;
+  for (nb::handle each : frames_given) {
+    frames.push_back(to_frame(each));
+    frames.back().orientation = unit(frames.back().orientation);
+  }
+  const auto which = nb::cast<nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>>(which_given);
+  const Doubles local_positions = to_doubles(positions_given, "positions", "an array of shape (k, 3)");
+  const Doubles local_orientations = to_doubles(orientations_given, "orientations", "an array of shape (k, 4)");
+  const size_t k = which.shape(0);
+  if (local_positions.ndim() != 2 || local_positions.shape(0) != k || local_positions.shape(1) != 3)
+    fail("positions", "must have the shape (k, 3), a row for each of `which`");
+  if (local_orientations.ndim() != 2 || local_orientations.shape(0) != k || local_orientations.shape(1) != 4)
+    fail("orientations", "must have the shape (k, 4), a row for each of `which`");
+  std::vector<double> positions, orientations;
+  positions.reserve(3 * k);
+  orientations.reserve(4 * k);
+  for (size_t i = 0; i < k; ++i) {
+    if (which(i) < 0 || which(i) >= std::int64_t(frames.size())) fail("which", "must index the frames");
+    const Frame& frame = frames[which(i)];
+    const auto p = row_of<3>(local_positions, i);
+    const auto q = row_of<4>(local_orientations, i);
+    const Vec3 x = frame.position + rotated(frame.orientation, {p[0], p[1], p[2]});
+    const Quaternion r = frame.orientation * Quaternion{q[0], q[1], q[2], q[3]};
+    positions.insert(positions.end(), {x.x, x.y, x.z});
+    orientations.insert(orientations.end(), {r.x, r.y, r.z, r.w});
+  }
+  return nb::make_tuple(to_numpy<Matrix>(std::move(positions), {k, 3}),
+                        to_numpy<Matrix>(std::move(orientations), {k, 4}));
+}
+
+}  // namespace
+
+void define_poses(nb::module_& m) {
+  m.def("world_poses", &world_poses, "frames"_a, "which"_a, "positions"_a, "orientations"_a,
+        nb::sig("def world_poses(frames: collections.abc.Sequence[typing.Any], which: "
+                "numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: "
+                "numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], "
+                "numpy.typing.NDArray[numpy.float64]]"),
+        R"((k, 3) positions in m and (k, 4) unit quaternions xyzw in the world of what is fixed to moving frames.
+
+`frames` begin with position and quaternion (of any length but 0), as pybullet's answers do; thing i is fixed to frame
+`which[i]` at `positions[i]` and `orientations[i]` of it.)");
+}
+
+}  // namespace overlapper::python
