@@ -88,7 +88,8 @@ class Report:
         widened = f"{self.pairs_widened:,} of them" if self.pairs_widened else "none of them"
         return (
             f"{self.bodies:,} bodies, {self.shapes_read:,} of {self.shapes:,} shapes read\n"
-            f"{self.pairs_examined:,} of {self.pairs_possible:,} pairs examined, {self.facets_touched:,} facets touched\n"
+            f"{self.pairs_examined:,} of {self.pairs_possible:,} pairs examined, "
+            f"{self.facets_touched:,} facets touched\n"
             f"{self.pairs_overlapping:,} overlap, {widened} measured again in wider arithmetic"
         )
 
