@@ -30,7 +30,7 @@ def main() -> None:
 
 
 async def screenshot(page: Path, picture: Path) -> None:
-    """What Chromium shows of a page, frames included: these are targets of their own, for which --screenshot is early."""
+    """What Chromium shows of a page and its frames, which are targets of their own: --screenshot comes too early."""
     options = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--no-first-run"]
     options += ["--enable-unsafe-swiftshader", "--remote-debugging-port=0", "--window-size=1280,1000"]
     with tempfile.TemporaryDirectory() as profile:

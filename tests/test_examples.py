@@ -141,7 +141,7 @@ def test_links_of_a_chain_share_less_than_their_hulls(run, tmp_path, monkeypatch
 
 
 def test_a_repository_of_ones_own_is_guarded_by_what_its_workflow_runs(tmp_path):
-    repository = shutil.copytree(EXAMPLES / "ci", tmp_path / "mine", ignore=shutil.ignore_patterns("out", "__pycache__"))
+    repository = shutil.copytree(EXAMPLES / "ci", tmp_path / "mine", ignore=shutil.ignore_patterns("out"))
     workflow = (repository / ".github" / "workflows" / "scenes.yml").read_text(encoding="utf-8")
     (command,) = re.findall(r"- run: (pytest .*)", workflow)
 
