@@ -15,11 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import HalfSpace, Placed
-from overlapper.rational import Exact, RationalBody, fans, is_closed, root, triple
+from overlapper.rational import Exact, RationalBody, fans, integers, is_closed, root, triple
 
 Bounds = tuple[Fraction, Fraction]
 
 AXES = np.array([[Fraction(int(i == j)) for j in range(3)] for i in range(3)])
+
+
+# Bits below 1 to which shares of single cones are rounded, upwards: their sum then is as short as they are.
+ROUNDED = 128
 
 
 class CertificateError(ValueError):
@@ -154,23 +158,25 @@ class Overlapping:
     def verify(self) -> Bounds:
         check_planes(self.shapes, self.planes)
         require_rational(self.vertices, self.point, self.margin, self.pull)
-        self._check_inside()
         triangles = fans(self.rings)
-        arms = self.vertices - self.point
+        numbers, unit = integers(np.vstack([self.vertices, self.point]))
+        arms, centre = numbers[:-1] - numbers[-1], numbers[-1]
+        shares, whole = integers(self.pull)
+        self._check_inside(whole * centre + shares[:, None] * arms, whole * unit)
         corners = arms[triangles]
         six = triple(*np.moveaxis(corners, 1, 0))
         self._check_star(triangles, corners, six)
-        pulled = self.pull[triangles].prod(axis=1)
-        return (six * pulled).sum() / 6, (six * self._reach(corners)).sum() / 6
+        lower = Fraction((six * shares[triangles].prod(axis=1)).sum(), 6 * (unit * whole) ** 3)
+        return lower, Fraction((six * self._reach(corners, unit)).sum(), 6 * unit**3 << ROUNDED)
 
-    def _check_inside(self) -> None:
+    def _check_inside(self, pulled: Exact, scale: int) -> None:
+        """`pulled / scale` are the vertices after their pull."""
         require(self.margin > 0, "margin must be greater than 0")
         require((self.pull > 0).all() and (self.pull <= 1).all(), "pull must be in (0, 1]")
-        pulled = self.point + self.pull[:, None] * (self.vertices - self.point)
         for number, body in enumerate(RationalBody(shape) for shape in self.shapes):
             ball = body.contains(self.point[None], self.margin)[0]
             require(ball, f"the ball about the point must lie in body {number}")
-            inside = body.contains(pulled)
+            inside = body.contains(pulled, scale=scale)
             require(inside.all(), f"vertex {inside.argmin()} must lie in body {number} after its pull")
 
     def _check_star(self, triangles: NDArray[np.intp], corners: Exact, six: Exact) -> None:
@@ -182,21 +188,24 @@ class Overlapping:
         require(len(self.rings) == len(self.facet), "every polygon must have a plane")
         require(is_closed(triangles), "polygons must form a closed surface")
         require((six >= 0).all(), "no triangle may be seen from behind by the point")
-        ray = corners[six.argmax()].T @ [Fraction(17), Fraction(19), Fraction(23)]
+        ray = corners[six.argmax()].T @ [17, 19, 23]
         a, b, c = np.moveaxis(corners, 1, 0)
         sides = np.array([triple(ray[None], u, v) for u, v in ((a, b), (b, c), (c, a))])
         met = (sides >= 0).all(axis=0) & (six > 0)
         require(met.sum() == 1, "the surface must wind about the point once")
 
-    def _reach(self, corners: Exact) -> Exact:
-        """By how much a plane cuts off more, or less, of the cone over each of its triangles than the triangle does."""
+    def _reach(self, corners: Exact, unit: int) -> Exact:
+        """By how much a plane cuts off more, or less, of the cone over each of its triangles than the triangle does.
+
+        Above the true share, by 2^-ROUNDED or less, and in units of that.
+        """
         facets = [facet for facet, ring in zip(self.facet, self.rings) for _ in ring[2:]]
-        normals = np.array([plane.normal for plane in self.planes])
-        slack = np.array([plane.offset for plane in self.planes]) - normals @ self.point
-        along = (normals[facets][:, None] * corners).sum(axis=2)
-        require((slack > 0).all(), "every plane must have the point below it")
+        slack = [plane.offset - plane.normal @ self.point for plane in self.planes]
+        require(min(slack) > 0, "every plane must have the point below it")
+        rows = np.array([integers([*plane.normal, s])[0] for plane, s in zip(self.planes, slack)], object)[facets]
+        along = (rows[:, None, :3] * corners).sum(axis=2)
         require((along > 0).all(), "every plane must cut all edges of the cones over its polygon")
-        ratio: Exact = (slack[facets][:, None] / along).prod(axis=1)
+        ratio: Exact = -(-((rows[:, 3] * unit) ** 3 << ROUNDED) // along.prod(axis=1))
         return ratio
 
 

@@ -39,6 +39,25 @@ def rotation(quaternion: NDArray[np.float64]) -> Exact:
     )
 
 
+def integers(values: Any) -> tuple[Exact, int]:
+    """Integers, and the least by which to divide them: many sums and products are faster by far so."""
+    values = np.asarray(values, object)
+    scale = math.lcm(*(x.denominator for x in values.flat))
+    numbers: Exact = np.frompyfunc(lambda x: x.numerator * (scale // x.denominator), 1, 1)(values)
+    return numbers, scale
+
+
+def in_doubles(numbers: Exact, scale: int) -> NDArray[np.float64]:
+    """Integers of any size divided by another, rounded once."""
+    doubles: NDArray[np.float64] = np.frompyfunc(lambda x: x / scale, 1, 1)(numbers).astype(float)
+    return doubles
+
+
+def bits(numbers: Exact) -> int:
+    """Of the largest of the integers."""
+    return max((abs(x).bit_length() for x in numbers.flat), default=0)
+
+
 def cross(u: Exact, v: Exact) -> Exact:
     """Of vectors (..., 3)."""
     (a, b, c), (x, y, z) = np.moveaxis(u, -1, 0), np.moveaxis(v, -1, 0)
@@ -81,6 +100,11 @@ def fans(rings: Iterable[NDArray[np.int32]]) -> NDArray[np.intp]:
     return np.array(triangles, np.intp).reshape(-1, 3)
 
 
+# A sum of a few products of doubles that are numbers below 1, rounded, is right to this share of the sum of their
+# magnitudes, and, where they underflow, to that much.
+DOUBT, UNDERFLOW = 2.0**-48, 2.0**-1000
+
+
 class RationalBody:
     """A placed shape as its numbers say, without any rounding."""
 
@@ -88,88 +112,150 @@ class RationalBody:
         self.shape = placed.shape
         self.position: Exact = exact(placed.position)
         self.axes = rotation(placed.orientation)
+        self._turn = integers(self.axes)
+
+    def local(self, points: Exact, scale: int = 1) -> tuple[Exact, int]:
+        """Points (n, 3) / scale of the world in the body's frame: integers, and what to divide them by."""
+        numbers, unit = integers(np.vstack([points, scale * self.position]))
+        turned: Exact = (numbers[:-1] - numbers[-1]) @ self._turn[0]
+        return turned, scale * unit * self._turn[1]
 
     def support(self, direction: Exact) -> tuple[Fraction, Fraction] | None:
         """(flat, square): flat + sqrt(square) is the greatest direction . x on the body; None if there is none."""
-        base, (x, y, z) = direction @ self.position, self.axes.T @ direction
-        none = Fraction(0)
+        base = direction @ self.position
+        numbers, scale = integers(direction)
+        x, y, z = local = numbers @ self._turn[0]
+        scale *= self._turn[1]
         match self.shape:
             case Box() as box:
-                return base + exact(box.half_extents) @ [abs(x), abs(y), abs(z)], none
-            case Hull() as hull:
-                return base + max(exact(hull.corners) @ [x, y, z]), none
+                return base + exact(box.half_extents) @ [abs(x), abs(y), abs(z)] / scale, Fraction(0)
+            case Hull():
+                return base + Fraction(self._farthest(local), scale * self._corners[1]), Fraction(0)
             case Sphere() as ball:
-                return base, Fraction(ball.radius) ** 2 * (x * x + y * y + z * z)
+                return base, Fraction(ball.radius) ** 2 * Fraction(local @ local, scale * scale)
             case Capsule() as capsule:
-                tip = Fraction(capsule.length) / 2 * abs(z)
-                return base + tip, Fraction(capsule.radius) ** 2 * (x * x + y * y + z * z)
+                tip = Fraction(capsule.length) / 2 * Fraction(abs(z), scale)
+                return base + tip, Fraction(capsule.radius) ** 2 * Fraction(local @ local, scale * scale)
             case Cylinder() as cylinder:
-                tip = Fraction(cylinder.length) / 2 * abs(z)
-                return base + tip, Fraction(cylinder.radius) ** 2 * (x * x + y * y)
+                tip = Fraction(cylinder.length) / 2 * Fraction(abs(z), scale)
+                return base + tip, Fraction(cylinder.radius) ** 2 * Fraction(x * x + y * y, scale * scale)
             case HalfSpace() as half:
-                normal, local = exact(half.given_normal), np.array([x, y, z])
+                normal = exact(half.given_normal)
                 if any(cross(normal, local)) or local @ normal < 0:
                     return None
-                return base + Fraction(half.given_offset) * (local @ normal) / (normal @ normal), none
+                level = Fraction(half.given_offset) * (local @ normal) / (normal @ normal)
+                return base + level / scale, Fraction(0)
+
+    @cached_property
+    def _corners(self) -> tuple[Exact, int]:
+        assert isinstance(self.shape, Hull)
+        return integers(exact(self.shape.corners))
+
+    @cached_property
+    def _corners_in_doubles(self) -> NDArray[np.float64]:
+        corners, _ = self._corners
+        return in_doubles(corners, 1 << bits(corners))
+
+    def _farthest(self, direction: Exact) -> int:
+        """The greatest product with a corner of a hull, both in integers: doubles leave a few to choose from."""
+        d = in_doubles(direction, 1 << bits(direction))
+        along = self._corners_in_doubles @ d
+        doubt = DOUBT * (abs(self._corners_in_doubles) @ abs(d)) + UNDERFLOW
+        few = np.flatnonzero(along + doubt >= (along - doubt).max())
+        return int(max(self._corners[0][few] @ direction))
 
     def is_below(self, direction: Exact, offset: Fraction) -> bool:
         """Whether the body lies in { x : direction . x <= offset }: the squares are compared, no root is taken."""
         support = self.support(direction)
         return support is not None and support[0] <= offset and support[1] <= (offset - support[0]) ** 2
 
-    def contains(self, points: Exact, margin: Fraction | int = 0) -> NDArray[np.bool_]:
-        """Whether the body holds a ball of radius `margin` about each of the points (n, 3) in the world."""
-        local = (points - self.position) @ self.axes
+    def contains(self, points: Exact, margin: Fraction | int = 0, scale: int = 1) -> NDArray[np.bool_]:
+        """Whether the body holds a ball of radius `margin` about each of the points (n, 3) / scale in the world."""
+        local, scale = self.local(points, scale)
         x, y, z = local.T
         inside: Any
 
+        def least(size: Fraction) -> int:
+            return math.floor((size - margin) * scale)
+
         def holds(square: Exact, radius: float) -> Any:
-            return (square <= (Fraction(radius) - margin) ** 2) & (Fraction(radius) >= margin)
+            return (square <= math.floor(((Fraction(radius) - margin) * scale) ** 2)) & (Fraction(radius) >= margin)
 
         match self.shape:
             case Box() as box:
-                inside = (abs(local) + margin <= exact(box.half_extents)).all(axis=1)
-            case Hull():
-                inside = self._below(*self.facets, local, margin)
+                inside = (abs(local) <= [least(half) for half in exact(box.half_extents)]).all(axis=1)
             case Sphere() as ball:
                 inside = holds(x * x + y * y + z * z, ball.radius)
             case Capsule() as capsule:
-                past = np.maximum(abs(z) - Fraction(capsule.length) / 2, 0)
-                inside = holds(x * x + y * y + past * past, capsule.radius)
+                # Twice the length past its ends, by the denominator of the length: so that it is an integer.
+                length = Fraction(capsule.length)
+                past = np.maximum(2 * length.denominator * abs(z) - length.numerator * scale, 0)
+                own = (2 * length.denominator) ** 2
+                square = own * (x * x + y * y) + past * past
+                reach = (Fraction(capsule.radius) - margin) * scale
+                inside = (square <= math.floor(own * reach * reach)) & (reach >= 0)
             case Cylinder() as cylinder:
-                inside = (abs(z) + margin <= Fraction(cylinder.length) / 2) & holds(x * x + y * y, cylinder.radius)
-            case HalfSpace() as half:
-                row = np.array([primitive([*exact(half.given_normal), Fraction(half.given_offset)])], object)
-                inside = self._below(row[:, :3], row[:, 3], local, margin)
+                inside = (abs(z) <= least(Fraction(cylinder.length) / 2)) & holds(x * x + y * y, cylinder.radius)
+            case Hull() | HalfSpace():
+                inside = self._below_facets(local, scale, margin)
         return np.asarray(inside, bool)
 
-    @staticmethod
-    def _below(normals: Exact, offsets: Exact, points: Exact, margin: Fraction | int) -> Any:
-        """Planes of integers: over a common denominator a point is of integers too, which is faster by far."""
-        scale = np.array([[math.lcm(*(x.denominator for x in point))] for point in points], object)
-        slack = offsets * scale - np.frompyfunc(int, 1, 1)(points * scale) @ normals.T
-        inside = (slack >= 0).all(axis=1)
-        if margin:
-            inside &= (slack * slack >= (margin * scale) ** 2 * (normals * normals).sum(axis=1)).all(axis=1)
+    def _below_facets(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
+        normals, offsets = self.facets
+        inside = np.ones(len(points), bool)
+        for i, point in enumerate(points) if margin else ():
+            slack = offsets * scale - normals @ point
+            deep = slack * slack >= (margin * scale) ** 2 * (normals * normals).sum(axis=1)
+            inside[i] = ((slack >= 0) & deep).all()
+        if not margin:
+            for some in np.array_split(np.arange(len(points)), 1 + len(points) * len(offsets) // 2**20):
+                point, facet = self._not_surely_below(points[some], scale)
+                slack = offsets[facet] * scale - (normals[facet] * points[some[point]]).sum(axis=1)
+                inside[some[point[slack < 0]]] = False
         return inside
+
+    def _not_surely_below(self, points: Exact, scale: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Pairs of a point and a plane of which doubles, with all their rounding, do not say that it is below."""
+        unit = 1 << max(bits(points), scale.bit_length())
+        x, (normals, offsets) = in_doubles(points, unit), self._facets_in_doubles
+        level = offsets * (scale / unit)
+        slack = level - x @ normals.T
+        point, facet = np.nonzero(slack <= DOUBT * (abs(level) + abs(x) @ abs(normals.T)) + UNDERFLOW)
+        return point, facet
+
+    @cached_property
+    def _facets_in_doubles(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        rows = np.column_stack(self.facets)
+        doubles = np.array([in_doubles(row, 1 << bits(row)) for row in rows])
+        return doubles[:, :3], doubles[:, 3]
 
     @cached_property
     def facets(self) -> tuple[Exact, Exact]:
-        """Normals (k, 3), outward, and offsets (k,), integers, of the planes of a hull's triangles in its own frame.
+        """Normals (k, 3), outward, and offsets (k,), integers, of the planes of a hull or half-space in its own frame.
 
-        What is below all of them is inside of the hull of the vertices: the triangles close, so their surface winds
-        about a point that is on the inner side of each, and no plane can then separate the point from their corners.
-        Points on some triangles are limits of such points, because the mean of the vertices is one. Triangles without
-        area lie on the edges of others. The converse is not said: a hull may be larger than its facets.
+        What is below all planes of a hull's triangles is inside of the hull of the corners: the triangles close, so
+        their surface winds about a point that is on the inner side of each, and no plane can then separate the point
+        from their corners. Points on some triangles are limits of such points, because the mean of the corners is one.
+        Triangles without area lie on the edges of others. The converse is not said: a hull may be larger than its
+        facets.
         """
+        if isinstance(self.shape, HalfSpace):
+            row = primitive([*exact(self.shape.given_normal), Fraction(self.shape.given_offset)])
+            return np.array([row[:3]], object), np.array(row[3:], object)
         assert isinstance(self.shape, Hull)
-        vertices, triangles = exact(self.shape.corners), self.shape.triangles
-        a, b, c = (vertices[corner] for corner in triangles.T)
+        (corners, unit), triangles = self._corners, self.shape.triangles
+        a, b, c = (corners[corner] for corner in triangles.T)
         normals = cross(b - a, c - a)
         solid = np.array([any(normal) for normal in normals])
         normals, offsets = normals[solid], (normals * a).sum(axis=1)[solid]
-        mean = vertices.sum(axis=0) / Fraction(len(vertices))
-        if not is_closed(triangles) or any(normals @ mean >= offsets):
+        total = corners.sum(axis=0)
+        if not is_closed(triangles) or any(normals @ total >= len(corners) * offsets):
             raise ValueError("triangles of a hull must be a closed surface around the mean of its corners")
-        rows = np.array(sorted({primitive(row) for row in np.column_stack([normals, offsets])}), object)
+        # The offsets are in units of the corners, once more than the normals.
+        rows = np.array(sorted({_lowest(row) for row in np.column_stack([normals * unit, offsets])}), object)
         return rows[:, :3], rows[:, 3]
+
+
+def _lowest(row: Exact) -> tuple[int, ...]:
+    divisor = math.gcd(*row)
+    return tuple(x // divisor for x in row)
