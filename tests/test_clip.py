@@ -2,10 +2,12 @@
 
 from fractions import Fraction
 
+import exact
 import numpy as np
 import pytest
-from families import make
+from families import Below, Case, Posed, PosedBox, make
 from numpy.testing import assert_allclose
+from strategies import quaternion
 
 from overlapper import Box, HalfSpace, Placed, overlap
 
@@ -70,3 +72,35 @@ def test_a_corner_under_the_ground_is_a_tetrahedron():
     level = -3 + 0.5  # the plane x + y + z = level cuts a corner with legs of a half
     found = overlap(corner, HalfSpace((1, 1, 1), level))
     assert found.volume == pytest.approx(0.5**3 / 6, rel=1e-12)
+
+
+def sunk(way, depth, rng):
+    """A box in another one by `depth`, with a face, an edge or a corner, or in the ground with a hull's corner."""
+    still = PosedBox(np.ones(3), np.zeros(3), np.array([0, 0, 0, 1.0]))
+    if way == "face":
+        return still, PosedBox(
+            np.array([0.5, 0.75, 1.5]), np.array([0.3, 0.2, 2.5 - depth]), np.array([0, 0, 0.4, 0.8])
+        )
+    if way == "edge":
+        eighth = np.pi / 8
+        along_x, along_y = ([np.sin(eighth), 0, 0, np.cos(eighth)], [0, np.sin(eighth), 0, np.cos(eighth)])
+        up = np.array([0.1, 0.05, np.sqrt(8) - depth])
+        return still._replace(orientation=np.array(along_x)), PosedBox(np.ones(3), up, np.array(along_y))
+    body = Posed(rng.normal(size=(12, 3)), rng.normal(size=3), quaternion(rng))
+    lowest = float(np.array(exact.placed(*body), float)[:, 2].min())
+    return body, Below((0.0, 0.0, 1.0), lowest + depth)
+
+
+@pytest.mark.parametrize("way", ["face", "edge", "corner"])
+def test_a_sliver_of_any_thickness_is_right_to_twelve_digits(way):
+    rng = np.random.default_rng(5)
+    widened = []
+    for exponent in range(1, 13):
+        case = Case(way, 10.0**-exponent, sunk(way, 10.0**-exponent, rng))
+        found = overlap(*case.placed)
+        off = abs(Fraction(found.volume) - case.truth.volume)
+        assert off <= min(Fraction(found.volume_error), case.truth.volume / 10**12)
+        assert_allclose(found.area, case.truth.area, rtol=1e-9)
+        assert_allclose(found.centroid, np.array(case.truth.centroid, float), atol=1e-15)
+        widened.append(found.widened)
+    assert widened == sorted(widened) and widened[-1]

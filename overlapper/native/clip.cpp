@@ -8,6 +8,7 @@
 
 #include "canonical_order.h"
 #include "minkowski.h"
+#include "wide_corners.h"
 
 namespace overlapper {
 namespace {
@@ -45,7 +46,7 @@ constexpr std::array<Edge, 12> box_edges() {
   }
   return edges;
 }
-/// Vertex number's bit k and facet 2 k + that bit say on which side of axis k they are.
+/// By the numbers of corner() and side().
 constexpr std::array<Edge, 12> kBoxEdges = box_edges();
 
 /// A body in the coordinates of the first one, as columns.
@@ -181,13 +182,17 @@ struct Workspace {
   std::vector<double> ratio;
   std::vector<int> first_vertex, second_vertex;  ///< which common vertex a body's vertex is, or -1
   std::vector<Vec3> vertices;                    ///< of the common polytope
+  std::vector<Corner> corners;                   ///< parallel to them
   std::vector<Edge> edges;                       ///< of the common polytope
   std::vector<Edge> seam;  ///< its edges between the first body's facets, on the left, and the second's
   std::vector<int>
       open;  ///< per pair of facets: 1 + the vertex at which their common edge begins, minus that if it ends there
   int unpaired = 0;
-  std::vector<int> apex;     ///< per facet: one of its vertices, or -1
-  std::vector<double> cone;  ///< per facet: six times the volume of the cone from the origin
+  std::vector<int> apex;          ///< per facet: one of its vertices, or -1
+  std::vector<double> cone;       ///< per facet: six times the volume of the cone from the origin
+  std::vector<double> extent;     ///< per vertex: the sum of its coordinates over their size
+  std::vector<Vec3> area_vector;  ///< per facet: twice its
+  WideCorners wide;
 };
 
 /// Finds the common polytope in a workspace whose solids are in place.
@@ -203,6 +208,7 @@ class Tracer {
     if (one == Signs::kUncertain || other == Signs::kUncertain) return Signs::kUncertain;
 
     w_.vertices.clear();
+    w_.corners.clear();
     w_.edges.clear();
     w_.seam.clear();
     w_.unpaired = 0;
@@ -218,15 +224,16 @@ class Tracer {
   }
 
  private:
-  int add_vertex(Vec3 v) {
+  int add_vertex(Vec3 v, const Corner& corner) {
     w_.vertices.push_back(v);
+    w_.corners.push_back(corner);
     return static_cast<int>(w_.vertices.size()) - 1;
   }
 
   bool trace(const Solid& body, SignTable& signs, std::vector<int>& common_vertex, bool is_first) {
     common_vertex.assign(body.vertices, -1);
     for (int i = 0; i < body.vertices; ++i)
-      if (signs.inside[i]) common_vertex[i] = add_vertex(body.vertex(i));
+      if (signs.inside[i]) common_vertex[i] = add_vertex(body.vertex(i), {is_first ? 0 : 1, i, {}});
     const int offset = is_first ? 0 : w_.first.facets;
     for (const Edge& e : body.edges) {
       const bool from_inside = signs.inside[e.from], to_inside = signs.inside[e.to];
@@ -236,7 +243,8 @@ class Tracer {
         const EdgeSigns edge{signs.row(e.from), signs.row(e.to), signs.stride,
                              std::abs(along.x) + std::abs(along.y) + std::abs(along.z), rounding_};
         const auto cross = [&](Crossing crossing, bool enters) {
-          const int v = add_vertex(from + crossing.at * along);
+          const int facet = crossing.plane + (is_first ? w_.first.facets : 0);
+          const int v = add_vertex(from + crossing.at * along, {-1, -1, {common.left, common.right, facet}});
           meet(e, crossing.plane, v, enters, is_first);
           return v;
         };
@@ -289,61 +297,50 @@ class Tracer {
   double rounding_;
 };
 
-/// Sums over the common polytope that a tracer has left.
+/// Counts coordinates from the middle of the vertices, which it returns.
+Vec3 centre(std::vector<Vec3>& vertices) {
+  Vec3 middle;
+  for (Vec3 v : vertices) middle += v;
+  middle = middle / static_cast<double>(vertices.size());
+  for (Vec3& v : vertices) v -= middle;
+  return middle;
+}
+
+/// Sums over the common polytope that a tracer has left, its vertices counted from a point inside.
 class Sums {
  public:
-  explicit Sums(Workspace& workspace) : w_(workspace) {
-    for (Vec3 v : w_.vertices) origin_ += v;
-    origin_ = origin_ / static_cast<double>(w_.vertices.size());
-    for (Vec3& v : w_.vertices) v -= origin_;
+  /// `size` is how far the vertices reach along each axis, or any other unit of length.
+  Sums(Workspace& workspace, Vec3 size) : w_(workspace) {
+    const Vec3 per_size{1 / size.x, 1 / size.y, 1 / size.z};
     w_.apex.assign(w_.first.facets + w_.second.facets, -1);
     w_.cone.assign(w_.first.facets + w_.second.facets, 0);
+    w_.extent.clear();
+    for (Vec3 v : w_.vertices) w_.extent.push_back(dot(abs(v), per_size));
     for (const auto* list : {&w_.edges, &w_.seam})
       for (const Edge& e : *list) w_.apex[e.left] = w_.apex[e.right] = e.from;
     for (const auto* list : {&w_.edges, &w_.seam})
       for (const Edge& e : *list) add(e);
     for (const Edge& e : w_.seam) add_seam(e);
+    // Each product of three coordinates is rounded less than eight times, and then comes the sum of the tetrahedra, of
+    // which none is negative.
+    const double terms = 2 * static_cast<double>(w_.edges.size() + w_.seam.size());
+    rounding_ = 8 * 0x1p-53 * lost_ * size.x * size.y * size.z / 6 + terms * 0x1p-53 * six_volumes_ / 6;
   }
 
-  /// Nothing if a plane passes the middle nearer than `least`.
-  std::optional<ClippedPair> measures(double rounding, double least) const {
-    ClippedPair common;
-    common.status = Status::kOverlapping;
-    common.volume = six_volumes_ / 6;
-    common.centroid = origin_ + moment_ / (4 * six_volumes_);
-    common.pull = pull_;
-    common.moment = turn_ - cross(common.centroid - origin_, pull_);
-    double least_slack = kInfinity;
-    for (size_t f = 0; f < w_.cone.size(); ++f) {
-      if (w_.apex[f] < 0) continue;
-      const bool first = f < static_cast<size_t>(w_.first.facets);
-      const Solid& body = first ? w_.first : w_.second;
-      const int plane = static_cast<int>(first ? f : f - w_.first.facets);
-      const double slack = body.offset[plane] - dot(body.normal(plane), origin_);
-      common.area += w_.cone[f] / (2 * slack);
-      least_slack = std::min(least_slack, slack);
-      ++common.facets_touched;
-    }
-    if (!(least_slack > least)) return std::nullopt;
-    // As for a region: every plane moved by its rounding, growth on the way included. Then each product of three
-    // coordinates, rounded less than eight times, and the sum of the tetrahedra, of which none is negative.
-    const double grown = 1 + rounding / least_slack;
-    const double terms = 2 * static_cast<double>(w_.edges.size() + w_.seam.size());
-    const double summed = 8 * 0x1p-53 * lost_ / 6 + terms * 0x1p-53 * common.volume;
-    common.volume_error = rounding * common.area * (grown * grown + grown + 1) / 3 + summed;
-    common.measured = common.volume_error <= kEnough * common.volume;
-    return common;
-  }
+  double volume() const { return six_volumes_ / 6; }
+  double volume_rounding() const { return rounding_; }
+  Vec3 centroid() const { return moment_ / (4 * six_volumes_); }
+  Vec3 pull() const { return pull_; }
+  Vec3 moment() const { return turn_ - cross(centroid(), pull_); }
 
  private:
-  static double extent(Vec3 v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
-
   void add(const Edge& e) {
     const Vec3 from = w_.vertices[e.from], to = w_.vertices[e.to], sum = from + to;
-    const Vec3 area = cross(from, to), left = w_.vertices[w_.apex[e.left]], right = w_.vertices[w_.apex[e.right]];
+    const int left_apex = w_.apex[e.left], right_apex = w_.apex[e.right];
+    const Vec3 area = cross(from, to), left = w_.vertices[left_apex], right = w_.vertices[right_apex];
     // Tetrahedra from the origin over the edge and a corner of either facet; none is negative.
     const double on_left = dot(left, area), on_right = -dot(right, area);
-    lost_ += (extent(left) + extent(right)) * extent(from) * extent(to);
+    lost_ += (w_.extent[left_apex] + w_.extent[right_apex]) * w_.extent[e.from] * w_.extent[e.to];
     w_.cone[e.left] += on_left;
     w_.cone[e.right] += on_right;
     six_volumes_ += on_left + on_right;
@@ -358,10 +355,116 @@ class Sums {
   }
 
   Workspace& w_;
-  Vec3 origin_, moment_, pull_, turn_;
+  Vec3 moment_, pull_, turn_;
   double six_volumes_ = 0;
   double lost_ = 0;  ///< the products that the volume is summed from, were none of their terms to cancel
+  double rounding_ = 0;
 };
+
+/// Distance of a common facet's plane from the middle of the common polytope.
+struct Slack {
+  Vec3 normal;
+  double distance;
+};
+
+/// Calls `use(facet, slack)` for each facet of the common polytope.
+template <class Use>
+void for_each_facet(const Workspace& w, Vec3 middle, Use use) {
+  for (int f = 0; f < static_cast<int>(w.apex.size()); ++f) {
+    if (w.apex[f] < 0) continue;
+    const Solid& body = f < w.first.facets ? w.first : w.second;
+    const int plane = f < w.first.facets ? f : f - w.first.facets;
+    use(f, Slack{body.normal(plane), body.offset[plane] - dot(body.normal(plane), middle)});
+  }
+}
+
+/// The volume between the polytope and one whose planes are moved out by `moved`: its area grows on the way.
+double moved_volume(double area, double moved, double least_slack) {
+  const double grown = 1 + moved / least_slack;
+  return moved * area * (grown * grown + grown + 1) / 3;
+}
+
+/// Orthogonal axes as rows, the first across the facet nearest to the middle, the second across the one that is nearest
+/// to it after that: so along each, coordinates in a sliver or a needle are no larger than its thickness there.
+Mat3 thin_axes(const Workspace& w, Vec3 middle) {
+  Slack nearest{{}, kInfinity}, next{{}, kInfinity};
+  for_each_facet(w, middle, [&](int, const Slack& s) { nearest = s.distance < nearest.distance ? s : nearest; });
+  const Vec3 first = unit(nearest.normal);
+  for_each_facet(w, middle, [&](int, const Slack& s) {
+    const Vec3 along = s.normal - dot(s.normal, first) * first;
+    const double length2 = norm2(along);
+    if (length2 < 0x1p-10) return;  // a direction of its own has more than rounding left
+    const double distance = s.distance / std::sqrt(length2);
+    if (distance < next.distance) next = {along, distance};
+  });
+  const Vec3 along = unit(next.normal), second = unit(along - dot(along, first) * first);
+  return {first, second, cross(first, second)};
+}
+
+/// Areas of facets from their corners alone.
+double area_by_corners(Workspace& w) {
+  w.area_vector.assign(w.apex.size(), {});
+  for (const auto* list : {&w.edges, &w.seam}) {
+    for (const Edge& e : *list) {
+      const Vec3 area = cross(w.vertices[e.from], w.vertices[e.to] - w.vertices[e.from]);
+      w.area_vector[e.left] += area;
+      w.area_vector[e.right] -= area;
+    }
+  }
+  double area = 0;
+  for (Vec3 twice : w.area_vector) area += std::sqrt(norm2(twice)) / 2;
+  return area;
+}
+
+/// What a tracer has left, once more about `middle` from corners placed in wider arithmetic. Leaves `common` as it is
+/// where even that is not enough.
+void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reach, double least_slack, Vec3 middle,
+                     ClippedPair& common) {
+  const Mat3 axes = thin_axes(w, middle);
+  w.wide.begin(a, b, w.first.facets, static_cast<int>(w.apex.size()), middle, reach);
+  for (int f = 0; f < static_cast<int>(w.apex.size()); ++f)
+    if (w.apex[f] >= 0 && !w.wide.add_plane(f)) return;
+  w.wide.place(w.corners, axes, w.vertices);
+  Vec3 size;
+  for (Vec3 v : w.vertices) size = max(size, abs(v));
+  const Sums sums(w, size);
+  const double area = area_by_corners(w);
+  // The axes are at right angles and of length 1 but for a few roundings.
+  const double error =
+      moved_volume(area, w.wide.noise(), least_slack) + sums.volume_rounding() + 16 * 0x1p-53 * sums.volume();
+  if (!(error <= kEnough * sums.volume())) return;
+  common.measured = common.widened = true;
+  common.volume = sums.volume();
+  common.volume_error = error;
+  common.area = area;
+  common.centroid = middle + apply_transposed(axes, sums.centroid());
+  common.pull = apply_transposed(axes, sums.pull());
+  common.moment = apply_transposed(axes, sums.moment());
+}
+
+/// Nothing if a plane passes the middle nearer than `least_slack`.
+std::optional<ClippedPair> measure(Workspace& w, const Placed& a, const Placed& b, double reach, double rounding,
+                                   double least) {
+  const Vec3 middle = centre(w.vertices);
+  const Sums sums(w, {1, 1, 1});
+  ClippedPair common;
+  common.status = Status::kOverlapping;
+  common.volume = sums.volume();
+  common.centroid = middle + sums.centroid();
+  common.pull = sums.pull();
+  common.moment = sums.moment();
+  double least_slack = kInfinity;
+  for_each_facet(w, middle, [&](int f, const Slack& slack) {
+    common.area += w.cone[f] / (2 * slack.distance);
+    least_slack = std::min(least_slack, slack.distance);
+    ++common.facets_touched;
+  });
+  if (!(least_slack > least)) return std::nullopt;
+  common.volume_error = moved_volume(common.area, rounding, least_slack) + sums.volume_rounding();
+  common.measured = common.volume_error <= kEnough * common.volume;
+  if (!common.measured) measure_widened(w, a, b, reach, least_slack, middle, common);
+  return common;
+}
 
 /// A bounded polytope in the coordinates of `pose`, or a half-space.
 void set_solid(Solid& solid, const Shape& shape, const Pose* pose, double beyond) {
@@ -371,15 +474,9 @@ void set_solid(Solid& solid, const Shape& shape, const Pose* pose, double beyond
     solid.set_plane(f, placed.normal, placed.offset);
   };
   if (const Box* box = std::get_if<Box>(&shape)) {
-    const Vec3 h = box->half_extents;
     solid.resize(8, 6, beyond);
-    for (int i = 0; i < 8; ++i)
-      solid.set_vertex(i, place({i & 1 ? h.x : -h.x, i & 2 ? h.y : -h.y, i & 4 ? h.z : -h.z}));
-    for (int f = 0; f < 6; ++f) {
-      const double side = f & 1 ? 1 : -1;
-      const int k = f / 2;
-      turn(f, {{k == 0 ? side : 0, k == 1 ? side : 0, k == 2 ? side : 0}, h[k]});
-    }
+    for (int i = 0; i < 8; ++i) solid.set_vertex(i, place(corner(*box, i)));
+    for (int f = 0; f < 6; ++f) turn(f, side(*box, f));
     solid.edges = kBoxEdges;
   } else if (const Hull* hull = std::get_if<Hull>(&shape)) {
     const HullData& data = *hull->data;
@@ -451,7 +548,7 @@ std::optional<ClippedPair> clip_in_order(const Placed& a, const Placed& b) {
   if (signs == Signs::kSeparated) return ClippedPair{};
   if (signs == Signs::kUncertain) return std::nullopt;
   // One so thin that rounding might hide it is left to those who look closer.
-  std::optional<ClippedPair> common = Sums(workspace).measures(rounding(reach) + flatness, 4 * sign_rounding);
+  std::optional<ClippedPair> common = measure(workspace, a, b, reach, rounding(reach) + flatness, 4 * sign_rounding);
   if (!common) return std::nullopt;
   common->centroid = a.pose * common->centroid;
   common->pull = a.pose.rotation * common->pull;

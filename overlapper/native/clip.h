@@ -13,6 +13,7 @@ enum class Status { kSeparated, kTouching, kOverlapping };
 struct ClippedPair {
   Status status = Status::kSeparated;  ///< never kTouching
   bool measured = false;        ///< overlapping, and the volume is right to 1e-12; otherwise only the status counts
+  bool widened = false;         ///< doubles were not enough for that
   double volume = 0, area = 0;  ///< m³, m²
   double volume_error = 0;      ///< m³: the true volume is within volume ± volume_error
   Vec3 centroid;

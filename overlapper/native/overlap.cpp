@@ -231,7 +231,8 @@ double Overlap::area() const {
 Vec3 Overlap::centroid() const { return measured_by_clipping_ ? clipped_->centroid : quantities().centroid; }
 
 bool Overlap::widened() const {
-  return status_ == Status::kOverlapping && !measured_by_clipping_ && quantities().widened;
+  if (measured_by_clipping_) return clipped_->widened;
+  return status_ == Status::kOverlapping && quantities().widened;
 }
 
 int Overlap::facets_touched() const {

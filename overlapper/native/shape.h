@@ -39,6 +39,18 @@ struct Box {
   Plane tightest(Vec3 point) const;
 };
 
+/// A box's corners and sides by number: bit k of a corner's says on which side of axis k it is, and so does the last
+/// bit of a side's, 2 k or 2 k + 1.
+inline Vec3 corner(const Box& box, int i) {
+  const Vec3 h = box.half_extents;
+  return {i & 1 ? h.x : -h.x, i & 2 ? h.y : -h.y, i & 4 ? h.z : -h.z};
+}
+inline Plane side(const Box& box, int f) {
+  const double sign = f & 1 ? 1 : -1;
+  const int k = f / 2;
+  return {{k == 0 ? sign : 0, k == 1 ? sign : 0, k == 2 ? sign : 0}, box.half_extents[k]};
+}
+
 /// Around local z; `length` lies between the centres of the caps.
 struct Capsule {
   double radius, length;
