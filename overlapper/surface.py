@@ -20,28 +20,31 @@ class Surface:
     """Triangles `faces` (k, 3), counter-clockwise from outside, over `vertices` (n, 3).
 
     `normals` (n, 3) are the directions to shade by, None if the triangles are meant flat. `edges` (m, 2, 3) are lines
-    that show the shape: creases, rims, a grid.
+    that show the shape beside its faces: creases, rims, a grid. `wires` (w, 2, 3) are lines that show it without them:
+    every edge, or circles and meridians of what is round.
     """
 
     vertices: Array
     faces: NDArray[np.integer[Any]]
     normals: Array | None
     edges: Array
+    wires: Array
 
 
 def surface(shape: Box | Sphere | Capsule | Cylinder | Hull) -> Surface:
     """The surface of a bounded shape; round ones within 0.3 % of the radius."""
     if isinstance(shape, Box | Hull):
         vertices, facets = _box(shape) if isinstance(shape, Box) else (shape.vertices, shape.facets)
-        return Surface(vertices, triangles(facets), None, _creases(vertices, facets))
+        return Surface(vertices, triangles(facets), None, _creases(vertices, facets), vertices[polytope_edges(facets)])
     if isinstance(shape, Cylinder):
         half = shape.length / 2
         slopes = np.deg2rad([-90, -90, 0, 0, 90, 90])
-        return _revolved(shape.radius * np.array([0, 1, 1, 1, 1, 0]), np.repeat([-half, half], 3), slopes, rims=(1, 4))
+        radii, rims = shape.radius * np.array([0, 1, 1, 1, 1, 0]), (1, 4)
+        return _revolved(radii, np.repeat([-half, half], 3), slopes, rims, rims)
     half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
     slopes = np.concatenate([np.linspace(-np.pi / 2, 0, 13), np.linspace(0, np.pi / 2, 13)])
     heights = shape.radius * np.sin(slopes) + np.repeat([-half, half], 13)
-    return _revolved(shape.radius * np.cos(slopes), heights, slopes)
+    return _revolved(shape.radius * np.cos(slopes), heights, slopes, circles=(4, 8, 12, 13, 17, 21))
 
 
 def plate(shape: HalfSpace, center: Array, size: float) -> Surface:
@@ -56,7 +59,7 @@ def plate(shape: HalfSpace, center: Array, size: float) -> Surface:
     vertices, grid = (
         np.insert(flat, 2, shape.offset, axis=-1) @ basis.T for flat in (corners, np.array(across + along))
     )
-    return Surface(vertices, np.array([[0, 1, 2], [0, 2, 3]]), None, grid)
+    return Surface(vertices, np.array([[0, 1, 2], [0, 2, 3]]), None, grid, grid)
 
 
 def cone(radius: float, bottom: float, top: float) -> Surface:
@@ -82,6 +85,12 @@ def _box(shape: Box) -> tuple[Array, Facets]:
     return signs * shape.half_extents, [np.array(ring) for ring in rings]
 
 
+def polytope_edges(facets: Facets) -> NDArray[np.integer[Any]]:
+    """The edges (k, 2) of a closed surface, each once."""
+    pairs = np.concatenate([np.stack([ring, np.roll(ring, -1)], axis=1) for ring in facets])
+    return pairs[pairs[:, 0] < pairs[:, 1]]
+
+
 def _creases(vertices: Array, facets: Facets) -> Array:
     """The edges where two facets, counter-clockwise from outside, meet at an angle of more than 40°."""
     normals: dict[tuple[int, int], Array] = {}
@@ -95,8 +104,13 @@ def _creases(vertices: Array, facets: Facets) -> Array:
     return edges
 
 
-def _revolved(radii: Array, heights: Array, slopes: Array, rims: Sequence[int] = ()) -> Surface:
-    """A profile turned about z: radius, height, and how far its normal points above the horizon; `rims` are edges."""
+def _revolved(
+    radii: Array, heights: Array, slopes: Array, rims: Sequence[int] = (), circles: Sequence[int] = ()
+) -> Surface:
+    """A profile turned about z: radius, height, and how far its normal points above the horizon.
+
+    Of its points, `rims` are turned into edges, and `circles` into wires, which meridians join.
+    """
     turn = np.linspace(0, 2 * np.pi, 49)
     outward, up = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1), np.array([0.0, 0.0, 1.0])
     rings = radii[:, None, None] * outward + heights[:, None, None] * up
@@ -104,6 +118,11 @@ def _revolved(radii: Array, heights: Array, slopes: Array, rims: Sequence[int] =
     index = np.arange(rings[..., 0].size).reshape(rings.shape[:2])
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
-    rim = rings[list(rims)]
-    edges = np.stack([rim[:, :-1], rim[:, 1:]], axis=2).reshape(-1, 2, 3)
-    return Surface(rings.reshape(-1, 3), faces, normals.reshape(-1, 3), edges)
+    edges, wires = (_polylines(rings[list(rows)]) for rows in (rims, circles))
+    wires = np.concatenate([wires, _polylines(rings[:, :-1:4].swapaxes(0, 1))])
+    return Surface(rings.reshape(-1, 3), faces, normals.reshape(-1, 3), edges, wires)
+
+
+def _polylines(points: Array) -> Array:
+    """Lines (k, n, 3) through n points each, as segments (k (n - 1), 2, 3)."""
+    return np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)

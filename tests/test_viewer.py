@@ -6,7 +6,6 @@ import base64
 import gzip
 import json
 import re
-import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -16,13 +15,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import umsgpack
+from browser import CHROMIUM, Browser
 from numpy.testing import assert_allclose
-from PIL import Image
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, Placed, Sphere, overlap
+from overlapper.look import Look
 from overlapper.viewer import Recording, Viewer
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 looks = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not to be had here, and the picture is taken with it")
 
 GROUND, CUP, HAND = (0, -1, 0), (1, -1, 0), (2, 3, 0)
@@ -66,24 +65,78 @@ def recorded(frames: list[Bodies], path: Path) -> Path:
     return recording.save(path)
 
 
-def unpacked(page: Path, name: str) -> list[dict]:
+def unpacked(page: Path, name: str) -> bytes:
     text = re.search(f'id="{name}">([^<]*)<', page.read_text(encoding="utf-8"))[1]
-    return json.loads(gzip.decompress(base64.b64decode(text)))
+    return gzip.decompress(base64.b64decode(text))
+
+
+def commands(page: Path) -> list[dict]:
+    return json.loads(unpacked(page, "commands"))
 
 
 def drawings(page: Path) -> dict[str, dict]:
     """What is drawn at each path of the tree, in three.js's object format."""
-    return {each["path"]: each["object"] for each in unpacked(page, "commands") if each["type"] == "set_object"}
+    return {each["path"]: each["object"] for each in commands(page) if each["type"] == "set_object"}
 
 
-def tracks(page: Path) -> dict[tuple[str, str], list[tuple[float, object]]]:
-    """Key frames (time, value) by path and track."""
-    (animation,) = [each for each in unpacked(page, "commands") if each["type"] == "set_animation"]
-    return {
-        (clip["path"], track["name"]): [(key["time"], key["value"]) for key in track["keys"]]
-        for clip in animation["animations"]
-        for track in clip["clip"]["tracks"]
-    }
+@dataclass
+class Film:
+    """The frames of a page, put together from its arrays."""
+
+    heading: dict
+    arrays: dict[str, np.ndarray]
+
+    @classmethod
+    def of(cls, page: Path) -> Film:
+        data = unpacked(page, "film")
+        length = int.from_bytes(data[:4], "little")
+        heading, data = json.loads(data[4 : 4 + length]), data[4 + length :]
+        arrays = {}
+        for name, (kind, count) in heading["arrays"].items():
+            dtype = np.dtype(kind.removesuffix("Array").lower())
+            planes, data = data[: count * dtype.itemsize], data[count * dtype.itemsize :]
+            shuffled = np.frombuffer(planes, np.uint8).reshape(dtype.itemsize, count)
+            arrays[name] = np.ascontiguousarray(shuffled.T).view(dtype).ravel()
+        return cls(heading, arrays)
+
+    def poses(self, node: str) -> list[tuple[int, np.ndarray]]:
+        """(frame, pose) wherever that of the node changes, about the scene's centre; zeros where it is not there."""
+        number = self.heading["nodes"].index(node)
+        poses = self.arrays["key_pose"].reshape(7, -1).T
+        chosen = self.arrays["key_node"] == number
+        return list(zip(self.arrays["key_frame"][chosen].tolist(), poses[chosen]))
+
+    def sightings(self, frame: int) -> dict[tuple[str, str], tuple[int, np.ndarray]]:
+        """The polytope, and volume, error, depth, area, centroid about the scene's centre, normal, by pair."""
+        start = self.arrays["sighting_start"]
+        numbers = self.arrays["numbers"].reshape(10, -1).T
+        return {
+            tuple(self.heading["pairs"][self.arrays["sighting_pair"][k]]): (
+                int(self.arrays["sighting_polytope"][k]),
+                numbers[k],
+            )
+            for k in range(start[frame], start[frame + 1])
+        }
+
+    def polytopes(self) -> list[tuple[np.ndarray, list[tuple[int, np.ndarray]]]]:
+        """The vertices of each about the scene's centre, and its facets: owner and ring."""
+        corners = np.split(self.arrays["vertices"].reshape(-1, 3), np.cumsum(self.arrays["polytope_vertices"])[:-1])
+        rings = np.split(self.arrays["rings"], np.cumsum(self.arrays["ring_length"])[:-1])
+        facets = list(zip(self.arrays["owners"].tolist(), rings))
+        made, grids = [], []
+        for k, (*middle, unit) in enumerate(self.arrays["polytope_frame"].reshape(4, -1).T):
+            like = self.arrays["polytope_previous"][k]
+            grids.append(corners[k] + (grids[like] if like >= 0 else 0))
+            count = self.arrays["polytope_facets"][k]
+            made.append((middle + unit / 32767 * grids[-1], facets[:count]))
+            facets = facets[count:]
+        return made
+
+
+def enclosed_by_rings(vertices: np.ndarray, facets: list[tuple[int, np.ndarray]]) -> float:
+    """Volume inside of facets that are counter-clockwise from outside."""
+    fans = [vertices[[ring[0], ring[i], ring[i + 1]]] for _, ring in facets for i in range(1, len(ring) - 1)]
+    return np.linalg.det(np.array(fans)).sum() / 6
 
 
 def numbers(attribute: dict) -> np.ndarray:
@@ -111,18 +164,6 @@ def enclosed(surfaces: list[tuple[np.ndarray, np.ndarray, int]]) -> float:
     return sum(np.linalg.det(vertices[faces]).sum() / 6 for vertices, faces, _ in surfaces)
 
 
-def picture(page: Path, time: float, view: str = "") -> np.ndarray:
-    """The page at a time as Chromium shows it, (600, 800, 3), its table of overlaps and its slider cut off."""
-    shot = page.with_suffix(f".{time}.png")
-    options = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--no-first-run"]
-    options += ["--enable-unsafe-swiftshader", "--disable-background-networking", "--virtual-time-budget=4000"]
-    options += [f"--user-data-dir={page.with_suffix('.profile')}", f"--screenshot={shot}", "--window-size=800,800"]
-    subprocess.run(
-        [CHROMIUM, *options, f"{page.as_uri()}#t={time}{view}"], check=True, capture_output=True, timeout=120
-    )
-    return np.asarray(Image.open(shot).convert("RGB"), dtype=int)[120:720]
-
-
 def coloured(image: np.ndarray, name: str) -> int:
     """How many pixels have a colour, in light or shade: the owners' orange and sky blue, the marks' pink, green."""
     red, green, blue = np.moveaxis(image, -1, 0)
@@ -137,58 +178,192 @@ def coloured(image: np.ndarray, name: str) -> int:
 
 
 @pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    browser = Browser(tmp_path_factory.mktemp("profile"))
+    yield browser
+    browser.close()
+
+
+@pytest.fixture(scope="module")
 def reach(tmp_path_factory):
     """A recording of two frames, apart and overlapping."""
     return recorded([hand_at(0.3), hand_at(0.12)], tmp_path_factory.mktemp("reach") / "hand.html")
 
 
-@pytest.fixture(scope="module")
-def overlapping(reach):
-    return picture(reach, time=1)
+def opened(browser: Browser, page: Path, view: str = "#t=1") -> Browser:
+    """The page with a frame shown as it was first, its panel folded away."""
+    if browser.ask("location.href").partition("#")[0] == page.as_uri():
+        browser.press("r")
+        browser.ask("location.hash = '#'")
+    else:
+        browser.open(page.as_uri(), until="document.querySelector('#time output').textContent.endsWith(' s')")
+        browser.ask("document.querySelector('#look').open = false")
+    browser.ask(f"location.hash = {view!r}")
+    time = float(re.search(r"t=([\d.]+)", view)[1])
+    browser.wait(f"document.querySelector('#time output').textContent === '{time:.3f} s'")
+    return browser
+
+
+def scene(browser: Browser) -> np.ndarray:
+    """What is seen below the panels and above the bar with the time."""
+    return browser.picture()[130:680]
 
 
 @looks
-def test_an_overlap_is_seen_opaque_in_the_colours_of_both_owners(overlapping):
+def test_an_overlap_is_seen_opaque_in_the_colours_of_both_owners(browser, reach):
+    image = scene(opened(browser, reach))
     for colour in ("orange", "sky blue"):
-        assert coloured(overlapping, colour) > 500
-    assert coloured(overlapping, "pink") > 20
-    assert coloured(overlapping, "green") > 10_000
+        assert coloured(image, colour) > 500
+    assert coloured(image, "pink") > 20
+    assert coloured(image, "green") > 10_000
 
 
 @looks
-def test_only_the_bodies_are_seen_before_they_overlap(reach):
-    image = picture(reach, time=0)
+def test_only_the_bodies_are_seen_before_they_overlap(browser, reach):
+    image = scene(opened(browser, reach, "#t=0"))
     assert [coloured(image, colour) for colour in ("orange", "sky blue", "pink")] == [0, 0, 0]
     assert coloured(image, "green") > 10_000
 
 
 @looks
-def test_an_overlap_of_a_millimetre_in_a_scene_of_metres_is_found(tmp_path):
+def test_an_overlap_of_a_millimetre_in_a_scene_of_metres_is_found_and_clicked_upon(browser, tmp_path):
     corner = Placed(Box([0.5, 0.5, 0.5]), (0.999, 0.999, 0.999))
     page = recorded([Bodies({CUP: Placed(Box([0.5, 0.5, 0.5])), HAND: corner})], tmp_path / "corner.html")
-    assert coloured(picture(page, time=0), "pink") > 20
+    image = scene(opened(browser, page, "#t=0"))
+    assert 20 < coloured(image, "pink") < 1000
+    red, green, blue = np.moveaxis(image, -1, 0)
+    rows, columns = np.nonzero((red > 200) & (red > 2 * green) & (blue > 1.5 * green))
+    # The arrow points to the left and down, away from the corner.
+    browser.click(columns.max() - 2, 130 + rows.min() + 2)
+    assert "1 ± " in browser.ask("document.querySelector('#numbers').innerText")
 
 
 @looks
-def test_a_link_opens_the_page_with_the_camera_where_it_says(reach):
-    above = picture(reach, time=1, view="&from=0.06,0.029,0.5&at=0.06,0.03,0.04")  # upon the top of the cup
-    below = picture(reach, time=1, view="&from=0.06,0.029,-0.5&at=0.06,0.03,0.04")  # upon the bottom of the hand
-    assert coloured(above, "orange") > 2000
-    assert coloured(above, "sky blue") == 0
-    assert coloured(below, "sky blue") > 2000
-    assert coloured(below, "orange") == 0
+def test_a_link_opens_the_page_with_the_camera_where_it_says(browser, reach):
+    for height, seen, hidden in ((0.5, "orange", "sky blue"), (-0.5, "sky blue", "orange")):
+        # From above upon the top of the cup, from below upon the bottom of the hand.
+        image = scene(opened(browser, reach, f"#t=1&from=0.06,0.029,{height}&at=0.06,0.03,0.04"))
+        assert coloured(image, seen) > 2000
+        assert coloured(image, hidden) == 0
 
 
 @looks
-def test_a_live_view_looks_like_a_recording(overlapping, tmp_path):
+def test_a_click_on_an_overlap_shows_its_numbers_and_one_beside_it_hides_them(browser, reach):
+    opened(browser, reach)
+    rows, columns = np.nonzero(
+        (lambda red, green, blue: (red > 130) & (red > 1.3 * green) & (green > 3 * blue))(
+            *np.moveaxis(scene(browser), -1, 0)
+        )
+    )
+    middle = len(rows) // 2
+    browser.click(columns[middle], 130 + rows[middle])
+    browser.wait("!document.querySelector('#numbers').hidden")
+    text = browser.ask("document.querySelector('#numbers').innerText")
+    assert "cup – arm.hand" in text
+    # 8 x 14 x 12 cm about (0.06, 0.03, 0.04): pushed back by 8 cm, they are apart.
+    assert re.search(r"volume\s1\.344 ± \S+ dm³", text)
+    assert re.search(r"depth\s80 mm", text)
+    assert re.search(r"surface\s752 cm²", text)
+    assert "(0.0600, 0.0300, 0.0400) m" in text
+    assert "(-1.0000, 0.0000, 0.0000)" in text
+    browser.click(20, 660)
+    browser.wait("document.querySelector('#numbers').hidden")
+
+
+@looks
+def test_a_row_comes_near_and_its_pair_stands_out_in_the_chart_until_escape(browser, reach):
+    opened(browser, reach)
+    far = scene(browser)
+    plain = coloured(browser.picture()[700:], "pink")
+    browser.click_on("#overlaps tbody tr")
+    near, bar = scene(browser), browser.picture()[700:]
+    assert coloured(near, "orange") > 1.1 * coloured(far, "orange")
+    assert plain == 0
+    assert coloured(bar, "pink") > 100
+    assert "1.344" in browser.ask("document.querySelector('#numbers').innerText")
+    browser.press("Escape")
+    assert_allclose(scene(browser), far, atol=8)
+
+
+@looks
+def test_keys_and_controls_choose_what_is_drawn(browser, reach):
+    opened(browser, reach)
+
+    def seen(*keys: str) -> dict[str, int]:
+        for key in keys:
+            browser.press(key)
+        image = scene(browser)
+        # Lines and points of overlaps are nearly white.
+        white = int((image.min(axis=-1) > 200).sum())
+        return {name: coloured(image, name) for name in ("orange", "sky blue", "pink", "green")} | {"white": white}
+
+    whole = seen()
+    assert seen("m")["pink"] == 0
+    edges = seen("f", "e")
+    assert edges["orange"] == edges["sky blue"] == 0
+    vertices = seen("e", "v")
+    assert 8 * 4 <= vertices["white"] <= 8 * 25 < edges["white"]
+    assert seen("r") == whole
+    wires = seen("F")["green"]
+    assert 500 < wires < whole["green"] / 5
+    dots = seen("E", "V")["green"]
+    assert 16 * 4 <= dots <= 16 * 25 < wires
+    browser.press("r")
+    browser.ask(
+        "for (const [id, value] of Object.entries({'overlaps-front': '#ff0000', 'overlaps-opacity': 0.5,"
+        "'overlaps-back': '#0000ff', 'bodies-opacity': 0})) {"
+        "const control = document.getElementById(id); control.value = value; control.oninput(); }"
+    )
+    image = scene(browser)
+    red, green, blue = np.moveaxis(image, -1, 0)
+    assert coloured(image, "orange") == coloured(image, "sky blue") == 0
+    assert ((red > green + 60) & (blue > green + 60)).sum() > 500  # the blue inside through the red outside
+    assert seen("r") == whole
+
+
+@looks
+def test_the_arrow_keys_and_the_chart_go_through_time(browser, reach):
+    def time() -> str:
+        return browser.ask("document.querySelector('#time output').textContent")
+
+    opened(browser, reach)
+    browser.press("ArrowLeft")
+    assert time() == "0.000 s"
+    assert "0 overlaps" in browser.ask("document.querySelector('#overlaps').innerText")
+    browser.press("ArrowRight")
+    assert time() == "1.000 s"
+    box = browser.ask("JSON.parse(JSON.stringify(document.querySelector('#chart').getBoundingClientRect()))")
+    browser.click(box["x"] + 20, box["y"] + 5)
+    assert time() == "0.000 s"
+    browser.press(" ")
+    browser.wait("document.querySelector('#time output').textContent === '1.000 s'")
+
+
+@looks
+def test_a_live_view_looks_like_a_recording(browser, reach, tmp_path):
+    recording = scene(opened(browser, reach))
     with Viewer() as viewer:
         for bodies in (hand_at(0.3), hand_at(0.12)):
             viewer.show(bodies, bodies.contacts())
         page = tmp_path / "live.html"
         page.write_text(viewer.visualizer.static_html(), encoding="utf-8")
-    live = picture(page, time=1)
+    browser.open(page.as_uri(), until="document.querySelector('canvas')")
+    while coloured(live := browser.picture()[:680], "orange") == 0:
+        pass
     for colour in ("orange", "sky blue", "green"):
-        assert_allclose(coloured(live, colour), coloured(overlapping, colour), rtol=0.1)
+        # The live view has the whole height, of which the recording leaves 680 pixels of 800.
+        assert_allclose(coloured(live, colour) * (680 / 800) ** 2, coloured(recording, colour), rtol=0.25)
+
+
+@looks
+def test_a_recording_begins_with_the_look_it_was_made_with(browser, tmp_path):
+    recording = Recording(bodies=Look(faces=False), overlaps=Look(front="#ff0000", marks=False))
+    recording.add(hand_at(0.12), hand_at(0.12).contacts(), time=0.0)
+    image = scene(opened(browser, recording.save(tmp_path / "hand.html"), "#t=0"))
+    assert coloured(image, "sky blue") == coloured(image, "pink") == 0
+    red, green, blue = np.moveaxis(image, -1, 0)
+    assert ((red > 100) & (green < 20) & (blue < 20)).sum() > 1000
+    assert 500 < coloured(image, "green") < 10_000
 
 
 def test_the_page_needs_nothing_from_outside(tmp_path):
@@ -207,42 +382,57 @@ def test_the_page_needs_nothing_from_outside(tmp_path):
     assert "@import" not in style
 
 
-def test_the_tree_names_links_and_pairs_and_the_largest_volume_of_a_pair(tmp_path):
+def test_the_tree_names_bodies_by_body_link_and_shape(tmp_path):
     page = recorded([hand_at(0.19), hand_at(0.12), hand_at(0.3)], tmp_path / "hand.html")
-    volume = "1.34 dm³"  # 8 x 14 x 12 cm
-    assert set(drawings(page)) == {
-        "/overlapper/bodies/cup/base/0",
-        "/overlapper/bodies/arm/hand/0",
-        f"/overlapper/overlaps/cup-arm.hand/at most {volume}",
-    }
+    assert set(drawings(page)) == {"/overlapper/bodies/cup/base/0", "/overlapper/bodies/arm/hand/0"}
 
 
-def test_the_table_lists_the_overlaps_of_each_frame(tmp_path):
-    page = recorded([hand_at(0.3), hand_at(0.12)], tmp_path / "hand.html")
-    before, after = unpacked(page, "frames")
-    assert (before["time"], before["overlaps"]) == (0, [])
-    (row,) = after["overlaps"]
-    assert (row["pair"], row["volume"], row["depth"]) == (["cup", "arm.hand"], "1.34 dm³", "80 mm")
-    assert_allclose(row["centroid"], [0.06, 0.03, 0.04], atol=1e-12)
+def test_the_numbers_are_those_of_each_frame(tmp_path):
+    film = Film.of(recorded([hand_at(0.3), hand_at(0.12)], tmp_path / "hand.html"))
+    assert film.heading["times"] == [0, 1]
+    assert film.sightings(0) == {}
+    ((polytope, (volume, error, depth, area, *rest)),) = film.sightings(1).values()
+    assert list(film.sightings(1)) == [("cup", "arm.hand")]
+    assert polytope == 0
+    assert_allclose([volume, depth, area], [0.08 * 0.14 * 0.12, 0.08, 0.0752], rtol=1e-5)
+    assert 0 < error < 1e-15
+    assert_allclose(rest[:3] + np.array(film.heading["center"]), [0.06, 0.03, 0.04], atol=1e-5)
+    assert_allclose(rest[3:], [-1, 0, 0], atol=1e-6)
 
 
-def test_bodies_are_sent_once_and_have_key_frames_only_where_they_move(tmp_path):
+def test_bodies_are_sent_once_and_have_poses_only_where_they_move(tmp_path):
     page = recorded([hand_at(x) for x in (0.3, 0.3, 0.12, 0.12)], tmp_path / "hand.html")
-    sent = [each["path"] for each in unpacked(page, "commands") if each["type"] == "set_object"]
+    sent = [each["path"] for each in commands(page) if each["type"] == "set_object"]
     assert sent.count("/overlapper/bodies/arm/hand/0") == sent.count("/overlapper/bodies/cup/base/0") == 1
-    times = {path: [time for time, _ in keys] for (path, name), keys in tracks(page).items() if name == ".position"}
-    assert times == {"/overlapper/bodies/arm/hand/0": [0, 2, 4], "/overlapper/bodies/cup/base/0": [0, 4]}
+    film = Film.of(page)
+    frames = {node: [frame for frame, _ in film.poses(node)] for node in film.heading["nodes"]}
+    assert frames == {"/overlapper/bodies/arm/hand/0": [0, 2], "/overlapper/bodies/cup/base/0": [0]}
 
 
-def test_one_mesh_stands_for_an_overlap_at_rest_and_is_hidden_without_it(tmp_path):
-    page = recorded([hand_at(x) for x in (0.3, 0.12, 0.12, 0.15, 0.3)], tmp_path / "hand.html")
-    switches = {
-        name: keys for (path, name), keys in tracks(page).items() if path == "/overlapper/overlaps/cup-arm.hand"
-    }
-    assert switches == {
-        "frame0.visible": [(0, False), (1, True), (3, False), (5, False)],
-        "frame1.visible": [(0, False), (3, True), (4, False), (5, False)],
-    }
+def test_one_polytope_stands_for_an_overlap_at_rest(tmp_path):
+    positions = (0.3, 0.12, 0.12, 0.12 + 1e-5, 0.15, 0.3, 0.15)
+    film = Film.of(recorded([hand_at(x) for x in positions], tmp_path / "hand.html"))
+    assert [[polytope for polytope, _ in film.sightings(k).values()] for k in range(7)] == [
+        [], [0], [0], [0], [1], [], [1],
+    ]  # fmt: skip
+
+
+def test_a_thin_overlap_that_thins_by_less_than_is_seen_of_its_width_is_drawn_anew(tmp_path):
+    def pressed(depth: float) -> Bodies:
+        plates = Placed(Box([1, 1, 0.1])), Placed(Box([1, 1, 0.1]), (0, 0, 0.2 - depth))
+        return Bodies({CUP: plates[0], HAND: plates[1]})
+
+    film = Film.of(recorded([pressed(2e-3), pressed(1.9e-3), pressed(1.899e-3)], tmp_path / "plates.html"))
+    assert [polytope for k in range(3) for polytope, _ in film.sightings(k).values()] == [0, 1, 1]
+
+
+def test_a_spinning_overlap_is_drawn_anew_though_its_measures_stay(tmp_path):
+    def spun(angle: float) -> Bodies:
+        turned = Placed(Box([0.1, 0.1, 0.1]), (0, 0, 0.19), (0, 0, np.sin(angle / 2), np.cos(angle / 2)))
+        return Bodies({CUP: Placed(Box([1, 1, 0.1])), HAND: turned})
+
+    film = Film.of(recorded([spun(angle) for angle in (0, 0.02, 0.0201)], tmp_path / "spin.html"))
+    assert [polytope for k in range(3) for polytope, _ in film.sightings(k).values()] == [0, 1, 1]
 
 
 def test_a_body_that_takes_over_an_id_is_drawn_anew(tmp_path):
@@ -250,8 +440,9 @@ def test_a_body_that_takes_over_an_id_is_drawn_anew(tmp_path):
     page = recorded([hand_at(0.3), ball], tmp_path / "cup.html")
     old, new = "/overlapper/bodies/cup/base/0", "/overlapper/bodies/cup/base/0 from frame 2"
     assert {old, new} <= set(drawings(page))
-    assert [value for _, value in tracks(page)[old, ".visible"]] == [True, False, False]
-    assert [value for _, value in tracks(page)[new, ".visible"]] == [False, True, True]
+    film = Film.of(page)
+    assert [(frame, bool(pose[3:].any())) for frame, pose in film.poses(old)] == [(0, True), (1, False)]
+    assert [(frame, bool(pose[3:].any())) for frame, pose in film.poses(new)] == [(1, True)]
 
 
 @pytest.mark.parametrize(
@@ -281,39 +472,52 @@ def test_a_half_space_is_drawn_as_a_plate_in_its_plane_as_large_as_the_scene(tmp
     assert np.ptp(corners, axis=0)[1] >= 4
 
 
-def test_the_facets_of_each_owner_close_the_overlap(tmp_path):
-    bodies = hand_at(0.12)
-    (contact,) = bodies.contacts()
-    page = recorded([bodies], tmp_path / "hand.html")
-    surfaces = meshes(drawings(page)["/overlapper/overlaps/cup-arm.hand/at most 1.34 dm³"])
-    assert_allclose(enclosed(surfaces), contact.overlap.volume, rtol=1e-6)
-    first, second = (vertices for vertices, _, _ in surfaces)
-    reds, blues = zip(*((colour >> 16, colour & 255) for _, _, colour in surfaces), strict=True)
-    assert reds[0] > blues[0]  # orange
-    assert reds[1] < blues[1]  # sky blue
-    # About the centroid (0.06, 0.03, 0.04): the cup ends at 0.1 in x, the hand begins at 0.02.
-    assert_allclose([first[:, 0].max(), second[:, 0].min()], [0.04, -0.04], atol=1e-7)
+def test_the_facets_of_each_owner_close_the_overlap_in_every_frame(tmp_path):
+    frames = [hand_at(x) for x in (0.15, 0.14, 0.12)]
+    page = recorded(frames, tmp_path / "hand.html")
+    film = Film.of(page)
+    assert film.arrays["polytope_previous"].tolist() == [-1, 0, 1]
+    for k, (bodies, (vertices, facets)) in enumerate(zip(frames, film.polytopes(), strict=True)):
+        (contact,) = bodies.contacts()
+        assert_allclose(enclosed_by_rings(vertices, facets), contact.overlap.volume, rtol=1e-4)
+        first, second = (
+            np.concatenate([vertices[ring] for owner, ring in facets if owner == side]) + film.heading["center"]
+            for side in (0, 1)
+        )
+        # The cup ends at 0.1 in x, where its facet is.
+        assert_allclose([first[:, 0].max(), second[:, 0].min()], [0.1, (0.05, 0.04, 0.02)[k]], atol=1e-5)
 
 
 def test_a_round_overlap_of_thousands_of_facets_is_drawn_with_hundreds(tmp_path):
     bodies = Bodies({CUP: Placed(Sphere(0.1)), HAND: Placed(Sphere(0.1), (0.05, 0, 0))})
     (contact,) = bodies.contacts()
-    page = recorded([bodies], tmp_path / "balls.html")
-    (drawn,) = [drawing for path, drawing in drawings(page).items() if "/overlaps/" in path]
+    ((vertices, facets),) = Film.of(recorded([bodies], tmp_path / "balls.html")).polytopes()
     assert len(contact.overlap.faces) > 2000
-    assert sum(len(faces) for _, faces, _ in meshes(drawn)) < 1000
-    assert_allclose(enclosed(meshes(drawn)), contact.overlap.volume, rtol=0.1)
+    assert len(facets) < 500
+    assert_allclose(enclosed_by_rings(vertices, facets), contact.overlap.volume, rtol=0.1)
 
 
 def test_far_from_the_origin_nothing_is_lost_to_single_precision(tmp_path):
     far = np.array([3e6, -2e6, 1e6])
     boxes = {CUP: Placed(Box([0.1, 0.1, 0.1]), far), HAND: Placed(Box([0.1, 0.1, 0.1]), far + [0.1875, 0, 0])}
-    page = recorded([Bodies(boxes)], tmp_path / "far.html")
-    ((_, hand), _) = tracks(page)["/overlapper/bodies/arm/hand/0", ".position"]
-    ((_, cup), _) = tracks(page)["/overlapper/bodies/cup/base/0", ".position"]
-    assert_allclose(np.float32(hand) - np.float32(cup), [0.1875, 0, 0], atol=1e-6)
-    (drawn,) = [drawing for path, drawing in drawings(page).items() if "/overlaps/" in path]
-    assert_allclose(np.ptp(meshes(drawn)[0][0], axis=0), [0.0125, 0.2, 0.2], atol=1e-7)
+    film = Film.of(recorded([Bodies(boxes)], tmp_path / "far.html"))
+    ((_, hand),) = film.poses("/overlapper/bodies/arm/hand/0")
+    ((_, cup),) = film.poses("/overlapper/bodies/cup/base/0")
+    assert_allclose((hand - cup)[:3], [0.1875, 0, 0], atol=1e-6)
+    ((vertices, _),) = film.polytopes()
+    assert_allclose(np.ptp(vertices, axis=0), [0.0125, 0.2, 0.2], atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("look", "sentence"),
+    [
+        ({"opacity": 1.5}, "opacity must lie between 0 and 1, not 1.5"),
+        ({"front": "red"}, "front must be a colour like #e69f00, not 'red'"),
+    ],
+)
+def test_a_look_that_cannot_be_drawn_is_refused(look, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        Look(**look)
 
 
 def test_frames_must_come_in_the_order_of_time(tmp_path):

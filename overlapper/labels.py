@@ -1,0 +1,74 @@
+"""What views are given, and what bodies, links and pairs are called in them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Protocol
+
+from overlapper import Overlap, Placed
+
+ROOT = "/overlapper/bodies"
+
+
+class Bodies(Protocol):
+    """What is drawn: shapes in the world by (body, link, shape); the colours of the links and their distinct names."""
+
+    @property
+    def keys(self) -> Sequence[tuple[int, int, int]]: ...
+    @property
+    def placed(self) -> Sequence[Placed]: ...
+    @property
+    def colors(self) -> Mapping[tuple[int, int], Sequence[float]]: ...
+    @property
+    def names(self) -> Mapping[tuple[int, int], str]: ...
+
+
+class Contact(Protocol):
+    """A pair of shapes, each by body, link and index within the link, and what they have in common."""
+
+    @property
+    def bodyA(self) -> int: ...
+    @property
+    def linkA(self) -> int: ...
+    @property
+    def shapeA(self) -> int: ...
+    @property
+    def bodyB(self) -> int: ...
+    @property
+    def linkB(self) -> int: ...
+    @property
+    def shapeB(self) -> int: ...
+    @property
+    def overlap(self) -> Overlap: ...
+
+
+def link_names(bodies: Bodies) -> dict[tuple[int, int], tuple[str, str]]:
+    """What the tree calls the body and the link: a slash would begin a new level of it."""
+    names = {}
+    for (body, link), name in bodies.names.items():
+        first, _, rest = name.partition("/")
+        names[body, link] = first or str(body), rest.replace("/", ".") or str(link)
+    return names
+
+
+def body_paths(bodies: Bodies) -> list[str]:
+    """`/overlapper/bodies/<body>/<link>/<shape>` of each shape."""
+    names = link_names(bodies)
+    return [f"{ROOT}/{'/'.join(names[body, link])}/{shape}" for body, link, shape in bodies.keys]
+
+
+def pairs(bodies: Bodies, contacts: Iterable[Contact]) -> dict[tuple[str, str], Overlap]:
+    """The overlapping pairs by their names; a link or shape is named only where its body or link has more than one."""
+    names = link_names(bodies)
+    links = Counter(body for body, _ in names)
+    shapes = Counter((body, link) for body, link, _ in bodies.keys)
+
+    def name(body: int, link: int, shape: int) -> str:
+        first, rest = names[body, link]
+        label = f"{first}.{rest}" if links[body] > 1 else first
+        return f"{label}.{shape}" if shapes[body, link] > 1 else label
+
+    return {
+        (name(c.bodyA, c.linkA, c.shapeA), name(c.bodyB, c.linkB, c.shapeB)): c.overlap for c in contacts if c.overlap
+    }

@@ -1,0 +1,110 @@
+"""How bodies and overlaps are drawn, in a live view, in a recording and in a picture.
+
+Bodies are drawn by their collision shapes, translucent and in their own colours. Each facet of an overlap has the
+colour of the shape whose surface it lies on: orange for the first of the pair, sky blue for the second, from the
+palette of Okabe and Ito, which the common kinds of colour blindness keep apart. The bodies' own colours would say less,
+for in many models everything is white or grey.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import HalfSpace, Overlap, Placed
+from overlapper import overlap as common_part
+
+Array = NDArray[np.float64]
+
+OWNER_COLORS = [
+    (0.90, 0.62, 0.00),
+    (0.34, 0.71, 0.91),
+    (0.00, 0.62, 0.45),
+    (0.94, 0.89, 0.26),
+    (0.80, 0.47, 0.65),
+    (0.84, 0.37, 0.00),
+    (0.00, 0.45, 0.70),
+]
+INK = (1.00, 0.31, 0.64)  # for what shines through everything: a colour that models hardly ever have
+LINE = (0.91, 0.92, 0.94)  # edges and vertices of overlaps
+TOP, BOTTOM = (0.20, 0.23, 0.28), (0.09, 0.10, 0.13)  # of the background
+LIGHT = np.array([0.5, -0.8, 1.4]) / np.linalg.norm([0.5, -0.8, 1.4])  # the way to it
+FIELD_OF_VIEW = 35.0  # degrees, from bottom to top
+MANY_FACETS = 100  # more than that are only of what is round
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What is drawn of each polytope. Colours are written #rrggbb; without them, each has its own.
+
+    `opacity` is that of the faces. `front` is the colour of faces seen from outside, `back` of those seen from inside,
+    which are drawn where they can be seen: overlaps' own are a shade of their owners', bodies have none of their own.
+    `marks` are the patch outline and the normal of an overlap.
+    """
+
+    faces: bool = True
+    edges: bool = True
+    vertices: bool = False
+    opacity: float = 1.0
+    front: str | None = None
+    back: str | None = None
+    marks: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.opacity <= 1:
+            raise ValueError(f"opacity must lie between 0 and 1, not {self.opacity}")
+        for name in ("front", "back"):
+            color = getattr(self, name)
+            if color is not None and not re.fullmatch("#[0-9a-fA-F]{6}", color):
+                raise ValueError(f"{name} must be a colour like #e69f00, not {color!r}")
+
+
+BODIES = Look(opacity=0.35)
+OVERLAPS = Look(edges=False)
+
+
+def channels(color: str) -> Array:
+    """(3,) red, green and blue in 0..1 of a colour #rrggbb."""
+    return np.array([int(color[k : k + 2], 16) for k in (1, 3, 5)]) / 255
+
+
+def boxes(placed: Iterable[Placed]) -> list[Array]:
+    """The boxes (2, 3) around what is bounded; one about the origin if nothing is."""
+    bounded = [np.asarray(each.bounds) for each in placed if not isinstance(each.shape, HalfSpace)]
+    return bounded or [np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])]
+
+
+def camera(framed: Sequence[Array]) -> tuple[Array, Array, float]:
+    """The point to look at, the unit direction from it to the camera, and how far off that sees all boxes, in 4 : 3."""
+    corners = np.array(framed)
+    center = (corners[:, 0].min(axis=0) + corners[:, 1].max(axis=0)) / 2
+    back = np.array([0.60, -0.68, 0.42]) / np.linalg.norm([0.60, -0.68, 0.42])
+    right = np.array([-back[1], back[0], 0.0]) / np.hypot(back[0], back[1])
+    corners = np.array([corners[:, list(pick), range(3)] for pick in np.ndindex(2, 2, 2)]).reshape(-1, 3) - center
+    slope = np.tan(np.deg2rad(FIELD_OF_VIEW) / 2)
+    aside = np.maximum(np.abs(corners @ np.cross(back, right)), np.abs(corners @ right) / (4 / 3))
+    return center, back, float(1.15 * np.max(aside / slope + corners @ back))
+
+
+def to_draw(overlap: Overlap, size: float) -> Overlap:
+    """The overlap with no more facets than are seen in a scene of that size, m: what is round is drawn less so."""
+    if len(overlap.owner) <= MANY_FACETS:
+        return overlap
+    extent = np.ptp(np.asarray(overlap.bounds), axis=0).max()
+    return common_part(*overlap.shapes, tolerance=0.03 if extent > 0.1 * size else 0.1) or overlap
+
+
+def arrow_length(area: float, size: float) -> float:
+    """Of the normal: in proportion to the patch, but neither lost in a scene of that size nor in the way of others."""
+    return float(np.clip(np.sqrt(area) / 3, 0.03 * size, 0.06 * size))
+
+
+def volume_text(volume: float) -> str:
+    for cubic_metres, unit in ((1e-9, "mm³"), (1e-6, "cm³"), (1e-3, "dm³")):
+        if volume < 1000 * cubic_metres:
+            return f"{volume / cubic_metres:.3g} {unit}"
+    return f"{volume:.3g} m³"
