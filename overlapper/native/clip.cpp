@@ -8,6 +8,7 @@
 
 #include "canonical_order.h"
 #include "minkowski.h"
+#include "trace.h"
 #include "wide_corners.h"
 
 namespace overlapper {
@@ -520,6 +521,13 @@ bool clippable(const Shape& shape) {
   return std::holds_alternative<Box>(shape) || std::holds_alternative<HalfSpace>(shape);
 }
 
+/// Below it, a table of all signs is sooner filled than a seam found.
+constexpr int kLeastFacetsTraced = 64;
+
+bool worth_tracing(const Placed& a, const Placed& b) {
+  return traceable(a, b) && facets(a.shape) + facets(b.shape) > kLeastFacetsTraced;
+}
+
 Pose relative_pose(const Pose& to, const Pose& of) {
   const Mat3 back = transposed(to.rotation);
   return {back * of.rotation, back * (of.translation - to.translation)};
@@ -531,15 +539,29 @@ bool comes_first(const Placed& a, const Placed& b) {
   return facets_a != facets_b ? facets_a > facets_b : !comes_before(b, a);
 }
 
-std::optional<ClippedPair> clip_in_order(const Placed& a, const Placed& b) {
+/// What all signs of a pair are computed from: where the second body is in the first one's own coordinates.
+struct Arrangement {
+  Pose pose;
+  double reach;     ///< how large the numbers are
+  double flatness;  ///< by how much planes of facets that are not quite flat miss their corners
+  double sign_rounding;
+  bool apart;  ///< the balls around the bodies are
+};
+
+Arrangement arrange(const Placed& a, const Placed& b) {
   const Pose pose = relative_pose(a.pose, b.pose);
-  const double radius_a = radius(a.shape), radius_b = radius(b.shape), apart = norm(pose.translation);
-  const double reach = std::max(radius_a + lost_far_away(a), apart + radius_b + lost_far_away(b));
+  const double radius_a = radius(a.shape), radius_b = radius(b.shape), between = norm(pose.translation);
+  const double reach = std::max(radius_a + lost_far_away(a), between + radius_b + lost_far_away(b));
   double flatness = 0;
   for (const Placed* body : {&a, &b})
     if (const Hull* hull = std::get_if<Hull>(&body->shape)) flatness = std::max(flatness, hull->data->flatness);
   const double sign_rounding = doubt(reach) + 4 * flatness;
-  if (bounded(b.shape) && apart > radius_a + radius_b + sign_rounding) return ClippedPair{};
+  return {pose, reach, flatness, sign_rounding, bounded(b.shape) && between > radius_a + radius_b + sign_rounding};
+}
+
+std::optional<ClippedPair> clip_by_table(const Placed& a, const Placed& b) {
+  const auto [pose, reach, flatness, sign_rounding, apart] = arrange(a, b);
+  if (apart) return ClippedPair{};
 
   thread_local Workspace workspace;
   set_solid(workspace.first, a.shape, nullptr, 4 * reach);
@@ -548,26 +570,44 @@ std::optional<ClippedPair> clip_in_order(const Placed& a, const Placed& b) {
   if (signs == Signs::kSeparated) return ClippedPair{};
   if (signs == Signs::kUncertain) return std::nullopt;
   // One so thin that rounding might hide it is left to those who look closer.
-  std::optional<ClippedPair> common = measure(workspace, a, b, reach, rounding(reach) + flatness, 4 * sign_rounding);
-  if (!common) return std::nullopt;
-  common->centroid = a.pose * common->centroid;
-  common->pull = a.pose.rotation * common->pull;
-  common->moment = a.pose.rotation * common->moment;
+  return measure(workspace, a, b, reach, rounding(reach) + flatness, 4 * sign_rounding);
+}
+
+std::optional<ClippedPair> clip_by_tracing(const Placed& a, const Placed& b) {
+  const Arrangement at = arrange(a, b);
+  if (at.apart) return ClippedPair{};
+  return trace(a, b, at.pose, at.sign_rounding);
+}
+
+/// Calls `way` with the body first whose coordinates it will use, and says the answer in terms of `a` and the world.
+template <class Way>
+std::optional<ClippedPair> in_order(const Placed& a, const Placed& b, bool swapped, Way way) {
+  const Placed& first = swapped ? b : a;
+  std::optional<ClippedPair> common = way(first, swapped ? a : b);
+  if (!common || common->status != Status::kOverlapping) return common;
+  common->centroid = first.pose * common->centroid;
+  common->pull = first.pose.rotation * common->pull;
+  common->moment = first.pose.rotation * common->moment;
+  if (swapped) {
+    // Not the negatives, which would make negative zeros.
+    common->pull = Vec3{} - common->pull;
+    common->moment = Vec3{} - common->moment;
+  }
   return common;
 }
 
 }  // namespace
 
 std::optional<ClippedPair> clip(const Placed& a, const Placed& b) {
+  if (worth_tracing(a, b))
+    if (auto traced = in_order(a, b, comes_before(b, a), clip_by_tracing)) return traced;
   if (!clippable(a.shape) || !clippable(b.shape) || !(bounded(a.shape) || bounded(b.shape))) return std::nullopt;
-  if (comes_first(a, b)) return clip_in_order(a, b);
-  std::optional<ClippedPair> common = clip_in_order(b, a);
-  if (common) {
-    // Not the negatives, which would make negative zeros.
-    common->pull = Vec3{} - common->pull;
-    common->moment = Vec3{} - common->moment;
-  }
-  return common;
+  return in_order(a, b, !comes_first(a, b), clip_by_table);
+}
+
+std::optional<Region> region_of_clipped(const Placed& a, const Placed& b, Vec3 reference) {
+  const Arrangement at = arrange(a, b);
+  return traced_region(a, b, at.pose, at.sign_rounding, reference);
 }
 
 }  // namespace overlapper

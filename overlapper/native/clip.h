@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 
+#include "region.h"
 #include "shape.h"
 
 namespace overlapper {
@@ -21,6 +22,7 @@ struct ClippedPair {
       pull;  ///< d volume / d translation of the first body: the area vector of its facets; the second has the opposite
   Vec3 moment;  ///< d volume / d rotation vector of the first body about the centroid; the second has the opposite
   int facets_touched = 0;  ///< facets of the common polytope
+  bool traced = false;     ///< region_of_clipped() has the polytope, and it is more than touching, measured or not
 };
 
 /// Decides by static filters alone, and measures what is common; nothing where one of the signs that it needs is not
@@ -31,6 +33,11 @@ struct ClippedPair {
 /// other. The common polytope is then known by its edges: whole and cut ones of either body, and for each pair of
 /// facets that cross, the segment between the two points that lie on both. Volume, moments and area vectors are sums
 /// over edges, in any order.
+///
+/// Where that is more to ask than it takes to follow the seam, trace() does it.
 std::optional<ClippedPair> clip(const Placed& a, const Placed& b);
+
+/// The polytope of a pair that clip() has traced; `a` and `b` in canonical order, owners 0 and 1.
+std::optional<Region> region_of_clipped(const Placed& a, const Placed& b, Vec3 reference);
 
 }  // namespace overlapper

@@ -179,7 +179,10 @@ int DirectionMap::cell(Vec3 d) const {
   const double along = d[major];
   const double u = major == 0 ? d.y : d.x, v = major == 2 ? d.y : d.z;
   const double scale = std::abs(along) > 0 ? 0.5 * side_ / std::abs(along) : 0;
-  const auto index = [&](double w) { return std::min(side_ - 1, static_cast<int>(w * scale + 0.5 * side_)); };
+  const auto index = [&](double w) {
+    const double place = w * scale + 0.5 * side_;
+    return place < side_ - 1 ? static_cast<int>(place) : side_ - 1;
+  };
   return ((2 * major + (along < 0)) * side_ + index(u)) * side_ + index(v);
 }
 

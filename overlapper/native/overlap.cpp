@@ -106,7 +106,8 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
   }
   if (pair()) clipped_ = clip(bodies_[0], bodies_[1]);
   // What is too thin for clipping to measure may be too thin to be more than touching.
-  if (clipped_ && clipped_->status == Status::kOverlapping && !clipped_->measured) clipped_.reset();
+  if (clipped_ && clipped_->status == Status::kOverlapping && !clipped_->measured && !clipped_->traced)
+    clipped_.reset();
   status_ = clipped_ ? clipped_->status : search().status;
   measured_by_clipping_ = clipped_ && clipped_->measured;
 }
@@ -263,6 +264,11 @@ const Region& Overlap::grown() const {
   assert(status_ == Status::kOverlapping);
   std::optional<Region>& kept = lazy().region;
   if (kept) return *kept;
+  if (traced()) {
+    const Arrangement& at = arrangement();
+    if (auto region = region_of_clipped(bodies_[at.order[0]], bodies_[at.order[1]], at.reference))
+      return kept.emplace(owned_as_given(std::move(*region)));
+  }
   const Search& found = search();
   const double reach = *std::max_element(found.reach.begin(), found.reach.end());
   if (found.wide_ball) return kept.emplace(grown_about(*found.wide_ball, reach));
@@ -283,19 +289,21 @@ const Quantities& Overlap::measured() const {
   std::optional<Quantities>& kept = lazy().quantities;
   if (kept) return *kept;
   if (method_ == Method::kPaper) return kept.emplace(measure(grown()));
-  const Search& found = search();
-  if (found.wide_ball) {
-    kept = measure(grown());
-    kept->widened = true;
-    return *kept;
-  }
   const Arrangement& at = arrangement();
-  const double reach = *std::max_element(found.reach.begin(), found.reach.end());
-  if (pair()) {
-    kept = closed_form(at.relative[0], at.relative[1], rounding(reach), at.reference);
-    if (kept) {
-      for (Quantities::Pull& pull : kept->pulls) pull.owner = at.order[pull.owner];
+  if (!traced()) {
+    const Search& found = search();
+    if (found.wide_ball) {
+      kept = measure(grown());
+      kept->widened = true;
       return *kept;
+    }
+    if (pair()) {
+      const double reach = *std::max_element(found.reach.begin(), found.reach.end());
+      kept = closed_form(at.relative[0], at.relative[1], rounding(reach), at.reference);
+      if (kept) {
+        for (Quantities::Pull& pull : kept->pulls) pull.owner = at.order[pull.owner];
+        return *kept;
+      }
     }
   }
   kept = measure(grown());
@@ -310,7 +318,8 @@ const Quantities& Overlap::measured() const {
     if (auto wide = overlapper::widened(at.relative, grown())) keep_better(owned_as_given(std::move(*wide)));
   if (!enough()) {
     // The point about which the region was grown may not be inside after all, or its frame not be round.
-    const double noise = wide_noise(reach);
+    const Search& found = search();
+    const double reach = *std::max_element(found.reach.begin(), found.reach.end()), noise = wide_noise(reach);
     const WideBall ball = wide_deepest_ball(wide_bodies(), {}, 4 * noise, reach, noise);
     if (ball.lower > 0) keep_better(grown_about(ball, reach));
     else kept->volume_error += kept->volume + touching_volume(found.ball);

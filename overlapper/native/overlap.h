@@ -66,6 +66,8 @@ class Overlap {
   const Contact& contact() const;
 
  private:
+  bool traced() const { return clipped_ && clipped_->traced; }
+
   /// The bodies in the order in which they are computed with, about a reference near them.
   struct Arrangement {
     std::vector<int> order;
