@@ -117,6 +117,22 @@ def test_bodies_that_touch_are_found():
     assert_array_equal(answer.depth < 1e-12, True)
 
 
+def test_candidates_are_the_boxes_that_meet_however_large_and_wherever_they_have_moved():
+    rng = np.random.default_rng(8)
+    halves = 10 ** rng.uniform(-3, 1, 300)[:, None] * rng.uniform(0.2, 1, (300, 3))
+    shapes, upright = [HalfSpace([0, 0, 1], 0), *map(Box, halves)], np.tile([0, 0, 0, 1], (301, 1))
+    batch = Batch(shapes)
+    positions = rng.normal(size=(301, 3)) * np.exp(rng.normal(size=(301, 1)))
+    positions[0] = 0
+    for step in (0, 1e-3, 1e-3, 0.1, 3, 1e-3, 1e-3, 100, 0, 1e7):
+        positions[1:] += step * rng.normal(size=(300, 3)) * (rng.random((300, 1)) < 0.5)
+        apart = np.abs(positions[1:, None] - positions[None, 1:]) > halves[:, None] + halves[None]
+        meet = np.argwhere(np.triu(~apart.any(axis=2), 1)) + 1
+        grounded = np.flatnonzero(positions[1:, 2] <= halves[:, 2]) + 1
+        expected = sorted([[0, k] for k in grounded.tolist()] + meet.tolist())
+        assert_array_equal(batch.candidate_pairs(positions, upright), np.reshape(expected, (-1, 2)))
+
+
 def test_rows_are_picked_as_from_an_array():
     shapes, positions, orientations = scene(np.random.default_rng(1))
     answer = overlaps(shapes, positions, orientations, tolerance=TOLERANCE)

@@ -160,7 +160,7 @@ struct Batch::Memory {
   std::vector<Body> bodies;
   std::shared_ptr<const std::vector<PoseNumbers>> poses;  ///< of the bodies; shared with the answers
   std::vector<Enclosure> enclosures;                      ///< parallel to them
-  BoxSweep sweep;
+  BoxTree tree;
   std::vector<IndexPair> candidates;
   std::vector<Known> known, next_known;        ///< of the last call with pairs, and of the one under way
   std::vector<Overlaps::Row> rows, next_rows;  ///< parallel to these
@@ -275,7 +275,7 @@ std::vector<IndexPair> Batch::candidate_pairs(std::span<const double> positions,
   Borrowed memory(*this);
   memory->place(positions, orientations);
   std::vector<IndexPair> pairs;
-  memory->sweep.run(memory->enclosures, pairs);
+  memory->tree.pairs(memory->enclosures, pairs);
   return pairs;
 }
 
@@ -286,7 +286,7 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
     throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
   Borrowed memory(*this);
   memory->place(positions, orientations);
-  if (!given) memory->sweep.run(memory->enclosures, memory->candidates);
+  if (!given) memory->tree.pairs(memory->enclosures, memory->candidates);
   const std::span<const IndexPair> pairs = given ? *given : std::span<const IndexPair>(memory->candidates);
   memory->recall(pairs);
   finished = for_each_in_parallel(

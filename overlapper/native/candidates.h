@@ -20,23 +20,39 @@ struct Enclosure {
 };
 Enclosure enclosure(const Placed& placed);
 
-/// Finds the pairs of boxes that meet by sweeping along the axis on which they are spread out most (Baraff 1992): boxes
-/// sorted by their lower side, each tested against those that begin before it ends. Keeps its memory between calls.
-class BoxSweep {
+/// Finds the pairs of boxes that meet by a tree of boxes around boxes, halved along the axis on which their middles are
+/// spread out most. Two parts of the tree whose boxes are apart have no pair in common, so that the work per body
+/// depends on how many it is near and hardly on how many there are. Bodies of very different size have trees of their
+/// own: a ground would make every box around it as large as itself. Keeps its memory between calls, and the tree for as
+/// long as that finds the pairs with as little work.
+class BoxTree {
  public:
   /// Pairs i < j, sorted. A half-space meets a box that reaches into it, and two half-spaces are no pair.
-  void run(std::span<const Enclosure> bodies, std::vector<IndexPair>& pairs);
+  void pairs(std::span<const Enclosure> bodies, std::vector<IndexPair>& pairs);
 
  private:
-  struct Entry {
-    double lower, upper;                    ///< along the axis of the sweep
-    double lower1, upper1, lower2, upper2;  ///< along the other two
-    int body;
+  /// Of the bodies order_[begin] ... order_[end - 1]. Nodes stand in the order of a walk, so that the first half of
+  /// node k is node k + 1.
+  struct Node {
+    Bounds box;
+    int begin, end;
+    int second_half;  ///< -1 for a leaf
   };
-  void sort_boxes(std::span<const Enclosure> bodies);
+  void build(std::span<const Enclosure> bodies);
+  void split(std::span<const Enclosure> bodies, int begin, int end);
+  void fit(std::span<const Enclosure> bodies);
+  void within(int node);
+  void between(int a, int b);
+  void sort(std::vector<IndexPair>& pairs);
 
-  std::vector<Entry> entries_;
-  std::vector<int> closed_, open_;
+  std::vector<int> order_, open_;  ///< the bodies with a box of their own, by leaf; the half-spaces
+  std::vector<Bounds> boxes_;      ///< parallel to order_
+  std::vector<Node> nodes_;
+  std::vector<int> roots_;  ///< of the trees, by size
+  std::vector<IndexPair> found_;
+  std::vector<int> starts_;
+  size_t looked_at_ = 0;   ///< pairs of nodes, in the last search
+  size_t when_built_ = 0;  ///< the same, in the first search of this tree
 };
 
 }  // namespace overlapper

@@ -197,7 +197,7 @@ gradient as arrays.
 
 `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs` (p, 2)
 indexes them and has a row each in the answer; without it there is a row for each pair that overlaps or touches, found by
-a sweep over boxes and sorted. `tolerance` and `method` are those of `overlap`, whose answers these are to the last bit. The work is
+a tree of boxes and sorted. `tolerance` and `method` are those of `overlap`, whose answers these are to the last bit. The work is
 spread over `threads`, None being all that there are; their number does not change a bit of the answer.
 
 Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
