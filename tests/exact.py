@@ -207,6 +207,38 @@ def hull(points: Iterable[Iterable[float | Fraction]]) -> Polytope:
     return merged(triangles)
 
 
+def checked_hull(points: Iterable[Iterable[float]], suggestion: Iterable[Sequence[int]]) -> Polytope:
+    """The convex hull of many points, from triangles (indices) that somebody suggests.
+
+    A closed surface that has a point on the inner side of all its triangles, that a ray from there leaves once, and
+    that is convex along every edge bounds a convex set. Here every point must be a vertex of it.
+    """
+    cloud = [point(p) for p in points]
+    far = [coordinates(cloud[i]) for i in range(0, len(cloud), max(1, len(cloud) // 8))]
+    x, y, z = (total(p[i] for p in far) / len(far) for i in range(3))
+    middle, target = point((x, y, z)), point((x + 17, y + 19, z + 23))
+    triangles: dict[Ring, Plane] = {}
+    for a, b, c in suggestion:
+        p, q, r = cloud[a], cloud[b], cloud[c]
+        plane = plane_through(p, q, r)
+        assert plane is not None and side(plane, middle) != 0
+        if side(plane, middle) > 0:
+            q, r, plane = r, q, (-plane[0], -plane[1], -plane[2], -plane[3])
+        triangles[p, q, r] = plane
+    beyond = {edge: plane for triangle, plane in triangles.items() for edge in edges_of(triangle)}
+    assert len(beyond) == 3 * len(triangles) and {p for p, _ in beyond} == set(cloud)
+    for triangle in triangles:
+        for (u, v), apex in zip(edges_of(triangle), (triangle[2], triangle[0], triangle[1]), strict=True):
+            assert side(beyond[v, u], apex) <= 0
+
+    def met(u: Point, v: Point) -> bool:
+        plane = plane_through(middle, u, v)
+        return plane is not None and side(plane, target) >= 0
+
+    assert sum(all(met(u, v) for u, v in edges_of(triangle)) for triangle in triangles) == 1
+    return merged(triangles)
+
+
 def edges_of(ring: Ring) -> Iterator[tuple[Point, Point]]:
     return zip(ring, ring[1:] + ring[:1], strict=True)
 

@@ -19,8 +19,8 @@ from zlib import crc32
 import exact
 import numpy as np
 from published import PUBLISHED
-from scipy.spatial import ConvexHull
-from strategies import directions, hull_points, overlapping_points, quaternion, rotation, turn
+from scipy.spatial import ConvexHull, cKDTree
+from strategies import directions, hull_points, overlapping_points, quaternion, reach, rotation, turn
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
 
@@ -70,13 +70,18 @@ class Case:
         return f"{self.family}[{self.seed}] {self.detail} {self.parameter:.3g}"
 
     @property
+    def round(self) -> bool:
+        """Whether there are bodies that are no polytopes, so that there is no exact truth but a closed form."""
+        return any(isinstance(body, Placed) for body in self.bodies)
+
+    @property
     def placed(self) -> list:
         """What `overlap` is given."""
         return [placed(body) for body in self.bodies]
 
     @cached_property
     def solids(self) -> list[exact.Polytope]:
-        return [exact.hull(points_of(body)) for body in self.bodies if not isinstance(body, Below)]
+        return [solid(points_of(body)) for body in self.bodies if not isinstance(body, Below)]
 
     @cached_property
     def truth(self) -> exact.Polytope:
@@ -114,6 +119,13 @@ def placed(body):
         shape, *pose = body
         return Placed(Hull(shape) if isinstance(body, Posed) else Box(shape), *pose)
     return body
+
+
+def solid(points):
+    """The exact hull; of many points from a suggestion, which is seen to be right."""
+    if len(points) < 1000:
+        return exact.hull(points)
+    return exact.checked_hull(points, ConvexHull(points).simplices.tolist())
 
 
 def points_of(body):
@@ -207,8 +219,7 @@ def icosphere(subdivisions):
     reach = 1.2
     for _ in range(subdivisions):
         cloud = np.array(points)
-        near = np.linalg.norm(cloud[:, None] - cloud[None], axis=2) < reach
-        middles = [cloud[i] + cloud[j] for i, j in zip(*np.nonzero(np.triu(near, 1)))]
+        middles = [cloud[i] + cloud[j] for i, j in sorted(cKDTree(cloud).query_pairs(reach))]
         points += [m / np.linalg.norm(m) for m in middles]
         reach *= 0.55
     return np.array(points)
@@ -427,6 +438,19 @@ def fine_round_hulls(rng):
     return Case("box", depth, (ball, turned(rng, CORNERS) + [2 - depth, 0, 0]))
 
 
+def finest_round_hulls(rng):
+    """Icospheres of 5120 and 20480 facets, `parameter` of them, cut by a half-space and perhaps a tetrahedron there."""
+    subdivisions, depth = int(rng.integers(4, 6)), float(rng.choice([1.0, 1e-2, 1e-5]))
+    ball, away = icosphere(subdivisions), directions(rng, 1)[0]
+    top = (ball @ away).max()
+    bodies = [ball, Below(tuple((-away).tolist()), float(depth - top))]
+    way = "half-space"
+    if rng.random() < 0.5:
+        way, tetrahedron = "tetrahedron", turned(rng, TETRA)
+        bodies.append(tetrahedron + away * (top - (tetrahedron @ away).min() - depth / 2))
+    return Case(way, 20.0 * 4**subdivisions, tuple(bodies))
+
+
 def prisms(rng):
     """Prisms of up to 256 sides: one in another, crossed, and stacked on a common flat; `parameter` is the number."""
     sides = int(rng.choice([16, 64, 256]))
@@ -625,6 +649,24 @@ def lenses(rng):
     return Case(way, depth, (ball, floor), float(h * h * (3 * Fraction(r) - h) / 3) * pi)
 
 
+def posed_round(rng):
+    """Two of ball, capsule, cylinder and box, at random poses: into each other by `parameter` or so. There is no closed
+    form, and the bracket of the proof is the truth."""
+    choices = [
+        Sphere(rng.uniform(0.3, 1)),
+        Capsule(rng.uniform(0.1, 1), rng.uniform(0, 2)),
+        Cylinder(*rng.uniform(0.2, 2, 2)),
+        Box(rng.uniform(0.2, 1, 3)),
+    ]
+    a, b = choices[int(rng.integers(3))], choices[int(rng.integers(4))]
+    depth = float(rng.choice([0.3, 1e-2, 1e-4, 1e-8, -1e-8, -1e-2]))
+    axis, p, q = directions(rng, 1)[0], quaternion(rng), quaternion(rng)
+    room = reach(Placed(a, orientation=p), axis) + reach(Placed(b, orientation=q), -axis)
+    where = rng.normal(size=3)
+    bodies = (Placed(a, where, p), Placed(b, where + axis * (room - depth), q))
+    return Case(f"{type(a).__name__} and {type(b).__name__}", depth, bodies)
+
+
 def lens(r, s, d):
     """The volume of two balls' common part, their centres d apart, each outside of the other."""
     return float((r + s - d) ** 2 * (d * d + 2 * d * (r + s) - 3 * (r - s) ** 2) / (12 * d)) * pi
@@ -635,9 +677,9 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
     for family in (
         general, posed, posed_boxes, posed_slivers, slivers, tilted_slivers, touching, parallel_edges,
         nearly_touching, identical, shared_planes, shared_facets, nested_flush, needles_and_plates,
-        stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls, prisms,
-        pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds, many_bodies, crowds, empty_triples,
-        slender_groups, half_spaces, half_spaces_alone, lenses,
+        stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
+        finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
+        many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
     )
 }  # fmt: skip
 

@@ -11,6 +11,18 @@ import numpy as np
 
 FCL = "https://github.com/flexible-collision-library/fcl/issues/"
 DRAKE = "https://github.com/RobotLocomotion/drake/issues/"
+HULL_OF_BULLET = np.array(  # on which btConvexHullComputer fell; the thread has no second body, so it meets itself
+    [
+        (2.0, 3.535533905932738, 3.535533905932737),
+        (4.0, 2.0, 0.0),
+        (0.0, 2.0, 0.0),
+        (1.0, 0.0, 0.0),
+        (4.0, 1.414213562373095, 1.414213562373095),
+        (0.0, 1.414213562373095, 1.414213562373095),
+        (3.0, 0.0, 0.0),
+        (2.0, 5.0, 0.0),
+    ]
+)
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 UPRIGHT = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
@@ -51,6 +63,11 @@ class Pair(NamedTuple):
 def box(size, rotation=UPRIGHT, position=(0, 0, 0)) -> Body:
     """By its full lengths."""
     return Body(CORNERS * size, rotation, position)
+
+
+def upright_prism(*corners) -> np.ndarray:
+    """From z = 0 to z = 300, as single precision has the corners."""
+    return np.array([(x, y, z) for x, y in corners for z in (0, 300)], np.float32).astype(float)
 
 
 PUBLISHED = (
@@ -250,4 +267,31 @@ PUBLISHED = (
             )
         ),
     ),
+    Pair(
+        "https://github.com/MattiaMontanari/openGJK/issues/52",
+        Body(upright_prism((90945.08, 54122.54), (91077.46, 53745.082), (91454.92, 53877.46), (91322.54, 54254.918))),
+        Body(upright_prism((90919.64, 54037.383), (91162.62, 53719.637), (91480.36, 53962.617), (91237.38, 54280.363))),
+    ),
+    Pair(
+        "https://github.com/coal-library/coal/issues/604",
+        box(
+            (0.363, 0.277, 0.363),
+            (
+                (0.9999195703, 0.01021849413, 0.007512347878),
+                (-0.01021878248, 0.9999477869, -3.329855922e-17),
+                (-0.007511955635, -7.676704888e-05, 0.9999717819),
+            ),
+            (1.503354966, -0.8531707835, 0.7700092418),
+        ),
+        box(
+            (0.363, 0.363, 0.277),
+            (
+                (0.9998670967, -0.01297708324, 0.009868343982),
+                (0.01297771517, 0.9999157859, 5.255670031e-17),
+                (-0.009867512928, 0.0001280685574, 0.9999513067),
+            ),
+            (1.48838308, -1.102020834, 0.4497073799),
+        ),
+    ),
+    Pair("https://github.com/bulletphysics/bullet3/issues/262", Body(HULL_OF_BULLET), Body(HULL_OF_BULLET)),
 )

@@ -8,12 +8,14 @@ import pytest
 import rules
 from families import FAMILIES, cases, icosphere, make
 from published import PUBLISHED
+from scipy.spatial import ConvexHull
 
 from overlapper import Hull
 
 SEED = 2026
 AFFORDABLE = {  # seeds whose exact truth takes less than half a second
     "fine_round_hulls": (2026, 2027),
+    "finest_round_hulls": (2027,),
     "prisms": (2026, 2029, 2031, 2033, 2034, 2036, 2037),
     "lenses": range(SEED, SEED + 40),
 }
@@ -137,6 +139,16 @@ def test_published_pairs_are_as_near_as_their_threads_say():
     depth = {pair.thread: exact.depth_squared(*map(exact.hull, pair.bodies())) for pair in PUBLISHED}
     assert float(depth["https://github.com/danfis/libccd/issues/25"]) == pytest.approx(0.1**2)
     assert depth["https://github.com/flexible-collision-library/fcl/issues/495"] < Fraction(1e-15) ** 2
+
+
+def test_the_hull_from_a_suggestion_is_the_hull():
+    points = icosphere(1)
+    triangles = ConvexHull(points).simplices.tolist()
+    assert {*exact.checked_hull(points, triangles).planes} == {*exact.hull(points).planes}
+    with pytest.raises((AssertionError, KeyError)):
+        exact.checked_hull(points, triangles[1:])
+    with pytest.raises(AssertionError):
+        exact.checked_hull(np.vstack([points, [[0.9, 0.9, 0.9]]]), triangles)
 
 
 @pytest.mark.parametrize("subdivisions", range(4))
