@@ -96,6 +96,21 @@ def sizes_are_not_negative(case: Case, found: Overlap) -> str:
     return "" if min(found.volume, found.volume_error, found.area) >= 0 else "a volume, area or error is negative"
 
 
+def the_way_out_agrees_with_the_status(case: Case, found: Overlap) -> str:
+    if len(case.bodies) != 2:
+        return ""
+    signs = {"separated": (True, False), "touching": (False, False), "overlapping": (False, True)}[found.status]
+    return (
+        ""
+        if (found.distance > 0, found.depth > 0) == signs
+        else (f"{found.status}, at distance {found.distance} and depth {found.depth}")
+    )
+
+
+def an_overlap_has_a_volume_and_a_surface(case: Case, found: Overlap) -> str:
+    return "" if (found.volume > 0 and found.area > 0) == bool(found) else f"{found.status}, with volume {found.volume}"
+
+
 def a_ball_in_common_is_an_overlap(case: Case, found: Overlap) -> str:
     if case.round:
         return f"{found.status}, with a volume in common" if case.closed_form and not found else ""
@@ -249,6 +264,8 @@ def volumes_agree(one: Overlap, other: Overlap) -> str:
 UNPROVED: tuple[Rule, ...] = (
     figures_are_finite,
     sizes_are_not_negative,
+    the_way_out_agrees_with_the_status,
+    an_overlap_has_a_volume_and_a_surface,
     a_ball_in_common_is_an_overlap,
     bodies_apart_are_separated,
     exact_contact_touches,

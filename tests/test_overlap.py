@@ -724,3 +724,15 @@ def test_settings_that_make_no_sense_are_named_in_one_sentence(settings, message
     with pytest.raises((TypeError, ValueError)) as refused:
         overlap(Sphere(1), Sphere(1), **settings)
     assert str(refused.value) == message
+
+
+@pytest.mark.parametrize("radius", [1e-4, 2.0**-27, 1e-12])
+@pytest.mark.parametrize("turn", [(0, 0, 0, 1), (0, 0, 0.00097656203433904576, 0.99999952316318286)])
+def test_thin_wires_side_by_side_share_a_lens_all_along(radius, turn):
+    apart = radius / 8
+    wires = Placed(Capsule(radius, 1)), Placed(Capsule(radius, 1), (-apart, 0, 0), turn)
+    found = overlap(*wires, tolerance=0.0125)
+    across = 2 * radius**2 * np.arccos(1 / 16) - apart / 2 * np.sqrt(4 * radius**2 - apart**2)
+    assert abs(found.volume - across) <= found.volume_error + 2 * np.pi * radius**3
+    assert found.volume_error <= 0.0125 * across
+    assert found.area == pytest.approx(4 * radius * np.arccos(1 / 16), rel=0.01)

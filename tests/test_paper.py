@@ -99,3 +99,13 @@ def test_paper_takes_boxes_at_any_pose():
         a, b = (Placed(Box(rng.uniform(0.3, 1, 3)), rng.normal(size=3) * 0.2, quaternion(rng)) for _ in range(2))
         paper, auto = overlap(a, b, method="paper"), overlap(a, b)
         assert paper.volume == pytest.approx(auto.volume, rel=1e-9)
+
+
+def test_a_half_space_far_from_a_tiny_ball_cuts_off_all_or_nothing():
+    far = Placed(HalfSpace([0, 1, 2], 6), (-1, 0, 0), (0, -0.99893578348605228, 0, 0.046122667649506732))
+    ball = Placed(Sphere(2e-12), (-0.75, 1, -1))
+    inside, outside = overlap(far, ball, tolerance=0.025, method="paper"), overlap(ball, far, method="auto")
+    assert inside.status == outside.status == "overlapping"
+    assert inside.volume == pytest.approx(4 / 3 * np.pi * 8e-36, rel=0.05)
+    ridges = sum(map(len, inside.facets)) / 2
+    assert len(inside.vertices) - ridges + len(inside.facets) == 2

@@ -8,7 +8,6 @@
 #include "canonical_order.h"
 #include "closed_forms.h"
 #include "expanding_hull.h"
-#include "minkowski.h"
 #include "paper.h"
 #include "predicates.h"
 #include "wide_gap.h"
@@ -371,6 +370,26 @@ std::vector<std::array<double, 6>> Overlap::gradient() const {
   return rows;
 }
 
+Distance Overlap::wide_distance(double reach) const {
+  const std::vector<WideBody> bodies = wide_bodies();
+  const WideGap gap = wide_gap(bodies[0], bodies[1], wide_noise(reach));
+  return {gap.distance, gap.certified, gap.normal, rounded(gap.witness_a), rounded(gap.witness_b)};
+}
+
+/// The shortest way out along one of the normals or of those of the planes between which the deepest ball lies.
+Penetration Overlap::parting(std::vector<Vec3> normals) const {
+  const std::vector<WideBody> bodies = wide_bodies();
+  if (!clipped_ && method_ == Method::kAuto && search().wide_ball)
+    for (const auto& [plane, owner] : search().wide_ball->cuts)
+      if (owner >= 0) normals.push_back(owner == 0 ? -rounded(plane.normal) : rounded(plane.normal));
+  Penetration least{std::numeric_limits<double>::infinity(), {}};
+  for (Vec3 normal : normals) {
+    const double depth = wide_depth(bodies[0], bodies[1], wide(normal));
+    if (depth < least.depth) least = {depth, normal};
+  }
+  return least;
+}
+
 const Overlap::Contact& Overlap::contact() const {
   assert(pair());
   const std::scoped_lock lock(mutex_);
@@ -379,16 +398,20 @@ const Overlap::Contact& Overlap::contact() const {
   Contact contact;
   const auto& [order, relative, reference] = arrangement();
   const Placed &a = relative[0], &b = relative[1];
+  const double reach = std::max(magnitude(a), magnitude(b));
+  const bool doubtful = method_ == Method::kAuto && !clipped_ && search().wide_ball;
   if (status_ == Status::kOverlapping) {
-    const Penetration p = penetration(a, b);
-    contact.depth = std::max(0.0, p.depth);
+    Penetration p = penetration(a, b);
+    if (doubtful || p.depth <= doubt(reach)) p = parting({p.normal});
+    contact.depth = p.depth;
     contact.normal = p.normal;
   } else {
-    const Distance d = overlapper::distance(a, b);
+    Distance d = overlapper::distance(a, b);
+    if (!(d.gap > doubt(reach)) && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(reach);
     contact.normal = d.normal;
     // Where the bodies touch, the line between the witness points may be all rounding; the way out is not.
-    if (norm2(d.normal) == 0 || d.gap < 0) contact.normal = penetration(a, b).normal;
-    contact.distance = status_ == Status::kSeparated ? std::max(0.0, d.distance) : 0;
+    if (status_ == Status::kTouching && !(d.gap > 0)) contact.normal = parting({penetration(a, b).normal}).normal;
+    contact.distance = status_ == Status::kSeparated ? d.distance : 0;
     contact.witness_a = d.witness_a + reference;
     contact.witness_b = d.witness_b + reference;
     // Half-way between the supports; a half-space reaches to its witness point.

@@ -7,6 +7,7 @@
 
 #include "clip.h"
 #include "common_point.h"
+#include "minkowski.h"
 #include "region.h"
 #include "shape.h"
 #include "surface.h"
@@ -100,6 +101,8 @@ class Overlap {
   const Search& search() const;
   void settle_in_wide_arithmetic(Search& search) const;
   std::vector<WideBody> wide_bodies() const;
+  Distance wide_distance(double reach) const;
+  Penetration parting(std::vector<Vec3> normals) const;
   Region grown_about(const WideBall& ball, double reach) const;
   const Region& grown() const;
   const Quantities& measured() const;

@@ -49,12 +49,12 @@ Hull stand_in(const Plane& plane, std::span<const Placed> bodies) {
   }
   if (reach == 0) throw std::invalid_argument("shapes must have a bounded one among them for method 'paper'");
   const Vec3 n = plane.normal, u = any_orthogonal(n), v = cross(n, u);
-  const double depth = std::max(0.0, reach + plane.offset);
+  // A plane farther away than that cuts off all or nothing, and the cube would be a needle.
+  const double offset = std::clamp(plane.offset, -2 * reach, 2 * reach), depth = std::max(0.0, reach + offset);
   std::vector<Vec3> corners;
   for (double a : {-2.0, 2.0})
     for (double b : {-2.0, 2.0})
-      for (double c : {0.0, -2 * depth - reach})
-        corners.push_back(a * reach * u + b * reach * v + (plane.offset + c) * n);
+      for (double c : {0.0, -2 * depth - reach}) corners.push_back(a * reach * u + b * reach * v + (offset + c) * n);
   return make_hull(corners);
 }
 

@@ -104,9 +104,9 @@ Plane Capsule::ray_exit(Vec3 origin, Vec3 d) const {
   // The ray meets the infinite cylinder past one end, so it has left through the ball around that end.
   const Vec3 end{0, 0, sign(past) * half};
   const Vec3 q = origin - end;
-  const double qq = norm2(q), qd = dot(q, d);
-  const double discriminant = std::max(0.0, qd * qd - norm2(d) * (qq - radius * radius));
-  const double t = (std::sqrt(discriminant) - qd) / norm2(d);
+  // Lagrange's identity: seen from afar, the difference of dot(q, d)² and |q|² |d|² would cancel.
+  const double discriminant = std::max(0.0, norm2(d) * radius * radius - norm2(cross(q, d)));
+  const double t = (std::sqrt(discriminant) - dot(q, d)) / norm2(d);
   return tangent(q + t * d, end, radius);
 }
 

@@ -32,10 +32,11 @@ WideVector leave_ball(const WideVector& q, const WideVector& d, double radius) {
 
 /// The same from a point that may be outside, for the far one of two crossings.
 WideVector leave_cap(const WideVector& q, const WideVector& d, double radius) {
-  const DoubleDouble length = norm(q), r{radius}, dd = dot(d, d), qd = dot(q, d);
-  DoubleDouble square = qd * qd + dd * ((r - length) * (r + length));
+  const WideVector across = wide_cross(q, d);
+  const DoubleDouble dd = dot(d, d);
+  DoubleDouble square = dd * two_product(radius, radius) - dot(across, across);
   if (square.head < 0) square = {};
-  return q + ((sqrt(square) - qd) / dd) * d;
+  return q + ((sqrt(square) - dot(q, d)) / dd) * d;
 }
 
 WidePlane ray_exit(const Sphere& s, const WideVector& origin, const WideVector& d) {

@@ -148,4 +148,11 @@ WideGap wide_gap(const WideBody& a, const WideBody& b, double noise) {
   return result;
 }
 
+double wide_depth(const WideBody& a, const WideBody& b, const WideVector& normal) {
+  if (!bounded(b.shape)) return -gap_above_plane(a, b).certified;
+  if (!bounded(a.shape)) return -gap_above_plane(b, a).certified;
+  const WideVector along = unit(normal);
+  return dot(along, b.support(along) - a.support(-along)).head;
+}
+
 }  // namespace overlapper

@@ -16,4 +16,8 @@ struct WideGap {
 /// the two may be a half-space.
 WideGap wide_gap(const WideBody& a, const WideBody& b, double noise);
 
+/// How far a has to move along `normal`, which points from b to a, until its support planes are those of b; negative if
+/// they are apart along it.
+double wide_depth(const WideBody& a, const WideBody& b, const WideVector& normal);
+
 }  // namespace overlapper
