@@ -91,11 +91,16 @@ def enclosed_volume(vertices: np.ndarray, rings: list[Ring]) -> float:
 
 
 def scipy_halfspaces(*bodies: np.ndarray) -> float:
+    from scipy.spatial import ConvexHull
+
+    return volume_of_halfspaces(np.vstack([ConvexHull(body).equations for body in bodies]))
+
+
+def volume_of_halfspaces(planes: np.ndarray) -> float:
     """The usual recipe: the centre of the largest ball by linear programming, then qhull's dual hull about it."""
     from scipy.optimize import linprog
     from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-    planes = np.vstack([ConvexHull(body).equations for body in bodies])
     slack = np.linalg.norm(planes[:, :3], axis=1)
     ball = linprog([0, 0, 0, -1], np.column_stack([planes[:, :3], slack]), -planes[:, 3], bounds=(None, None))
     if ball.status == 2 or (ball.status == 0 and ball.x[3] <= 0):  # 2: infeasible

@@ -307,12 +307,40 @@ def stability(
     ] = None,
 ) -> None:
     """Put hard cases to this package and to others, and chart who fails where: for a checkout, some minutes."""
-    script = Path(__file__).parents[1] / "benchmarks" / "stability.py"
-    if not script.is_file():
-        raise Refused("stability needs a checkout of overlapper, as its cases and peers are not installed")
     folder = [f"--out={out}"] if out else []
-    command = [sys.executable, str(script), f"--seed={seed}", f"--count={count}", *folder]
-    raise typer.Exit(subprocess.run(command).returncode)
+    _run_benchmark("stability", f"--seed={seed}", f"--count={count}", *folder)
+
+
+@app.command()
+def chart(
+    family: Annotated[
+        list[str] | None,
+        typer.Option(help="Measure these pairs only, such as 'box deep'; may be repeated.", show_default=False),
+    ] = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option(help="Ask these only, such as 'manifold3d'; may be repeated.", show_default=False),
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.0, help="About so long the methods take turns on a family.")] = 4.0,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for results, page and pictures; by default where the checkout has its own."),
+    ] = None,
+    page: Annotated[bool, typer.Option("--page", help="Only draw, from the results there are.")] = False,
+) -> None:
+    """Time this package and others on the same pairs and chart error over time: for a checkout, ten minutes.
+
+    Volumes are compared with the exact truth; the exit code is 1 if one of this package is wrong.
+    """
+    chosen = [f"--family={name}" for name in family or ()] + [f"--method={name}" for name in method or ()]
+    _run_benchmark("chart", f"--seconds={seconds}", *chosen, *([f"--out={out}"] if out else []), *["--page"] * page)
+
+
+def _run_benchmark(name: str, *options: str) -> None:
+    script = Path(__file__).parents[1] / "benchmarks" / f"{name}.py"
+    if not script.is_file():
+        raise Refused(f"{name} needs a checkout of overlapper, as its cases and peers are not installed")
+    raise typer.Exit(subprocess.run([sys.executable, str(script), *options]).returncode)
 
 
 def _hulls(source: str, query: str | None) -> Iterator[Hull]:

@@ -669,7 +669,11 @@ def posed_round(rng):
 
 def lens(r, s, d):
     """The volume of two balls' common part, their centres d apart, each outside of the other."""
-    return float((r + s - d) ** 2 * (d * d + 2 * d * (r + s) - 3 * (r - s) ** 2) / (12 * d)) * pi
+    return float(lens_over_pi(r, s, d)) * pi
+
+
+def lens_over_pi(r, s, d):
+    return (r + s - d) ** 2 * (d * d + 2 * d * (r + s) - 3 * (r - s) ** 2) / (12 * d)
 
 
 FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {

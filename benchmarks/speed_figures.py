@@ -1,0 +1,259 @@
+"""The charts of speed, each as PNG and SVG, from rows of the results; and one of them to hover over, as HTML."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from interleaved import Row
+from PIL import Image
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+INK, PALE = "#222222", "#e3e3e3"
+
+# Where an answer without any error is drawn: below the half-ulp of 1e-16.
+EXACT = 1e-17
+
+US = (0.1, 3e7)  # time per pair, from left to right
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a method is drawn; settings of one that are `joined` are a ladder from coarse to fine."""
+
+    colour: str
+    marker: str
+    joined: bool = False
+    size: float = 4.5
+    hollow: bool = False
+    ours: bool = False
+
+
+LOOKS = {
+    "auto": Look("#d1001f", "o", joined=True, size=7, ours=True),
+    "auto, batch": Look("#d1001f", "D", size=6, ours=True),
+    "paper": Look("#f08a00", "s", size=5.5),
+    "clipping": Look("#7a4a21", "v", size=5.5),
+    "scipy": Look("#1f5fbf", "^", size=6),
+    "manifold3d": Look("#1a8a3a", "P", size=7.5),
+    "trimesh": Look("#19a7a7", "X", size=7),
+    "Monte Carlo": Look("#8d8d8d", ".", joined=True, size=6),
+    "voxels": Look("#9467bd", "s", joined=True, size=3.5),
+    "auto, depth": Look("#d1001f", "o", size=6, hollow=True, ours=True),
+    "fcl, depth": Look("#1f5fbf", "^", hollow=True, size=5.5),
+    "coal, depth": Look("#000000", "s", hollow=True, size=5),
+}
+
+
+def style() -> None:
+    plt.rcParams.update(
+        {
+            "font.size": 8, "font.family": "DejaVu Sans", "axes.linewidth": 0.6, "axes.edgecolor": "#999999",
+            "svg.fonttype": "none", "svg.hashsalt": "overlapper", "xtick.major.size": 2, "ytick.major.size": 2,
+        }
+    )  # fmt: skip
+
+
+def save(figure: Figure, path: Path) -> None:
+    """As PNG with few colours, which flat charts stand, and as SVG without a date."""
+    figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})
+    figure.savefig(path.with_suffix(".png"), dpi=170)
+    plt.close(figure)
+    with Image.open(path.with_suffix(".png")) as image:
+        image.convert("RGB").quantize(128).save(path.with_suffix(".png"), optimize=True)
+
+
+# Error over time
+
+
+def accuracy(rows: list[Row], families: list[str], columns: int, path: Path, hover: Path | None = None) -> None:
+    """A panel for each family, every method at every setting a point."""
+    lines = -(-len(families) // columns)
+    size = (2.35 * columns + 0.4, 2.05 * lines + 1.1)
+    figure, axes = plt.subplots(lines, columns, figsize=size, sharex=True, sharey=True, squeeze=False)
+    words: dict[str, tuple[str, str]] = {}
+    for ax, family in zip(axes.flat, families):
+        panel(ax, family, [row for row in rows if row.family == family], words)
+    for ax in axes.flat[len(families) :]:
+        ax.set_axis_off()
+        above = axes.flat[list(axes.flat).index(ax) - columns]
+        above.tick_params(labelbottom=True)
+    for ax in axes[:, 0]:
+        ax.set_ylabel("error, relative")
+    for ax in axes[-1]:
+        ax.set_xlabel("time per pair")
+    top = 1 - 0.62 / size[1]
+    figure.legend(handles=list(legend()), ncols=6, loc="upper center", frameon=False, handletextpad=0.3)
+    figure.tight_layout(rect=(0, 0, 1, top), h_pad=0.6, w_pad=0.5)
+    if hover:
+        write_hover(hover, figure, words)
+    save(figure, path)
+
+
+def panel(ax: Axes, family: str, rows: list[Row], words: dict[str, tuple[str, str]]) -> None:
+    ax.set(xscale="log", yscale="log", xlim=US, ylim=(3e-18, 8))
+    ax.set_title(family, fontsize=8.5, fontweight="bold", loc="left", pad=3)
+    ax.set_xticks([1e0, 1e2, 1e4, 1e6], ["1 µs", "100 µs", "10 ms", "1 s"])
+    ax.set_yticks([EXACT, 1e-12, 1e-8, 1e-4, 1], ["none", "1e−12", "1e−8", "1e−4", "1"])
+    ax.minorticks_off()
+    ax.grid(color=PALE, lw=0.5)
+    ax.set_axisbelow(True)
+    for name, look in LOOKS.items():
+        found = [row for row in rows if row.method == name and row.us and row.error]
+        x = [float(row.us) for row in found]
+        y = [min(1.0, max(EXACT, float(row.error))) for row in found]
+        order = 5 if look.ours else 3
+        if look.joined and len(found) > 1:
+            ax.plot(x, y, color=look.colour, lw=1.0, alpha=0.6, zorder=order - 1)
+        for row, across, up in zip(found, x, y):
+            key = f"point{len(words)}"
+            words[key] = (row.method, spoken(row))
+            fill = "white" if look.hollow else look.colour
+            edge = look.colour if look.hollow else "white"
+            ax.plot(
+                across, up, look.marker, ms=look.size, mfc=fill, mec=edge, mew=1.1 if look.hollow else 0.6,
+                zorder=order, gid=key, clip_on=False,
+            )  # fmt: skip
+
+
+def legend() -> Iterator[Line2D]:
+    for name, look in LOOKS.items():
+        fill = "white" if look.hollow else look.colour
+        edge = look.colour if look.hollow else "white"
+        label = f"{name} (ours)" if look.ours else name
+        yield Line2D(
+            [], [], color=look.colour, lw=1.0 if look.joined else 0, marker=look.marker, ms=look.size, mfc=fill,
+            mec=edge, mew=1.1 if look.hollow else 0.6, label=label,
+        )  # fmt: skip
+
+
+def spoken(row: Row) -> str:
+    """A point in words, for those who hover over it."""
+    setting = f" at {row.setting}" if row.setting else ""
+    error = "without error" if float(row.error) == 0 else f"{row.quantity} off by {float(row.error):.1e}"
+    note = f" ({row.note})" if row.note else ""
+    return f"{row.family}: {row.method}{setting}, {duration(float(row.us))} a pair, {error}{note}"
+
+
+def duration(us: float) -> str:
+    for unit, least in (("s", 1e6), ("ms", 1e3)):
+        if us >= least:
+            return f"{us / least:.3g} {unit}"
+    return f"{us:.3g} µs"
+
+
+# Time over size
+
+
+def sizes(
+    lines: dict[str, dict[str, list[tuple[float, float]]]], slopes: dict[str, dict[str, float]], path: Path
+) -> None:
+    """A panel for each way to overlap; a line for each method, through (facets, µs), its slope named at the end."""
+    figure, axes = plt.subplots(1, len(lines), figsize=(9.4, 4.2), sharey=True)
+    for ax, (way, methods) in zip(axes, lines.items()):
+        ax.set(xscale="log", yscale="log", xlabel="facets of either mesh")
+        ax.set_title(way, fontsize=9.5, fontweight="bold", loc="left")
+        ax.grid(color=PALE, lw=0.5)
+        ax.minorticks_off()
+        ends = []
+        for name, points in methods.items():
+            look = LOOKS[name]
+            x, y = zip(*points)
+            ax.plot(
+                x, y, color=look.colour, marker=look.marker, ms=look.size, lw=2.2 if look.ours else 1.2, mec="white",
+                mew=0.5, zorder=5 if look.ours else 3,
+            )  # fmt: skip
+            slope = slopes[way].get(name)
+            ends.append((x[-1], y[-1], name + (f", {slope:.2f}" if slope is not None else ""), look))
+        ticks = sorted({x for points in methods.values() for x, _ in points})
+        ax.set_xticks(ticks, [f"{t:,.0f}" for t in ticks])
+        ax.set_xlim(min(ticks) / 1.3, max(ticks) * 14)
+        name_ends(ax, ends)
+    axes[0].set_ylabel("time per pair")
+    axes[0].set_yticks(
+        [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6], ["1 µs", "10 µs", "100 µs", "1 ms", "10 ms", "100 ms", "1 s"]
+    )
+    axes[0].minorticks_off()
+    figure.tight_layout(w_pad=1.0)
+    save(figure, path)
+
+
+def name_ends(ax: Axes, ends: list[tuple[float, float, str, Look]]) -> None:
+    """Names to the right of the last points, moved apart where they would lie on each other."""
+    low, high = np.log10(ax.get_ylim())
+    room = 0.052 * (high - low)
+    level = -np.inf
+    for x, y, name, look in sorted(ends, key=lambda end: end[1]):
+        level = max(np.log10(y), level + room)
+        weight = "bold" if look.ours else "normal"
+        ax.annotate(
+            name, (x, y), (max(e[0] for e in ends) * 1.35, 10**level), color=look.colour, fontsize=8, fontweight=weight,
+            va="center", annotation_clip=False,
+        )  # fmt: skip
+
+
+# To hover over
+
+PAGE = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><title>Error over time per pair</title>
+<style>
+body {{ margin: 1em; font: 15px "DejaVu Sans", Verdana, sans-serif; color: #222 }}
+svg {{ width: 100%; max-width: 1500px; height: auto }}
+.point {{ cursor: pointer }}
+.point:hover {{ stroke: #000; stroke-width: 3 }}
+.aside .point:not(.same) {{ opacity: 0.12 }}
+#words {{ position: fixed; display: none; padding: 4px 8px; background: #222; color: #fff; border-radius: 4px;
+  pointer-events: none; max-width: 30em; font-size: 13px }}
+</style>
+<h1>Error over time per pair</h1>
+<p>Point at a mark: its numbers are shown, and its method in all panels.</p>
+<div id="chart">{svg}</div><div id="words"></div>
+<script>
+const chart = document.getElementById("chart"), words = document.getElementById("words")
+for (const point of chart.querySelectorAll(".point")) {{
+  point.addEventListener("mousemove", event => {{
+    words.textContent = point.dataset.words
+    words.style.display = "block"
+    words.style.left = Math.min(event.clientX + 14, innerWidth - 380) + "px"
+    words.style.top = event.clientY + 14 + "px"
+  }})
+  point.addEventListener("mouseenter", () => {{
+    chart.classList.add("aside")
+    for (const other of chart.querySelectorAll(".point"))
+      other.classList.toggle("same", other.dataset.method === point.dataset.method)
+  }})
+  point.addEventListener("mouseleave", () => {{
+    chart.classList.remove("aside")
+    words.style.display = "none"
+  }})
+}}
+</script>
+</html>
+"""
+
+
+def write_hover(path: Path, figure: Figure, words: dict[str, tuple[str, str]]) -> None:
+    """The figure with words for every point, in a page that needs nothing else."""
+    ET.register_namespace("", "http://www.w3.org/2000/svg")
+    ET.register_namespace("xlink", "http://www.w3.org/1999/xlink")
+    drawn = StringIO()
+    figure.savefig(drawn, format="svg", metadata={"Date": None})
+    root = ET.fromstring(drawn.getvalue())
+    for group in root.iter("{http://www.w3.org/2000/svg}g"):
+        method, said = words.get(group.get("id", ""), ("", ""))
+        if said:
+            group.set("class", "point")
+            group.set("data-method", method)
+            group.set("data-words", said)
+    svg = ET.tostring(root, encoding="unicode")
+    path.write_text(PAGE.format(svg=svg), encoding="utf-8")
