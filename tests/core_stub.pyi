@@ -1,7 +1,7 @@
 """Convex shapes and the polytopes they share."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, overload
 
 import numpy
 import numpy.typing
@@ -476,6 +476,10 @@ class Overlap:
 
     def __setstate__(self, state: tuple[object, ...]) -> None: ...
 
+@overload
+def overlap(a: Placed, b: Placed, /) -> Overlap: ...
+
+@overload
 def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001, method: Literal['auto', 'paper'] = 'auto') -> Overlap:
     """
     The common set of two or more convex shapes.

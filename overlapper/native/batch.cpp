@@ -233,7 +233,7 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   const Body &a = bodies[pair.pair[0]], &b = bodies[pair.pair[1]];
   // The article's method has its own way of telling.
   const bool separated = by_method == Method::kAuto && apart(a, b, pair.axis);
-  next_rows[i] = separated ? Overlaps::Row{} : row_of(Overlap({a.placed, b.placed}, with_tolerance, by_method));
+  next_rows[i] = separated ? Overlaps::Row{} : row_of(Overlap(a.placed, b.placed, with_tolerance, by_method));
   done[i] = true;
   return separated;
 }

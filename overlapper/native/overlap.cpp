@@ -89,13 +89,23 @@ std::vector<OwnedPlane> facing_planes(std::span<const Placed> bodies, const Dist
 
 // --------------------------------------------------------------------------------------------------------------- Overlap
 
-Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
-    : bodies_(std::move(bodies)), tolerance_(tolerance), method_(method) {
-  if (bodies_.size() < 2) throw std::invalid_argument("shapes must be two or more");
-  if (!(tolerance > 0 && tolerance < 1))
+Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method) : tolerance_(tolerance), method_(method) {
+  if (bodies.size() < 2) throw std::invalid_argument("shapes must be two or more");
+  if (bodies.size() == 2) two_ = {std::move(bodies[0]), std::move(bodies[1])};
+  else bodies_ = std::move(bodies);
+  start();
+}
+
+Overlap::Overlap(const Placed& a, const Placed& b, double tolerance, Method method)
+    : two_{a, b}, tolerance_(tolerance), method_(method) {
+  start();
+}
+
+void Overlap::start() {
+  if (!(tolerance_ > 0 && tolerance_ < 1))
     throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
-  if (method == Method::kPaper) {
-    PaperResult result = intersect_as_in_paper(arrangement().relative, tolerance);
+  if (method_ == Method::kPaper) {
+    PaperResult result = intersect_as_in_paper(arrangement().relative, tolerance_);
     status_ = result.status;
     if (result.region) {
       lazy().region = owned_as_given(std::move(*result.region));
@@ -103,7 +113,7 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
     }
     return;
   }
-  if (pair()) clipped_ = clip(bodies_[0], bodies_[1]);
+  if (pair()) clipped_ = clip(two_[0], two_[1]);
   // What is too thin for clipping to measure may be too thin to be more than touching.
   if (clipped_ && clipped_->status == Status::kOverlapping && !clipped_->measured && !clipped_->traced)
     clipped_.reset();
@@ -112,7 +122,8 @@ Overlap::Overlap(std::vector<Placed> bodies, double tolerance, Method method)
 }
 
 Overlap::Overlap(Overlap&& other) noexcept
-    : bodies_(std::move(other.bodies_)),
+    : two_(std::move(other.two_)),
+      bodies_(std::move(other.bodies_)),
       tolerance_(other.tolerance_),
       method_(other.method_),
       status_(other.status_),
@@ -128,9 +139,9 @@ Overlap::Lazy& Overlap::lazy() const {
 const Overlap::Arrangement& Overlap::arrangement() const {
   std::optional<Arrangement>& kept = lazy().arrangement;
   if (kept) return *kept;
-  Arrangement arrangement{canonical_order(bodies_), {}, {}};
-  arrangement.reference = bodies_[arrangement.order[0]].pose.translation;
-  for (int body : arrangement.order) arrangement.relative.push_back(bodies_[body].seen_from(arrangement.reference));
+  Arrangement arrangement{canonical_order(bodies()), {}, {}};
+  arrangement.reference = bodies()[arrangement.order[0]].pose.translation;
+  for (int body : arrangement.order) arrangement.relative.push_back(bodies()[body].seen_from(arrangement.reference));
   return kept.emplace(std::move(arrangement));
 }
 
@@ -154,7 +165,7 @@ const Overlap::Search& Overlap::search() const {
     search.status = Status::kTouching;
     settle_in_wide_arithmetic(search);
   }
-  if (search.status != Status::kSeparated && !bounds_space(bodies_))
+  if (search.status != Status::kSeparated && !bounds_space(bodies()))
     throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
   return kept.emplace(std::move(search));
 }
@@ -217,7 +228,7 @@ double Overlap::volume_error() const {
   const double claimed = volume();
   const std::scoped_lock lock(mutex_);
   if (!lazy().error_of_paper) {
-    const Overlap judge(bodies_, tolerance_, Method::kAuto);
+    const Overlap judge({bodies().begin(), bodies().end()}, tolerance_, Method::kAuto);
     lazy().error_of_paper = std::abs(claimed - judge.volume()) + judge.volume_error();
   }
   return *lazy().error_of_paper;
@@ -245,7 +256,7 @@ int Overlap::facets_touched() const {
 double Overlap::touching_volume(const DeepestBall& ball) const {
   double least = std::numeric_limits<double>::infinity();
   const double inradius = std::max(0.0, ball.upper) + ball.rounding;
-  for (const Placed& body : bodies_) {
+  for (const Placed& body : bodies()) {
     if (!bounded(body.shape)) continue;
     const Bounds box = bounds(body);
     const Vec3 side = box.upper - box.lower;
@@ -306,7 +317,7 @@ const Quantities& Overlap::measured() const {
     }
   }
   kept = measure(grown());
-  if (std::any_of(bodies_.begin(), bodies_.end(), smooth_body)) return *kept;
+  if (std::ranges::any_of(bodies(), smooth_body)) return *kept;
   const auto enough = [&] { return kept->volume_error <= kEnough * kept->volume; };
   const auto keep_better = [&](const Region& region) {
     Quantities again = measure(region);
@@ -348,11 +359,11 @@ Mat3 Overlap::inertia() const {
 const Surface& Overlap::surface() const {
   const std::scoped_lock lock(mutex_);
   std::optional<Surface>& kept = lazy().surface;
-  return kept ? *kept : kept.emplace(surface_of(grown(), static_cast<int>(bodies_.size())));
+  return kept ? *kept : kept.emplace(surface_of(grown(), static_cast<int>(bodies().size())));
 }
 
 std::vector<std::array<double, 6>> Overlap::gradient() const {
-  std::vector<std::array<double, 6>> rows(bodies_.size());
+  std::vector<std::array<double, 6>> rows(bodies().size());
   if (status_ != Status::kOverlapping) return rows;
   const auto pull = [&](int body, Vec3 force, Vec3 moment) {
     for (int i = 0; i < 3; ++i) rows[body][i] += force[i], rows[body][3 + i] += moment[i];
@@ -361,12 +372,12 @@ std::vector<std::array<double, 6>> Overlap::gradient() const {
     for (int body : {0, 1}) {
       const Vec3 force = body == 0 ? clipped_->pull : -clipped_->pull;
       const Vec3 moment = body == 0 ? clipped_->moment : -clipped_->moment;
-      pull(body, force, moment + cross(clipped_->centroid - bodies_[body].position, force));
+      pull(body, force, moment + cross(clipped_->centroid - bodies()[body].position, force));
     }
     return rows;
   }
   for (const Quantities::Pull& facet : quantities().pulls)
-    pull(facet.owner, facet.area_vector, cross(facet.centroid - bodies_[facet.owner].position, facet.area_vector));
+    pull(facet.owner, facet.area_vector, cross(facet.centroid - bodies()[facet.owner].position, facet.area_vector));
   return rows;
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "clip.h"
@@ -24,13 +26,14 @@ class Overlap {
   /// Throws std::invalid_argument if the common set is unbounded. `tolerance` is the fraction by which the polytope may
   /// have to shrink, about its inner point, to fit into smooth shapes; polyhedra are exact whatever it is.
   Overlap(std::vector<Placed> bodies, double tolerance, Method method);
+  Overlap(const Placed& a, const Placed& b, double tolerance, Method method);
   Overlap(Overlap&& other) noexcept;
 
-  const std::vector<Placed>& bodies() const { return bodies_; }
+  std::span<const Placed> bodies() const { return bodies_.empty() ? std::span<const Placed>(two_) : bodies_; }
   double tolerance() const { return tolerance_; }
   Method method() const { return method_; }
   Status status() const { return status_; }
-  bool pair() const { return bodies_.size() == 2; }
+  bool pair() const { return bodies_.empty(); }
   bool clipped() const { return measured_by_clipping_; }  ///< so that its measures are quickly had again
 
   /// m³; 0 unless overlapping.
@@ -109,7 +112,10 @@ class Overlap {
   double touching_volume(const DeepestBall& ball) const;
   Region owned_as_given(Region region) const;
 
-  std::vector<Placed> bodies_;
+  void start();
+
+  std::array<Placed, 2> two_;
+  std::vector<Placed> bodies_;  ///< if there are more than two
   double tolerance_;
   Method method_;
   Status status_ = Status::kSeparated;

@@ -166,12 +166,12 @@ void require(bool condition, const char* what) {
 
 bool sound(double value) { return std::isfinite(value) && value >= 0; }
 
-bool any_bounded(const std::vector<Placed>& bodies) {
+bool any_bounded(std::span<const Placed> bodies) {
   return std::any_of(bodies.begin(), bodies.end(), [](const Placed& b) { return bounded(b.shape); });
 }
 
 /// How far the bounded bodies reach from the origin.
-double extent(const std::vector<Placed>& bodies) {
+double extent(std::span<const Placed> bodies) {
   double reach = 0;
   for (const Placed& body : bodies) {
     reach = std::max(reach, norm(body.position));

@@ -26,9 +26,29 @@ Overlap make_overlap(std::vector<Placed> bodies, double tolerance, Method method
   return Overlap(std::move(bodies), tolerance, method);
 }
 
+/// True where the answer takes so few microseconds that letting other Python threads run meanwhile would double them.
+bool quick(const Shape& shape) {
+  const Hull* hull = std::get_if<Hull>(&shape);
+  return hull ? hull->data->planes.size() <= 64 : std::holds_alternative<Box>(shape) || !bounded(shape);
+}
+
+/// The answer is built where Python keeps it.
+nb::object overlap_of_pair(nb::handle type, const Placed& a, const Placed& b) {
+  nb::object answer = nb::inst_alloc(type);
+  const auto build = [&] { new (nb::inst_ptr<Overlap>(answer)) Overlap(a, b, 1e-3, Method::kAuto); };
+  if (quick(a.shape) && quick(b.shape)) {
+    build();
+  } else {
+    const nb::gil_scoped_release release;
+    build();
+  }
+  nb::inst_mark_ready(answer);
+  return answer;
+}
+
 /// Computes what the properties are about to read while other Python threads run.
 const Overlap& measured(const Overlap& o) {
-  if (solid(o)) {
+  if (solid(o) && !o.clipped()) {
     const nb::gil_scoped_release release;
     o.volume();
   }
@@ -262,6 +282,9 @@ double union_ratio(nb::handle a, nb::handle b, double tolerance) {
 
 void define_functions(nb::module_& m) {
   m.def(
+      "overlap", [type = nb::type<Overlap>()](const Placed& a, const Placed& b) { return overlap_of_pair(type, a, b); },
+      nb::sig("def overlap(a: Placed, b: Placed, /) -> Overlap"));
+  m.def(
       "overlap",
       [](nb::args shapes, nb::handle tolerance, nb::handle method) {
         return make_overlap(to_bodies(shapes), to_double(tolerance, "tolerance"), to_method(method));
@@ -321,8 +344,8 @@ distance is negative. Raises ValueError for two half-spaces.)");
 
 Method to_method(nb::handle value) {
   if (!nb::isinstance<nb::str>(value)) throw nb::type_error("method must be 'auto' or 'paper'");
+  if (PyUnicode_CompareWithASCIIString(value.ptr(), "auto") == 0) return Method::kAuto;
   const std::string name = nb::cast<std::string>(value);
-  if (name == "auto") return Method::kAuto;
   if (name == "paper") return Method::kPaper;
   fail("method", "must be 'auto' or 'paper', not '" + name + "'");
 }
