@@ -1,18 +1,21 @@
-"""The command line: scenes run, listed, checked and compared, polytopes intersected, and the chart of hard cases."""
+"""The command line: scenes run, seen, listed, checked and compared, polytopes intersected, the chart of hard cases."""
 
 from __future__ import annotations
 
 import ctypes
+import io
 import json
+import math
 import os
 import subprocess
 import sys
 import tempfile
+import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager, redirect_stdout
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager, redirect_stdout, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, Literal, NoReturn, TypeVar
 
 try:
     import typer
@@ -31,10 +34,14 @@ from overlapper.table_file import TABLES, origin
 
 if TYPE_CHECKING:
     from overlapper import Hull, Overlap
+    from overlapper.look import Look
+    from overlapper.playback import Playback, View
     from overlapper.regression import Frame
     from overlapper.summary import Summary
 
 LIBC = ctypes.CDLL(None)
+
+Step = TypeVar("Step")
 
 PICTURES_PER_SECOND = 30  # of simulated time: as smooth as a film, and a tenth of the size that every step would take
 
@@ -157,6 +164,69 @@ def run(
         _show(summary, finished, files)
     if not finished:
         raise typer.Exit(130)
+
+
+@app.command()
+def view(
+    source: Annotated[
+        str, typer.Argument(help="A scene, by name or path, or a table of one that was written.", show_default=False)
+    ],
+    html: Annotated[Path | None, typer.Option(help="Write a page for any browser; out/<name>.html by default.")] = None,
+    png: Annotated[Path | None, typer.Option(help="Draw a picture instead, without a browser.")] = None,
+    live: Annotated[bool, typer.Option("--live", help="Watch it in meshcat while it is simulated instead.")] = False,
+    steps: Annotated[int | None, typer.Option(min=1, help="Steps of a scene; by default as many as it says.")] = None,
+    step: Annotated[
+        int | None, typer.Option(min=1, help="Of the picture; by default the one in which most is shared.")
+    ] = None,
+    close: Annotated[bool, typer.Option("--close", help="The picture is of the largest overlap.")] = False,
+    overlaps: Annotated[
+        str, typer.Option(help="What is drawn of overlaps: faces, edges, vertices, marks.")
+    ] = "faces,marks",
+    overlaps_opacity: Annotated[float, typer.Option(help="From 0 to 1.")] = 1.0,
+    overlaps_front: Annotated[str | None, typer.Option(help="Colour from outside; the owners' if not given.")] = None,
+    overlaps_back: Annotated[str | None, typer.Option(help="Colour from inside, seen if opacity is below 1.")] = None,
+    bodies: Annotated[str, typer.Option(help="What is drawn of bodies: faces, edges, vertices.")] = "faces,edges",
+    bodies_opacity: Annotated[float, typer.Option(help="From 0 to 1.")] = 0.35,
+    bodies_front: Annotated[str | None, typer.Option(help="Colour from outside; their own if not given.")] = None,
+    bodies_back: Annotated[str | None, typer.Option(help="Colour from inside; not drawn if not given.")] = None,
+) -> None:
+    """See a scene, or a table of one: as a page with a time slider, as a picture, or live.
+
+    An expected file has all that is needed. Of any other table the scene is run again, as the table says it was, and
+    what is not as in the table is told.
+
+    Examples:
+
+    [bold]overlapper view franka_grasp[/bold]  a page to play, click and measure in: out/franka_grasp.html
+
+    [bold]overlapper view scenes/expected/box_pile.csv --png pile.png --close[/bold]  a picture for a report
+
+    [bold]overlapper view my_scene.py --live --bodies edges --overlaps-opacity 0.6[/bold]
+    """
+    if sum(map(bool, (html, png, live))) > 1:
+        raise Refused("--html, --png and --live do not go together: one at a time")
+    looks = (
+        _look("bodies", bodies, bodies_opacity, bodies_front, bodies_back),
+        _look("overlaps", overlaps, overlaps_opacity, overlaps_front, overlaps_back),
+    )
+    page = html or Path("out") / f"{Path(source).stem}.html"
+    with _quiet() as noise, _refusals(noise), _input_refusals():
+        with open(os.devnull, "wb") as nowhere, _diverted(2, nowhere):  # pybullet says on import when it was built
+            from overlapper.playback import play
+        playback = play(source, steps)
+        with closing(playback.views):
+            if live:
+                _live(playback, looks)
+            elif png:
+                _picture(playback, png, step, close, looks)
+            else:
+                _film(playback, page, looks)
+    for remark in playback.remarks:
+        print(f"overlapper: {remark}", file=sys.stderr)
+    if not live:
+        print(f"Written: {png or page}")
+    if not live and not png:
+        _open(page.resolve().as_uri())
 
 
 @app.command()
@@ -450,7 +520,7 @@ def _measure(
     return summary, True
 
 
-def _with_progress(frames: Iterable[Frame], name: str, steps: int) -> Iterator[Frame]:
+def _with_progress(frames: Iterable[Step], name: str, steps: int) -> Iterator[Step]:
     """The frames, counted by a bar on stderr if that is a terminal."""
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
@@ -458,17 +528,19 @@ def _with_progress(frames: Iterable[Frame], name: str, steps: int) -> Iterator[F
 
 
 @contextmanager
-def _recorder(path: Path) -> Iterator[Callable[[Frame], None]]:
+def _recorder(
+    path: Path, looks: Sequence[Look] = (), rate: float = PICTURES_PER_SECOND
+) -> Iterator[Callable[[Frame | View], None]]:
     """Records some of the frames it is called with, and writes the page in the end, however that comes."""
     from overlapper.viewer import Recording
 
     path.touch()  # better refused now than after the run
-    recording = Recording()
+    recording = Recording(*looks)
     shown = 0
 
-    def record(frame: Frame) -> None:
+    def record(frame: Frame | View) -> None:
         nonlocal shown
-        if frame.time * PICTURES_PER_SECOND >= shown:
+        if frame.time * rate >= shown:
             recording.add(frame.bodies, frame.contacts, frame.time)
             shown += 1
 
@@ -477,6 +549,63 @@ def _recorder(path: Path) -> Iterator[Callable[[Frame], None]]:
     finally:
         if shown:
             recording.save(path)
+
+
+def _film(playback: Playback, html: Path, looks: Sequence[Look]) -> None:
+    html.parent.mkdir(parents=True, exist_ok=True)
+    rate = math.inf if playback.sparse else PICTURES_PER_SECOND
+    with _recorder(html, looks, rate) as record, suppress(KeyboardInterrupt):
+        for view in _with_progress(playback.views, playback.name, playback.total):
+            record(view)
+
+
+def _picture(playback: Playback, png: Path, step: int | None, close: bool, looks: tuple[Look, Look]) -> None:
+    from overlapper import picture
+    from overlapper.playback import at_step, largest
+
+    views = _with_progress(playback.views, playback.name, playback.total)
+    view = at_step(views, step) if step else largest(views)
+    png.parent.mkdir(parents=True, exist_ok=True)
+    title = f"{playback.name}, step {view.step}, {view.time:.3f} s"
+    picture.save(png, view.bodies, view.contacts, title, close, looks)
+
+
+def _live(playback: Playback, looks: Sequence[Look]) -> None:
+    """As fast as the simulation is in the world, or as it can be; stays until it is interrupted, on a terminal."""
+    from overlapper.viewer import Viewer
+
+    with redirect_stdout(io.StringIO()):  # meshcat says where it is, too
+        viewer = Viewer(None, *looks)
+    with viewer, suppress(KeyboardInterrupt):
+        print(f"overlapper: {viewer.url} (Ctrl-C ends it)", file=sys.stderr, flush=True)
+        _open(viewer.url)
+        start, shown = time.monotonic(), 0
+        for view in playback.views:
+            if view.time * PICTURES_PER_SECOND >= shown or playback.sparse:
+                time.sleep(max(0.0, start + view.time - time.monotonic()))
+                viewer.show(view.bodies, view.contacts)
+                shown += 1
+        while sys.stderr.isatty():
+            time.sleep(3600)
+
+
+def _open(address: str) -> None:
+    """In a browser, for somebody who sits at a screen."""
+    if sys.stderr.isatty() and (sys.platform != "linux" or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ):
+        typer.launch(address)
+
+
+def _look(kind: str, parts: str, opacity: float, front: str | None, back: str | None) -> Look:
+    from overlapper.look import PARTS, Look
+
+    wanted = [part.strip() for part in parts.split(",") if part.strip()]
+    for part in wanted:
+        if part not in PARTS:
+            raise Refused(f"--{kind} must name some of {','.join(PARTS)}, not {part!r}")
+    try:
+        return Look(opacity=opacity, front=front, back=back, **{part: part in wanted for part in PARTS})
+    except ValueError as error:
+        raise Refused(f"--{kind}-{error}") from error
 
 
 @contextmanager

@@ -34,6 +34,7 @@ LINE = (0.91, 0.92, 0.94)  # edges and vertices of overlaps
 TOP, BOTTOM = (0.20, 0.23, 0.28), (0.09, 0.10, 0.13)  # of the background
 LIGHT = np.array([0.5, -0.8, 1.4]) / np.linalg.norm([0.5, -0.8, 1.4])  # the way to it
 FIELD_OF_VIEW = 35.0  # degrees, from bottom to top
+PARTS = ("faces", "edges", "vertices", "marks")  # what a Look may show
 MANY_FACETS = 100  # more than that are only of what is round
 
 

@@ -6,6 +6,7 @@ Every file says in its metadata what wrote it and with which settings; the units
 from __future__ import annotations
 
 import csv
+import itertools
 import os
 import re
 import shutil
@@ -19,7 +20,7 @@ from typing import Any, Protocol
 from overlapper import __version__
 from overlapper.table import COLUMNS, Row, Value
 
-__all__ = ["TABLES", "CsvTable", "ParquetTable", "SqliteTable", "Table", "read_csv", "read_table"]
+__all__ = ["TABLES", "CsvTable", "ParquetTable", "SqliteTable", "Table", "read_csv", "read_metadata", "read_table"]
 
 
 def origin() -> dict[str, str]:
@@ -189,6 +190,21 @@ TABLES: dict[str, Callable[[Path, Mapping[str, str] | None], Table]] = {
     ".parquet": ParquetTable,
     ".sqlite": SqliteTable,
 }
+
+
+def read_metadata(path: Path) -> dict[str, str]:
+    """What a table says of itself, by name: what wrote it and with which settings."""
+    if path.suffix in (".parquet", ".parts"):
+        import pyarrow.parquet
+
+        schema = pyarrow.parquet.ParquetDataset(path).schema
+        return {name.decode(): value.decode() for name, value in (schema.metadata or {}).items()}
+    if path.suffix == ".sqlite":
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=rw", uri=True)) as connection:
+            return dict(connection.execute("SELECT name, value FROM metadata"))
+    with path.open(encoding="utf-8") as file:
+        heading = itertools.takewhile(lambda line: line.startswith("# "), file)
+        return {name: value.strip() for name, colon, value in (line[2:].partition(": ") for line in heading) if colon}
 
 
 def read_table(path: Path) -> list[Row]:
