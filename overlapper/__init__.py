@@ -14,6 +14,7 @@ from overlapper._core import (
     Overlap,
     Overlaps,
     Placed,
+    RoundedHull,
     Sphere,
     distance,
     iou,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from overlapper.mesh_file import write_mesh as write_mesh
     from overlapper.sampling import random_polytope
 
-Shape = Box | Sphere | Capsule | Cylinder | Hull | HalfSpace
+Shape = Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace
 
 __version__ = _version("overlapper")
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "Overlap",
     "Overlaps",
     "Placed",
+    "RoundedHull",
     "Shape",
     "Sphere",
     "distance",

@@ -24,7 +24,7 @@ from itertools import combinations_with_replacement, product
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Shape, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere
 from overlapper.rational import Exact, RationalBody, cross, exact
 
 Floats = NDArray[np.float64]
@@ -68,7 +68,9 @@ class Difference:
 
     def __init__(self, a: RationalBody, b: RationalBody) -> None:
         self.bodies = (a, b)
-        self.radius = sum(body.shape.radius for body in (a, b) if isinstance(body.shape, Sphere | Capsule))
+        self.radius = sum(
+            body.shape.radius for body in (a, b) if isinstance(body.shape, Sphere | Capsule | RoundedHull)
+        )
         self.offset = a.position - b.position
         self.points: dict[tuple[float, ...], Exact] = {}
         self.lower = -math.inf
@@ -171,6 +173,8 @@ def _support(shape: Shape, direction: Floats) -> Floats:
             farthest = np.copysign(shape.half_extents, direction)
         case Hull():
             farthest = shape.vertices[np.argmax(shape.vertices @ direction)]
+        case RoundedHull():
+            farthest = _support(shape.core, direction)
         case Sphere():
             farthest = np.zeros(3)
         case Capsule():

@@ -50,13 +50,15 @@ class Leaf:
         hull         (n, 3) points
         concave mesh (t, 3, 3) corners of the triangles
         multisphere  (n, 4) centres and radii of the spheres whose convex hull it is
-    and is empty for every other kind ("height field", "capsule along x", ...).
+    and is empty for every other kind ("height field", "capsule along x", ...). `margin` is the collision margin that
+    Bullet lays around a hull.
     """
 
     kind: str
     position: NDArray[np.float64]
     orientation: NDArray[np.float64]
     figures: NDArray[np.float64]
+    margin: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +151,10 @@ class BulletFile:
         kind = KINDS.get(number, f"shape of Bullet's type {number}")
         if kind != "compound":
             kind, figures = self._figures(kind, address)
-            return [Leaf(kind, position, _quaternion(rotation), figures)]
+            convex = self._base(address, "btConvexInternalShapeData") if kind == "hull" else None
+            # The shortest decimal of a single precision number is the double that was once rounded to it.
+            margin = float(str(convex["m_collisionMargin"])) if convex is not None else 0.0
+            return [Leaf(kind, position, _quaternion(rotation), figures, margin)]
         children = int(self._at(address)[0]["m_childShapePtr"])
         leaves: list[Leaf] = []
         for child in self._at(children) if children else ():

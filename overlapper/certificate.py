@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Capsule, Cylinder, HalfSpace, Overlap, Sphere
+from overlapper import Capsule, Cylinder, HalfSpace, Overlap, RoundedHull, Sphere
 from overlapper.body_planes import BodyPlanes, Floats, supporting
 from overlapper.claims import Certificate, CertificateError, Overlapping, OwnedPlane, Separated, Touching, support_above
 from overlapper.clipping import BORDER, ClippedPolytope
@@ -36,6 +36,8 @@ def certificate(overlap: Overlap) -> Certificate:
     `verify()` of the result checks it in rational arithmetic, without the core, and returns (lower, upper) bounds of
     the common volume in m³ as fractions. CertificateError says why there is no certificate.
     """
+    if any(isinstance(body.shape, RoundedHull) for body in overlap.shapes):
+        raise CertificateError("rounded hulls have no certificate")
     bodies = [RationalBody(shape) for shape in overlap.shapes]
     match overlap.status:
         case "separated":

@@ -122,6 +122,10 @@ def run(
     concave_threshold: Annotated[
         float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
     ] = 0.05,
+    surface: Annotated[
+        Literal["nominal", "margin"],
+        typer.Option(help="Convex meshes as they are, or with the margin that Bullet lays around them."),
+    ] = "nominal",
     pairs: Annotated[
         Literal["simulated", "all"] | None,
         typer.Option(help="Pairs that the simulator lets collide, or all of different bodies; by default PAIRS."),
@@ -154,6 +158,7 @@ def run(
         "method": method,
         "concave": concave,
         "concave_threshold": concave_threshold,
+        "surface": surface,
         "pairs": pairs,
     }
     summary, finished = _measure(scene, steps, out, html, check is not None, per, geometry)

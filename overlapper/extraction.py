@@ -14,20 +14,21 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import count
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Shape, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Shape, Sphere
 from overlapper.bullet_file import BulletFile, Leaf, SavedBody
-from overlapper.decomposition import Decomposition, NotDecomposed, decompose
+from overlapper.decomposition import Decomposition, NotDecomposed, check_threshold, decompose
 from overlapper.quaternion import composed, rotated
 
 Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]
 Concave = Literal["decompose", "enclose", "skip"]
+Surface = Literal["nominal", "margin"]
 
 BASE = -1
 MULTIBODY, SOFT_BODY = 2, 3  # of getDynamicsInfo; 1 is a rigid body in maximal coordinates
@@ -81,11 +82,27 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
+class Settings:
+    """How shapes are modelled: see `simulation.Bodies`. ValueError if there is no such way."""
+
+    concave: Concave
+    threshold: float
+    surface: Surface
+
+    def __post_init__(self) -> None:
+        for name, choices in (("concave", get_args(Concave)), ("surface", get_args(Surface))):
+            if (chosen := getattr(self, name)) not in choices:
+                raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, not {chosen!r}")
+        check_threshold(self.threshold)
+
+
+@dataclass(frozen=True, slots=True)
 class Body:
     name: str
     link_names: dict[int, str]
     colors: dict[int, Color]
     parents: dict[int, int]  # of each link
+    margin: float  # of the base's outermost shape
     shape_count: int
     parts: tuple[Part, ...]
     skipped: tuple[Skipped, ...]
@@ -158,9 +175,7 @@ def _frictions(client: int, frictions: Mapping[int, float]) -> Iterator[None]:
             pybullet.changeDynamics(id, BASE, lateralFriction=friction, physicsClientId=client)
 
 
-def read_body(
-    client: int, id: int, file: BulletFile, saved: SavedBody | None, concave: Concave, threshold: float
-) -> Body:
+def read_body(client: int, id: int, file: BulletFile, saved: SavedBody | None, settings: Settings) -> Body:
     base, name = (text.decode(errors="replace") for text in pybullet.getBodyInfo(id, client))
     name = name or f"body {id}"
     joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
@@ -172,7 +187,7 @@ def read_body(
     decomposed: list[Decomposed] = []
     shape_count = 0 if saved else 1
     for link, each in leaves.items():
-        modelled, reasons, meshes = _modelled(link, each, concave, threshold)
+        modelled, reasons, meshes = _modelled(link, each, settings)
         parts += modelled
         shapes = len(modelled) + len(reasons)
         shape_count += shapes
@@ -186,7 +201,8 @@ def read_body(
         soft = _body_type(client, id) == SOFT_BODY
         skipped.append(Skipped(id, BASE, name, "a soft body is not modelled" if soft else "saveBullet leaves it out"))
     colors = _colors(client, id, link_names)
-    return Body(name, link_names, colors, parents, shape_count, tuple(parts), tuple(skipped), tuple(decomposed))
+    margin = pybullet.getDynamicsInfo(id, BASE, client)[11]
+    return Body(name, link_names, colors, parents, margin, shape_count, tuple(parts), tuple(skipped), tuple(decomposed))
 
 
 def _colors(client: int, id: int, links: Mapping[int, str]) -> dict[int, Color]:
@@ -223,7 +239,7 @@ def _in_double_precision(client: int, id: int, link: int, leaves: tuple[Leaf, ..
         if leaf.kind in MESHES:
             # A mesh file of many hulls is reported once.
             frame = min(frames, key=lambda other: sum(_gaps(leaf, other)), default=leaf)
-            other = replace(frame, kind=leaf.kind, figures=leaf.figures)
+            other = replace(frame, kind=leaf.kind, figures=leaf.figures, margin=leaf.margin)
         else:
             other = next(primitives, leaf)
         exact.append(other if _alike(leaf, other) else leaf)
@@ -266,7 +282,7 @@ def _gaps(a: Leaf, b: Leaf) -> tuple[float, float]:
 
 
 def _modelled(
-    link: int, leaves: tuple[Leaf, ...], concave: Concave, threshold: float
+    link: int, leaves: tuple[Leaf, ...], settings: Settings
 ) -> tuple[list[Part], list[str], list[tuple[range, Decomposition]]]:
     """The leaves of a link as shapes, a reason for each that has none, and which shapes are parts of a concave mesh."""
     parts: list[Part] = []
@@ -278,11 +294,12 @@ def _modelled(
         try:
             shapes: Sequence[Shape]
             if leaf.kind == "concave mesh":
-                mesh = _solid(leaf.figures.tobytes(), concave, threshold)
+                mesh = _solid(leaf.figures.tobytes(), settings)
                 shapes = mesh.parts
                 meshes.append((range(first, first + len(shapes)), mesh))
             else:
-                shapes = [_shape(leaf.kind, leaf.figures.tobytes())]
+                margin = leaf.margin if settings.surface == "margin" else 0.0
+                shapes = [_shape(leaf.kind, leaf.figures.tobytes(), margin)]
         except ValueError as error:
             reasons.append(str(error))
         else:
@@ -292,11 +309,11 @@ def _modelled(
     return parts, reasons, meshes
 
 
-def _solid(data: bytes, concave: Concave, threshold: float) -> Decomposition:
+def _solid(data: bytes, settings: Settings) -> Decomposition:
     """A concave mesh as convex parts. NotDecomposed says why there are none."""
-    if concave == "skip":
+    if settings.concave == "skip":
         raise NotDecomposed("a concave mesh is left out, as concave='skip' asks")
-    found = _decomposition(data, concave == "enclose", threshold)
+    found = _decomposition(data, settings.concave == "enclose", settings.threshold)
     if isinstance(found, NotDecomposed):
         raise NotDecomposed(str(found))
     return found
@@ -328,7 +345,7 @@ def _capsule(leaf: Leaf) -> Leaf:
 
 
 @lru_cache(maxsize=1024)
-def _shape(kind: str, data: bytes) -> Shape:
+def _shape(kind: str, data: bytes, margin: float) -> Shape:
     """The shape with these figures of a leaf; equal ones are one object. ValueError says why there is none."""
     figures = np.frombuffer(data)
     match kind:
@@ -343,7 +360,8 @@ def _shape(kind: str, data: bytes) -> Shape:
         case "plane":
             return HalfSpace(figures[:3], figures[3])
         case "hull":
-            return Hull(figures.reshape(-1, 3))
+            points = figures.reshape(-1, 3)
+            return RoundedHull(points, margin) if margin else Hull(points)
         case "multisphere":
             raise ValueError("the hull of unequal spheres is not modelled")
         case _:

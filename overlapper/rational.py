@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere
 
 Exact = NDArray[np.object_]  # of Fraction
 
@@ -131,6 +131,9 @@ class RationalBody:
                 return base + exact(box.half_extents) @ [abs(x), abs(y), abs(z)] / scale, Fraction(0)
             case Hull():
                 return base + Fraction(self._farthest(local), scale * self._corners[1]), Fraction(0)
+            case RoundedHull() as rounded:
+                tip = Fraction(self._farthest(local), scale * self._corners[1])
+                return base + tip, Fraction(rounded.radius) ** 2 * Fraction(local @ local, scale * scale)
             case Sphere() as ball:
                 return base, Fraction(ball.radius) ** 2 * Fraction(local @ local, scale * scale)
             case Capsule() as capsule:
@@ -148,8 +151,9 @@ class RationalBody:
 
     @cached_property
     def _corners(self) -> tuple[Exact, int]:
-        assert isinstance(self.shape, Hull)
-        return integers(exact(self.shape.corners))
+        assert isinstance(self.shape, Hull | RoundedHull)
+        hull = self.shape if isinstance(self.shape, Hull) else self.shape.core
+        return integers(exact(hull.corners))
 
     @cached_property
     def _corners_in_doubles(self) -> NDArray[np.float64]:
@@ -157,7 +161,7 @@ class RationalBody:
         return in_doubles(corners, 1 << bits(corners))
 
     def _farthest(self, direction: Exact) -> int:
-        """The greatest product with a corner of a hull, both in integers: doubles leave a few to choose from."""
+        """The greatest product with a corner, both in integers: doubles leave a few to choose from."""
         d = in_doubles(direction, 1 << bits(direction))
         along = self._corners_in_doubles @ d
         doubt = DOUBT * (abs(self._corners_in_doubles) @ abs(d)) + UNDERFLOW

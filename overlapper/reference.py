@@ -25,7 +25,7 @@ from typing import IO, Any, Literal
 
 import numpy as np
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, Shape, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, RoundedHull, Shape, Sphere
 from overlapper.arbiter import signed_distance_bounds
 
 try:
@@ -276,6 +276,8 @@ def _model(shape: Shape) -> Model:
             return "Capsule", (shape.radius, shape.length)
         case Cylinder():
             return "Cylinder", (shape.radius, shape.length)
+        case RoundedHull():
+            raise TypeError("shape must not be a rounded hull, of which FCL has none")
         case HalfSpace():
             return "Halfspace", (*shape.normal, shape.offset)
         case Hull():
@@ -290,6 +292,8 @@ def _request(overlap: Overlap) -> Request:
 def _unsupported(overlap: Overlap) -> str | None:
     if len(overlap.shapes) != 2:
         return f"FCL is asked about two bodies at a time, not {len(overlap.shapes)}."
+    if any(isinstance(body.shape, RoundedHull) for body in overlap.shapes):
+        return "FCL has no rounded hulls."
     if all(isinstance(body.shape, HalfSpace) for body in overlap.shapes):
         return "FCL gives no depth or distance of two half-spaces."
     return None

@@ -20,7 +20,7 @@ from overlapper.contacts import Contacts
 from overlapper.expected import DRIFT, MEASURES, ROUNDING, Budget, Expected, Key, read_expected
 from overlapper.scene import Scene, SceneError, Step, broken, load_scene
 from overlapper.shape_text import alike, shape_of, text_of
-from overlapper.simulation import Among, Bodies, Concave, Recorder
+from overlapper.simulation import Among, Bodies, Concave, Recorder, Surface
 from overlapper.table import Row, key, placements, rows
 from overlapper.table_file import origin
 
@@ -50,20 +50,23 @@ def run(
     only: Container[int] | None = None,
     concave: Concave = "decompose",
     concave_threshold: float = 0.05,
+    surface: Surface = "nominal",
     pairs: Among | None = None,
 ) -> Generator[Frame, None, None]:
     """Build the scene in a client of its own and step it, `scene.steps` times by default.
 
     Every step is a frame, the first has number 1; or only those in `only`, if given. `tolerance` and `method` are those
-    of `overlapper.overlap`, `concave` and `concave_threshold` of `Bodies`, `pairs` of `Bodies.overlaps`, by default as
-    the scene says; a recorder hears all that it tells pybullet. SceneError if the scene itself fails.
+    of `overlapper.overlap`, `concave`, `concave_threshold` and `surface` of `Bodies`, `pairs` of `Bodies.overlaps`, by
+    default as the scene says; a recorder hears all that it tells pybullet. SceneError if the scene itself fails.
     """
     client = pybullet.connect(pybullet.DIRECT)
     recorder = Recorder(client)
     among = scene.pairs if pairs is None else pairs
     try:
         step = _built(scene, client)
-        bodies = Bodies(client, concave=concave, concave_threshold=concave_threshold, recorder=recorder)
+        bodies = Bodies(
+            client, concave=concave, concave_threshold=concave_threshold, surface=surface, recorder=recorder
+        )
         seconds = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
         for i in range(steps or scene.steps):
             _controlled(scene, step, i)

@@ -10,7 +10,7 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Shape, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Shape, Sphere
 
 PARAMETERS: dict[type, tuple[str, ...]] = {
     Box: ("half_extents",),
@@ -19,7 +19,7 @@ PARAMETERS: dict[type, tuple[str, ...]] = {
     Cylinder: ("radius", "length"),
     HalfSpace: ("normal", "offset"),
 }
-KINDS = {kind.__name__: kind for kind in (*PARAMETERS, Hull)}
+KINDS = {kind.__name__: kind for kind in (*PARAMETERS, Hull, RoundedHull)}
 
 
 def text_of(shape: Shape) -> str:
@@ -27,10 +27,11 @@ def text_of(shape: Shape) -> str:
 
     The vertices of a hull are sorted, as little-endian doubles, deflated and in base 64: 20 characters each, mostly.
     """
-    if isinstance(shape, Hull):
-        vertices = shape.vertices[np.lexsort(shape.vertices.T[::-1])]
+    if isinstance(shape, Hull | RoundedHull):
+        hull, radius = (shape, []) if isinstance(shape, Hull) else (shape.core, [shape.radius])
+        vertices = hull.vertices[np.lexsort(hull.vertices.T[::-1])]
         packed = base64.b64encode(zlib.compress(vertices.astype("<f8").tobytes(), level=9)).decode()
-        return json.dumps(["Hull", packed])
+        return json.dumps([type(shape).__name__, packed, *radius])
     parameters = [np.asarray(getattr(shape, name)).tolist() for name in PARAMETERS[type(shape)]]
     return json.dumps([type(shape).__name__, *parameters])
 
@@ -39,9 +40,9 @@ def shape_of(text: str) -> Shape:
     """The shape of such a text. ValueError if it is none."""
     try:
         kind, *parameters = json.loads(text)
-        if kind == "Hull":
-            (packed,) = parameters
-            parameters = [np.frombuffer(zlib.decompress(base64.b64decode(packed)), "<f8").reshape(-1, 3)]
+        if kind in ("Hull", "RoundedHull"):
+            packed, *radius = parameters
+            parameters = [np.frombuffer(zlib.decompress(base64.b64decode(packed)), "<f8").reshape(-1, 3), *radius]
         shape: Shape = KINDS[kind](*parameters)
     except (ValueError, TypeError, KeyError, zlib.error, binascii.Error) as error:
         raise ValueError(f"{text[:60]!r} is no shape: {error}") from error
@@ -58,6 +59,6 @@ def alike(a: Shape, b: Shape) -> bool:
 
 def _figures(shape: Shape) -> NDArray[np.float64]:
     """What a shape of its kind is known by, lengths all of them; of a half-space, the normal and the offset."""
-    if isinstance(shape, Hull):
+    if isinstance(shape, Hull | RoundedHull):
         return np.hstack([np.cbrt(shape.volume), shape.centroid, shape.bounds.ravel()])
     return np.hstack([getattr(shape, name) for name in PARAMETERS[type(shape)]])

@@ -1,9 +1,8 @@
 """The collision shapes of a running pybullet simulation, and their overlaps.
 
-Shapes are read once, poses at every step. Surfaces are the nominal ones: Bullet itself lays a margin of 1 mm around
-convex hulls (mesh shapes, and the `<cylinder>` of a URDF, which Bullet makes a 32-gon hull), so that pybullet reports
-hulls 1 mm nearer than they are here, and MJCF capsules thinner than 4 cm wrongly. Pairs are those that the simulator
-lets collide.
+Shapes are read once, poses at every step. Surfaces are the nominal ones or, with surface="margin", those that Bullet
+collides with: it lays a margin of 1 mm around convex hulls (mesh shapes, and the `<cylinder>` of a URDF, which Bullet
+makes a 32-gon hull). Pairs are those that the simulator lets collide.
 """
 
 from __future__ import annotations
@@ -12,14 +11,13 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Batch, Overlaps, Placed, Shape, _core, overlaps
 from overlapper.contacts import Contact, Contacts
-from overlapper.decomposition import check_threshold
 
 try:
     import pybullet
@@ -33,7 +31,9 @@ try:
         Color,
         Concave,
         Decomposed,
+        Settings,
         Skipped,
+        Surface,
         body_ids,
         hides_pose,
         read_body,
@@ -56,6 +56,7 @@ __all__ = [
     "Report",
     "Skipped",
     "SkippedShapeWarning",
+    "Surface",
 ]
 
 Among = Literal["simulated", "all"] | Iterable[tuple[Who, Who]]
@@ -112,6 +113,11 @@ class Bodies:
     It takes up to minutes the first time, and needs the extra `concave`. A mesh whose surface is open bounds no volume
     and is skipped; with concave="enclose" CoACD lays walls around it. With concave="skip" all concave meshes are.
 
+    With surface="margin" convex meshes have the margin that Bullet lays around them, 1 mm by default, so that depths
+    are those of pybullet's contact distances. Boxes and cylinders are the same either way: their margin lies inside,
+    though Bullet rounds their edges by it in most pairs, which takes up to 0.73 mm off a corner. Convex parts of
+    concave meshes have none. A margin that changes is noticed by `update()` where `getDynamicsInfo` of the base tells.
+
     Pairs are those that pybullet lets collide, by static bases, groups and masks; a `recorder`, set up before the scene
     is built, adds what pybullet cannot be asked for: pair filters, the filter mode and self-collision. `pairs` and
     `overlaps` take other choices. Groups and masks are read again with new bodies, when a base becomes static or
@@ -132,16 +138,13 @@ class Bodies:
         *,
         concave: Concave = "decompose",
         concave_threshold: float = 0.05,
+        surface: Surface = "nominal",
         recorder: Recorder | None = None,
     ) -> None:
-        if concave not in get_args(Concave):
-            raise ValueError(f"concave must be one of {', '.join(map(repr, get_args(Concave)))}, not {concave!r}")
-        check_threshold(concave_threshold)
         if recorder and recorder.physicsClientId != physicsClientId:
             raise ValueError(f"recorder is of client {recorder.physicsClientId}, not of {physicsClientId}")
         self.physicsClientId = physicsClientId
-        self._concave: Concave = concave
-        self._threshold = concave_threshold
+        self._settings = Settings(concave, concave_threshold, surface)
         self._recorder = recorder
         self._marks = Marks(physicsClientId)
         self._bodies: dict[int, Body] = {}
@@ -265,7 +268,7 @@ class Bodies:
         if not pybullet.isConnected(client):
             raise ValueError(f"physicsClientId {client} is not connected to a physics server")
         skipped, fresh = [], False
-        if not self._marks.are_as_remembered():
+        if self._margins_changed() or not self._marks.are_as_remembered():
             # After a syncBodyInfo, pybullet would show the user data of a removed body on the one that inherits its id.
             pybullet.syncUserData(physicsClientId=client)
             ids = body_ids(client)
@@ -280,6 +283,18 @@ class Bodies:
             message = f"{each.name} (body {each.body}, link {each.link}) is left out: {each.reason}"
             # The caller of update() or of Bodies() is three calls up.
             warnings.warn(message, SkippedShapeWarning, stacklevel=3)
+
+    def _margins_changed(self) -> bool:
+        """Whether a base has another margin than before, where that counts; its body is then new."""
+        if self._settings.surface == "nominal":
+            return False
+        client = self.physicsClientId
+        watched = body_ids(client).intersection(self._poses.bodies)
+        margins = {id: pybullet.getDynamicsInfo(id, BASE, client)[11] for id in watched}
+        changed = [id for id, margin in margins.items() if margin != self._bodies[id].margin]
+        for id in changed:
+            del self._bodies[id]
+        return bool(changed)
 
     def _read(self) -> list[Skipped]:
         """Read the bodies that are not marked yet, forget those that are gone; what is newly skipped."""
@@ -299,7 +314,7 @@ class Bodies:
             self._rows = {id: rows[id] for id in hidden if id in rows}
         for id in fresh:
             body = file.bodies[rows[id]] if id in rows else None
-            known[id] = read_body(client, id, file, body, self._concave, self._threshold)
+            known[id] = read_body(client, id, file, body, self._settings)
             self._marks.put(id)
         self._bodies = dict(sorted(known.items()))
         grown, self._unidentified = unidentified > self._unidentified, unidentified

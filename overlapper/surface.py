@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Sphere
 
 Array = NDArray[np.float64]
 Facets = Sequence[NDArray[np.integer[Any]]]
@@ -31,8 +31,12 @@ class Surface:
     wires: Array
 
 
-def surface(shape: Box | Sphere | Capsule | Cylinder | Hull) -> Surface:
-    """The surface of a bounded shape; round ones within 0.3 % of the radius."""
+def surface(shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull) -> Surface:
+    """The surface of a bounded shape; round ones within 0.3 % of the radius, rounded hulls with bevelled edges."""
+    if isinstance(shape, RoundedHull):
+        core = shape.core
+        outward = [core.vertices[ring] + shape.radius * plane[:3] for ring, plane in zip(core.facets, core.halfspaces)]
+        shape = Hull(np.concatenate(outward))
     if isinstance(shape, Box | Hull):
         vertices, facets = _box(shape) if isinstance(shape, Box) else (shape.vertices, shape.facets)
         return Surface(vertices, triangles(facets), None, _creases(vertices, facets), vertices[polytope_edges(facets)])

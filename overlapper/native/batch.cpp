@@ -59,8 +59,8 @@ struct Body {
 
   /// How large the numbers are that its pose is made from, beside its reach: those of a hull far from its own origin.
   double leverage() const {
-    const Hull* hull = std::get_if<Hull>(&placed.shape);
-    return hull && norm2(hull->data->origin) > 0 ? norm(hull->data->origin) + norm(placed.position) : 0;
+    const HullData* hull = polytope_of(placed.shape);
+    return hull && norm2(hull->origin) > 0 ? norm(hull->origin) + norm(placed.position) : 0;
   }
 };
 

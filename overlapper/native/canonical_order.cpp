@@ -31,6 +31,11 @@ std::partial_ordering compare(const Hull& a, const Hull& b) {
                                                 [](Vec3 u, Vec3 v) { return compare(u, v); });
 }
 
+std::partial_ordering compare(const RoundedHull& a, const RoundedHull& b) {
+  const auto by_radius = a.radius <=> b.radius;
+  return by_radius != 0 ? by_radius : compare(a.core, b.core);
+}
+
 std::partial_ordering compare(const Placed& a, const Placed& b) {
   if (a.shape.index() != b.shape.index())
     return a.shape.index() < b.shape.index() ? std::partial_ordering::less : std::partial_ordering::greater;

@@ -389,6 +389,7 @@ std::optional<Quantities> closed_form(const Placed& a, const Placed& b, double r
   }
   if (!smooth_a && !smooth_b) return std::nullopt;
   const Placed& other = smooth_a ? b : a;
+  if (smooth(other.shape)) return std::nullopt;
   std::vector<Plane> planes;
   append_planes(other.shape, planes);
   for (Plane& plane : planes) plane = other.pose * plane;

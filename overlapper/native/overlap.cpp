@@ -23,11 +23,11 @@ double magnitude(const Placed& relative) {
   double reach = norm(max(abs(box.lower), abs(box.upper)));
   // A hull whose points were counted from far away has had that distance rotated and added, and the planes of facets
   // that are not quite flat miss their corners.
-  if (const Hull* hull = std::get_if<Hull>(&relative.shape)) {
-    const Vec3 origin = hull->data->origin;
+  if (const HullData* hull = polytope_of(relative.shape)) {
+    const Vec3 origin = hull->origin;
     const bool turned = relative.orientation.w != 1;
     if (norm2(origin) > 0 && (turned || norm2(relative.position) > 0)) reach += norm(origin) + norm(relative.position);
-    reach += hull->data->flatness / rounding(1);
+    reach += hull->flatness / rounding(1);
   }
   return reach;
 }
@@ -36,6 +36,7 @@ double magnitude(const Placed& relative) {
 constexpr double kEnough = 1e-12;
 
 bool smooth_body(const Placed& body) { return smooth(body.shape); }
+bool rounded_hull(const Placed& body) { return std::holds_alternative<RoundedHull>(body.shape); }
 
 /// True if one of the bodies is bounded, or the half-spaces close up: the origin is strictly inside the hull of their
 /// normals.
@@ -183,6 +184,8 @@ double wide_noise(double reach) { return 0x1p-96 * reach; }
 /// other axes and for another order.
 void Overlap::settle_in_wide_arithmetic(Search& search) const {
   const std::vector<Placed>& relative = arrangement().relative;
+  // Their oracle knows the nearest point of a polytope in doubles only.
+  if (std::any_of(relative.begin(), relative.end(), rounded_hull)) return;
   const double reach = *std::max_element(search.reach.begin(), search.reach.end()), noise = wide_noise(reach);
   double least_size = std::numeric_limits<double>::infinity(), largest_size = 0;
   for (const Placed& body : relative) {

@@ -209,6 +209,7 @@ double volume(const Shape& shape) {
     double operator()(const Cylinder& c) const { return std::numbers::pi * c.radius * c.radius * c.length; }
     double operator()(const Hull& h) const { return h.data->volume; }
     double operator()(const HalfSpace&) const { return kInfinity; }
+    double operator()(const RoundedHull& h) const { return h.volume(); }
   };
   return std::visit(Visitor{}, shape);
 }
@@ -216,6 +217,7 @@ double volume(const Shape& shape) {
 Vec3 centroid(const Shape& shape) {
   if (const Hull* hull = std::get_if<Hull>(&shape)) return hull->data->centroid;
   if (const HalfSpace* half = std::get_if<HalfSpace>(&shape)) return half->plane.offset * half->plane.normal;
+  if (const RoundedHull* hull = std::get_if<RoundedHull>(&shape)) return hull->centroid();
   return {};
 }
 
@@ -223,7 +225,7 @@ bool bounded(const Shape& shape) { return !std::holds_alternative<HalfSpace>(sha
 
 bool smooth(const Shape& shape) {
   return std::holds_alternative<Sphere>(shape) || std::holds_alternative<Capsule>(shape) ||
-         std::holds_alternative<Cylinder>(shape);
+         std::holds_alternative<Cylinder>(shape) || std::holds_alternative<RoundedHull>(shape);
 }
 
 void append_planes(const Shape& shape, std::vector<Plane>& planes) {
@@ -240,6 +242,9 @@ void append_planes(const Shape& shape, std::vector<Plane>& planes) {
     void operator()(const Cylinder& c) const { box_of({c.radius, c.radius, c.length / 2}); }
     void operator()(const Hull& h) const { out.insert(out.end(), h.data->planes.begin(), h.data->planes.end()); }
     void operator()(const HalfSpace& h) const { out.push_back(h.plane); }
+    void operator()(const RoundedHull& h) const {
+      for (const Plane& plane : h.core.data->planes) out.push_back({plane.normal, plane.offset + h.radius});
+    }
   };
   std::visit(Visitor{six, planes}, shape);
 }
@@ -247,7 +252,14 @@ void append_planes(const Shape& shape, std::vector<Plane>& planes) {
 double core_radius(const Shape& shape) {
   if (const Sphere* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
   if (const Capsule* capsule = std::get_if<Capsule>(&shape)) return capsule->radius;
+  if (const RoundedHull* hull = std::get_if<RoundedHull>(&shape)) return hull->radius;
   return 0;
+}
+
+const HullData* polytope_of(const Shape& shape) {
+  if (const Hull* hull = std::get_if<Hull>(&shape)) return hull->data.get();
+  if (const RoundedHull* hull = std::get_if<RoundedHull>(&shape)) return hull->core.data.get();
+  return nullptr;
 }
 
 Placed make_placed(Shape shape, Vec3 position, Quaternion orientation) {
@@ -267,7 +279,7 @@ void Placed::move_to(Vec3 new_position, Quaternion q) {
   position = new_position;
   orientation = q;
   pose = {rotation_matrix(q), new_position};
-  if (const Hull* hull = std::get_if<Hull>(&shape)) pose.translation = pose * hull->data->origin;
+  if (const HullData* hull = polytope_of(shape)) pose.translation = pose * hull->origin;
 }
 
 Vec3 Placed::support(Vec3 direction) const {
@@ -281,6 +293,8 @@ Vec3 Placed::core_support(Vec3 direction) const {
     const Vec3 along = pose.rotation * Vec3{0, 0, capsule->length / 2};
     return pose.translation + (dot(along, direction) < 0 ? -along : along);
   }
+  if (const RoundedHull* hull = std::get_if<RoundedHull>(&shape))
+    return pose * hull->core.support(apply_transposed(pose.rotation, direction));
   return support(direction);
 }
 
@@ -584,6 +598,7 @@ Hull make_hull(std::span<const Vec3> points) {
 
 Hull tessellated(const Shape& shape, double tolerance) {
   if (const Hull* hull = std::get_if<Hull>(&shape)) return *hull;
+  require(!std::holds_alternative<RoundedHull>(shape), "shapes must not be rounded hulls for method 'paper'");
   std::vector<Vec3> points;
   const auto circle = [&](double radius, double z, int n) {
     for (int i = 0; i < n; ++i) {

@@ -123,7 +123,22 @@ struct Hull {
   Plane tightest(Vec3 point) const;
 };
 
-using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Hull, HalfSpace>;
+/// All points within `radius` of a polytope: its Minkowski sum with a ball.
+struct RoundedHull {
+  Hull core;
+  double radius;
+
+  Vec3 support(Vec3 direction) const { return core.support(direction) + radius * unit(direction); }
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+  /// The supporting plane whose normal is along `outward`.
+  Plane supporting(Vec3 outward) const;
+
+  double volume() const;  ///< m³, by Steiner's formula
+  Vec3 centroid() const;  ///< about the core's origin
+};
+
+using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Hull, HalfSpace, RoundedHull>;
 
 /// Each throws std::invalid_argument with one sentence that names the argument.
 Sphere make_sphere(double radius);
@@ -133,7 +148,8 @@ Cylinder make_cylinder(double radius, double length);
 HalfSpace make_half_space(Vec3 normal, double offset);
 /// Interior, duplicate, collinear and coplanar points are welcome; coplanar triangles become one facet.
 Hull make_hull(std::span<const Vec3> points);
-/// The same for finite points, or null if they are flat; `source[i]` becomes the index of vertex i among the points.
+RoundedHull make_rounded_hull(std::span<const Vec3> points, double radius);
+/// The hull of finite points, or null if they are flat; `source[i]` becomes the index of vertex i among the points.
 std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source = nullptr);
 
 /// Fills in what follows from vertices, planes and rings.
@@ -144,15 +160,20 @@ double volume(const Shape& shape);
 Vec3 centroid(const Shape& shape);
 bool bounded(const Shape& shape);
 
-/// True for shapes with infinitely many supporting planes along their boundary: sphere, capsule, cylinder.
+/// True for shapes with infinitely many supporting planes along their boundary: sphere, capsule, cylinder,
+/// rounded hull.
 bool smooth(const Shape& shape);
 
 /// All facet planes of a polytope; for a smooth shape a few of its tangent planes that already bound it. About the
 /// shape's origin.
 void append_planes(const Shape& shape, std::vector<Plane>& planes);
 
-/// A smooth shape is its core (a point or a segment) grown by a radius; every other shape is its own core, of radius 0.
+/// A smooth shape is its core (a point, a segment, a polytope) grown by a radius; every other shape is its own core, of
+/// radius 0.
 double core_radius(const Shape& shape);
+
+/// The polytope that a hull is, or that a rounded hull is grown from; null for other shapes.
+const HullData* polytope_of(const Shape& shape);
 
 /// A shape and where it is. `pose` maps the shape's own coordinates (a hull's are about HullData::origin) to the world.
 struct Placed {
@@ -183,7 +204,7 @@ struct Bounds {
 Bounds bounds(const Placed& placed);
 
 /// Vertices and facets of a polytope that approximates a smooth shape from inside, its volume short by the fraction
-/// `tolerance` or less; a polytope's own. A half-space has none: std::invalid_argument.
+/// `tolerance` or less; a polytope's own. Half-spaces and rounded hulls have none: std::invalid_argument.
 Hull tessellated(const Shape& shape, double tolerance);
 
 }  // namespace overlapper

@@ -99,11 +99,11 @@ WidePlane tightest(const Cylinder& c, const WideVector& p) {
 
 WideBody::WideBody(const Placed& body, const WideVector& about)
     : shape(body.shape), rotation_(wide_rotation(body.orientation)), translation_(wide(body.position) - about) {
-  const Hull* hull = std::get_if<Hull>(&shape);
+  const HullData* hull = polytope_of(shape);
   if (!hull) return;
-  translation_ = translation_ + rotation_ * wide(hull->data->origin);
-  for (const auto& [i, j, k] : hull->data->triangles) {
-    const Vec3 a = hull->data->corners[i], b = hull->data->corners[j], c = hull->data->corners[k];
+  translation_ = translation_ + rotation_ * wide(hull->origin);
+  for (const auto& [i, j, k] : hull->triangles) {
+    const Vec3 a = hull->corners[i], b = hull->corners[j], c = hull->corners[k];
     // An ulp of each corner's difference and product, as in orientation().
     const Vec3 normal = cross(b - a, c - a);
     const double length = norm(normal);
@@ -120,10 +120,10 @@ WidePlane WideBody::in_world(const WidePlane& plane) const {
 }
 
 WidePlane WideBody::triangle_plane(int triangle) const {
-  const HullData& hull = *std::get<Hull>(shape).data;
+  const HullData& hull = *polytope_of(shape);
   const auto& [a, b, c] = hull.triangles[triangle];
   const WideVector normal = unit(wide_normal(hull.corners[a], hull.corners[b], hull.corners[c]));
-  return {normal, dot(normal, wide(hull.corners[a]))};
+  return {normal, dot(normal, wide(hull.corners[a])) + DoubleDouble{core_radius(shape)}};
 }
 
 WidePlane WideBody::tightest_triangle(const WideVector& point) const {
@@ -155,6 +155,8 @@ WidePlane WideBody::tightest(const WideVector& point) const {
   }
   const WideVector p = local(point);
   if (std::holds_alternative<Hull>(shape)) return in_world(tightest_triangle(p));
+  if (const RoundedHull* hull = std::get_if<RoundedHull>(&shape))
+    return in_world(supporting(hull->tightest(rounded(p)).normal));
   const auto of_simple = [&](const auto& simple) -> WidePlane {
     if constexpr (requires { overlapper::tightest(simple, p); }) return overlapper::tightest(simple, p);
     return {};
@@ -162,15 +164,22 @@ WidePlane WideBody::tightest(const WideVector& point) const {
   return in_world(std::visit(of_simple, shape));
 }
 
+WidePlane WideBody::supporting(Vec3 outward) const {
+  const WideVector normal = unit(wide(outward));
+  return {normal, dot(normal, farthest_corner(normal)) + DoubleDouble{core_radius(shape)}};
+}
+
 WidePlane WideBody::ray_exit(const WideVector& origin, const WideVector& direction) const {
   const WideVector o = local(origin), d = apply_transposed(rotation_, direction);
+  if (const RoundedHull* hull = std::get_if<RoundedHull>(&shape))
+    return in_world(supporting(hull->ray_exit(rounded(o), rounded(d)).normal));
   if (const Sphere* sphere = std::get_if<Sphere>(&shape)) return in_world(overlapper::ray_exit(*sphere, o, d));
   if (const Capsule* capsule = std::get_if<Capsule>(&shape)) return in_world(overlapper::ray_exit(*capsule, o, d));
   return in_world(overlapper::ray_exit(std::get<Cylinder>(shape), o, d));
 }
 
 WideVector WideBody::farthest_corner(const WideVector& direction) const {
-  const std::vector<Vec3>& corners = std::get<Hull>(shape).data->corners;
+  const std::vector<Vec3>& corners = polytope_of(shape)->corners;
   const Vec3 d = rounded(direction);
   double surely = -kInfinity;
   const auto error = [&](Vec3 corner) { return 8 * 0x1p-53 * dot(abs(d), abs(corner)); };
@@ -200,6 +209,7 @@ WideVector WideBody::core_support(const WideVector& direction) const {
       return DoubleDouble{c.radius} * radial + WideVector{{}, {}, {sign(d.z) * c.length / 2}};
     }
     WideVector operator()(const Hull&) const { return body.farthest_corner(d); }
+    WideVector operator()(const RoundedHull&) const { return body.farthest_corner(d); }
     WideVector operator()(const HalfSpace&) const { return {}; }
   };
   return rotation_ * std::visit(Visitor{*this, d}, shape) + translation_;
@@ -210,7 +220,7 @@ WideVector WideBody::support(const WideVector& direction) const {
 }
 
 void WideBody::append_planes(std::vector<WidePlane>& planes) const {
-  if (std::holds_alternative<Hull>(shape)) {
+  if (polytope_of(shape)) {
     for (int t = 0; t < static_cast<int>(glances_.size()); ++t) planes.push_back(in_world(triangle_plane(t)));
   } else if (std::holds_alternative<HalfSpace>(shape)) {
     planes.push_back(tightest(WideVector{}));

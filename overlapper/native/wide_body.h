@@ -46,6 +46,7 @@ class WideBody {
   WideVector local(const WideVector& point) const;
   WidePlane triangle_plane(int triangle) const;
   WidePlane tightest_triangle(const WideVector& local_point) const;
+  WidePlane supporting(Vec3 local_outward) const;
   WideVector farthest_corner(const WideVector& local_direction) const;
 
   WideMatrix rotation_;

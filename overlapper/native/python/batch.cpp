@@ -188,7 +188,7 @@ unless it took long and its Batch has not been asked since; `overlaps[mask]`, a 
   });
 }
 
-#define OVERLAPPER_SHAPES "collections.abc.Sequence[Box | Sphere | Capsule | Cylinder | Hull | HalfSpace]"
+#define OVERLAPPER_SHAPES "collections.abc.Sequence[Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace]"
 #define OVERLAPPER_POSES "positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike"
 
 constexpr const char* kOverlapsDoc =

@@ -74,6 +74,10 @@ std::string repr(const Hull& h) {
 std::string repr(const HalfSpace& h) {
   return "HalfSpace(normal=" + text(h.plane.normal) + ", offset=" + number(h.plane.offset) + ")";
 }
+std::string repr(const RoundedHull& h) {
+  return "RoundedHull(" + std::to_string(h.core.data->vertices.size()) + " vertices, " +
+         std::to_string(h.core.data->planes.size()) + " facets, radius=" + number(h.radius) + ")";
+}
 std::string repr(const Shape& shape) {
   return std::visit([](const auto& s) { return repr(s); }, shape);
 }
@@ -82,18 +86,18 @@ std::string repr(const Placed& p) {
          ", orientation=" + tuple_text({p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w}) + ")";
 }
 
-Vec3 world_origin(const Hull& hull) { return hull.data->origin; }
+template <class T>
+Vec3 world_origin(const T& shape) {
+  const HullData* hull = polytope_of(Shape(shape));
+  return hull ? hull->origin : Vec3{};
+}
 
 /// What all shapes share: measures, printing, copies that are the same object.
 template <class T>
 void define_common(nb::class_<T>& cls) {
   cls.def_prop_ro("volume", [](const T& s) { return volume(Shape(s)); }, "Volume in m³; infinite for a half-space.");
   array_property(
-      cls, "centroid",
-      [](const T& s) {
-        if constexpr (std::is_same_v<T, Hull>) return to_numpy(centroid(s) + world_origin(s));
-        else return to_numpy(centroid(Shape(s)));
-      },
+      cls, "centroid", [](const T& s) { return to_numpy(centroid(Shape(s)) + world_origin(s)); },
       "(3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.");
   array_property(
       cls, "bounds", [](const T& s) { return to_numpy(bounds(make_placed(s, {}, {}))); },
@@ -268,6 +272,33 @@ ValueError for fewer than four points, for points that are not finite and for po
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
+void define_rounded_hull(nb::module_& m) {
+  nb::class_<RoundedHull> rounded(m, "RoundedHull",
+                                  R"(All points within `radius` (m) of the convex hull of (n, 3) points (m).
+
+The Minkowski sum of the hull and a ball: what Bullet collides with where a convex mesh has a margin. ValueError as
+for Hull and Sphere. Method "paper" does not take it, and it has no certificate.)");
+  rounded.def(
+      "__init__",
+      [](RoundedHull* self, nb::handle vertices, nb::handle radius) {
+        new (self) RoundedHull(make_rounded_hull(to_rows(vertices, "vertices"), to_double(radius, "radius")));
+      },
+      "vertices"_a.none(), "radius"_a.none(),
+      nb::sig("def __init__(self, vertices: numpy.typing.ArrayLike, radius: float) -> None"));
+  rounded.def_prop_ro("core", [](const RoundedHull& h) { return h.core; }, "The hull that is rounded.");
+  rounded.def_ro("radius", &RoundedHull::radius, "m");
+  define_common(rounded);
+  rounded.def(
+      "__getstate__", [](const RoundedHull& h) { return nb::make_tuple(hull_state(h.core), h.radius); },
+      nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+  rounded.def(
+      "__setstate__",
+      [](RoundedHull& self, nb::tuple state) {
+        new (&self) RoundedHull{hull_from_state(nb::cast<nb::tuple>(state[0])), nb::cast<double>(state[1])};
+      },
+      nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
+}
+
 void define_placed(nb::module_& m) {
   nb::class_<Placed> placed(m, "Placed",
                             R"(A shape and where it is in the world.
@@ -281,12 +312,12 @@ position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, 
       },
       "shape"_a.none(), "position"_a.none() = nb::make_tuple(0.0, 0.0, 0.0),
       "orientation"_a.none() = nb::make_tuple(0.0, 0.0, 0.0, 1.0),
-      nb::sig("def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Hull | HalfSpace | "
+      nb::sig("def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | "
               "numpy.typing.ArrayLike, position: "
               "numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None"));
   placed.def_prop_ro(
       "shape", [](const Placed& p) { return to_python(p.shape); },
-      nb::sig("def shape(self) -> Box | Sphere | Capsule | Cylinder | Hull | HalfSpace"));
+      nb::sig("def shape(self) -> Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace"));
   array_property(placed, "position", [](const Placed& p) { return to_numpy(p.position); }, "(3,) m");
   array_property(
       placed, "orientation",
@@ -317,6 +348,7 @@ position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, 
 
 void define_shapes(nb::module_& m) {
   define_shape_types(m);
+  define_rounded_hull(m);
   define_placed(m);
 }
 
