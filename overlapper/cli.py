@@ -1,4 +1,4 @@
-"""The command line: scenes run, seen, listed, checked and compared, polytopes intersected, the chart of hard cases."""
+"""The command line: scenes run, seen, listed, checked, compared; shapes listed; polytopes intersected; hard cases."""
 
 from __future__ import annotations
 
@@ -370,6 +370,56 @@ def intersect(
             print(f"{name:10}{_digits(fact)}{error}{UNITS.get(name, '')}")
     if out:
         print(f"Written: {out}" if written else f"Not written, as nothing is in common: {out}")
+
+
+@app.command()
+def shapes(
+    file: Annotated[
+        Path, typer.Argument(help="A model or a scene: .urdf, .sdf, .xml (MJCF), .bullet.", show_default=False)
+    ],
+    surface: Annotated[
+        Literal["nominal", "margin"],
+        typer.Option(help="Convex meshes as they are, or with the margin that Bullet lays around them."),
+    ] = "nominal",
+    concave: Annotated[
+        Literal["decompose", "enclose", "skip"],
+        typer.Option(help="Concave meshes: as convex parts, open ones too with walls around them, or not at all."),
+    ] = "decompose",
+    concave_threshold: Annotated[
+        float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
+    ] = 0.05,
+    self_collision: Annotated[
+        bool, typer.Option("--self-collision", help="Load it with pybullet's URDF_USE_SELF_COLLISION.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, of every shape, instead.")] = False,
+) -> None:
+    """List what is modelled of a file that pybullet loads: shapes by link, sizes, who may collide, what is skipped.
+
+    The exit code is 0 if all of it is modelled, 1 if something is skipped, and 2 if pybullet cannot load it.
+
+    Examples:
+
+    [bold]overlapper shapes robot.urdf[/bold]
+
+    [bold]overlapper shapes humanoid.xml --self-collision --json[/bold]
+    """
+    from overlapper.inventory import NotRead, inventory
+
+    try:
+        found = inventory(file, self_collision, surface=surface, concave=concave, concave_threshold=concave_threshold)
+    except (NotRead, ImportError) as error:
+        raise Refused(str(error)) from error
+    if as_json:
+        print(json.dumps(found.as_dict()))
+    else:
+        from overlapper.listing import remarks, shapes_table
+
+        console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
+        if found.links:
+            console.print(shapes_table(found))
+        for line in remarks(found):
+            console.print(line, markup=False, soft_wrap=True)
+    raise typer.Exit(1 if found.skipped else 0)
 
 
 @app.command()

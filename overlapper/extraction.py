@@ -187,13 +187,13 @@ def read_body(client: int, id: int, file: BulletFile, saved: SavedBody | None, s
     decomposed: list[Decomposed] = []
     shape_count = 0 if saved else 1
     for link, each in leaves.items():
-        modelled, reasons, meshes = _modelled(link, each, settings)
-        parts += modelled
-        shapes = len(modelled) + len(reasons)
-        shape_count += shapes
+        shapes, reasons, meshes = modelled(link, each, settings)
+        parts += shapes
+        count = len(shapes) + len(reasons)
+        shape_count += count
         label = f"{name}/{link_names[link]}"
         if reasons:
-            skipped.append(Skipped(id, link, label, _summary(reasons, shapes)))
+            skipped.append(Skipped(id, link, label, summary(reasons, count)))
         decomposed += [
             Decomposed(id, link, label, numbers, mesh.volume, mesh.mesh_volume, mesh.path) for numbers, mesh in meshes
         ]
@@ -281,7 +281,7 @@ def _gaps(a: Leaf, b: Leaf) -> tuple[float, float]:
     return float(shift), float(turn)
 
 
-def _modelled(
+def modelled(
     link: int, leaves: tuple[Leaf, ...], settings: Settings
 ) -> tuple[list[Part], list[str], list[tuple[range, Decomposition]]]:
     """The leaves of a link as shapes, a reason for each that has none, and which shapes are parts of a concave mesh."""
@@ -368,7 +368,7 @@ def _shape(kind: str, data: bytes, margin: float) -> Shape:
             raise ValueError(f"a {kind} is not modelled")
 
 
-def _summary(reasons: Sequence[str], shapes: int) -> str:
+def summary(reasons: Sequence[str], shapes: int) -> str:
     if shapes == 1:
         return reasons[0]
     return "; ".join(f"{number} of {shapes} shapes: {reason}" for reason, number in Counter(reasons).items())

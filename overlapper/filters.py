@@ -11,7 +11,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from overlapper.recorder import Recorder
+from overlapper.recorder import Link, Recorder
 
 Key = tuple[int, int, int]  # body, link, shape
 Who = int | tuple[int, int] | Key  # a body, a link or a shape
@@ -89,6 +89,17 @@ class CollisionRules:
     def _masks_admit(self, group: Any, mask: Any, other_group: Any, other_mask: Any) -> Mask:
         admitted, admitting = (group & other_mask) != 0, (other_group & mask) != 0
         return np.asarray(admitted & admitting if self._both else admitted | admitting)
+
+    def partners(self, rows: Indices) -> dict[Link, list[Link]]:
+        """Of the colliders in these rows, sorted, with whom each may collide, by body and link."""
+        links = list(self._colliders.rows)
+        found: dict[Link, list[Link]] = {links[row]: [] for row in rows}
+        first, second = (rows[each] for each in np.triu_indices(len(rows), 1))
+        allowed = self.allow(first, second)
+        for a, b in zip(first[allowed], second[allowed]):
+            found[links[a]].append(links[b])
+            found[links[b]].append(links[a])
+        return found
 
     def count(self, weights: NDArray[np.int64]) -> int:
         """How many pairs of shapes may collide, if `weights` (n,) says how many each collider has."""

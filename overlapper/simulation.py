@@ -196,6 +196,10 @@ class Bodies:
         pairs: NDArray[np.int32] = self._batch.candidate_pairs(self._positions, self._orientations)
         return np.asarray(pairs[self._chosen(pairs, among)])
 
+    def partners(self) -> dict[tuple[int, int], list[tuple[int, int]]]:
+        """The links that the simulator lets each link collide with, by (body, link), of those that have shapes."""
+        return self._rules.partners(np.unique(self._colliders))
+
     def report(self) -> Report:
         """How much of the scene was read, and how much of it the last `overlaps()` looked at."""
         examined = self._examined

@@ -398,8 +398,8 @@ def test_the_rest_of_a_link_with_a_flat_hull_is_modelled(client, tmp_path):
 def test_the_hull_of_unequal_spheres_is_not_taken_for_a_capsule():
     spheres = np.array([[0, 0, 0, 0.1], [0, 0, 1, 0.2]])
     leaf = Leaf("multisphere", np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), spheres)
-    modelled = extraction._modelled(0, (leaf,), extraction.Settings("skip", 0.05, "nominal"))
-    assert modelled == ([], ["the hull of unequal spheres is not modelled"], [])
+    found = extraction.modelled(0, (leaf,), extraction.Settings("skip", 0.05, "nominal"))
+    assert found == ([], ["the hull of unequal spheres is not modelled"], [])
 
 
 def test_links_without_an_id_are_counted_as_skipped(client):
