@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Shape, Sphere
 from overlapper.bullet_file import BulletFile, Leaf, SavedBody
 from overlapper.decomposition import Decomposition, NotDecomposed, check_threshold, decompose
+from overlapper.height_field import HeightField
 from overlapper.quaternion import composed, rotated
 
 Array = NDArray[np.float64]
@@ -82,6 +83,18 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
+class Ground:
+    """A height field, placed in the frame of its collider."""
+
+    field: HeightField
+    position: Array
+    orientation: Array
+
+    def part(self, number: int) -> Part:
+        return Part(BASE, number, self.field.prism(number), self.position, self.orientation)
+
+
+@dataclass(frozen=True, slots=True)
 class Settings:
     """How shapes are modelled: see `simulation.Bodies`. ValueError if there is no such way."""
 
@@ -107,6 +120,7 @@ class Body:
     parts: tuple[Part, ...]
     skipped: tuple[Skipped, ...]
     decomposed: tuple[Decomposed, ...]
+    ground: Ground | None = None  # of which `parts` are the prisms modelled so far
 
 
 def body_ids(client: int) -> set[int]:
@@ -175,7 +189,15 @@ def _frictions(client: int, frictions: Mapping[int, float]) -> Iterator[None]:
             pybullet.changeDynamics(id, BASE, lateralFriction=friction, physicsClientId=client)
 
 
-def read_body(client: int, id: int, file: BulletFile, saved: SavedBody | None, settings: Settings) -> Body:
+def read_body(
+    client: int,
+    id: int,
+    file: BulletFile,
+    saved: SavedBody | None,
+    settings: Settings,
+    field: HeightField | None = None,
+) -> Body:
+    """A body as it is in a .bullet file, and in pybullet; `field` is the height field that it is known to be."""
     base, name = (text.decode(errors="replace") for text in pybullet.getBodyInfo(id, client))
     name = name or f"body {id}"
     joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
@@ -186,6 +208,11 @@ def read_body(client: int, id: int, file: BulletFile, saved: SavedBody | None, s
     skipped: list[Skipped] = []
     decomposed: list[Decomposed] = []
     shape_count = 0 if saved else 1
+    ground = None
+    if field and [leaf.kind for leaf in leaves.get(BASE, ())] == ["height field"]:
+        (leaf,) = leaves.pop(BASE)
+        ground = Ground(field, leaf.position, leaf.orientation)
+        shape_count += field.count
     for link, each in leaves.items():
         shapes, reasons, meshes = modelled(link, each, settings)
         parts += shapes
@@ -202,7 +229,18 @@ def read_body(client: int, id: int, file: BulletFile, saved: SavedBody | None, s
         skipped.append(Skipped(id, BASE, name, "a soft body is not modelled" if soft else "saveBullet leaves it out"))
     colors = _colors(client, id, link_names)
     margin = pybullet.getDynamicsInfo(id, BASE, client)[11]
-    return Body(name, link_names, colors, parents, margin, shape_count, tuple(parts), tuple(skipped), tuple(decomposed))
+    return Body(
+        name,
+        link_names,
+        colors,
+        parents,
+        margin,
+        shape_count,
+        tuple(parts),
+        tuple(skipped),
+        tuple(decomposed),
+        ground,
+    )
 
 
 def _colors(client: int, id: int, links: Mapping[int, str]) -> dict[int, Color]:
@@ -364,6 +402,8 @@ def _shape(kind: str, data: bytes, margin: float) -> Shape:
             return RoundedHull(points, margin) if margin else Hull(points)
         case "multisphere":
             raise ValueError("the hull of unequal spheres is not modelled")
+        case "height field":
+            raise ValueError("a height field is modelled only if a Recorder has noted its heightfieldData")
         case _:
             raise ValueError(f"a {kind} is not modelled")
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import pybullet
 
+from overlapper.height_field import HeightField
+
 # The calls that are noted, with their parameters in pybullet's order, as far as they are needed.
 CALLS: dict[str, tuple[str, ...]] = {
     "setCollisionFilterPair": (
@@ -33,6 +35,12 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("linkInertialFrameOrientations", "linkParentIndices", "linkJointTypes", "linkJointAxis"),
         *("useMaximalCoordinates", "flags", "batchPositions", "physicsClientId"),
     ),
+    "createCollisionShape": (
+        *("shapeType", "radius", "halfExtents", "height", "fileName", "meshScale", "planeNormal", "flags"),
+        *("collisionFramePosition", "collisionFrameOrientation", "vertices", "indices", "heightfieldTextureScaling"),
+        *("heightfieldData", "numHeightfieldRows", "numHeightfieldColumns", "replaceHeightfieldIndex"),
+        "physicsClientId",
+    ),
     "removeBody": ("bodyUniqueId", "physicsClientId"),
     "resetSimulation": ("flags", "physicsClientId"),
     "disconnect": ("physicsClientId",),
@@ -46,7 +54,9 @@ _open: list[Recorder] = []
 
 
 class Recorder:
-    """Notes what pybullet is told about collisions and cannot be asked for: pair filters, filter mode, self-collision.
+    """Notes what pybullet is told about collisions and cannot be asked for later.
+
+    These are pair filters, the filter mode, self-collision and the data of height fields.
 
         client = pybullet.connect(pybullet.DIRECT)
         recorder = Recorder(client)
@@ -78,6 +88,12 @@ class Recorder:
         """collisionFilterMode 0; by default one mask that admits the other's group is enough."""
         self.self_collision: dict[int, int] = {}
         """The flags, by body, that a body with URDF_USE_SELF_COLLISION was loaded with."""
+        self._fields: dict[int, HeightField] = {}  # by shape
+        self._shapes: dict[int, int] = {}  # by body that is a height field
+
+    def height_field(self, body: int) -> HeightField | None:
+        """The height field that a body is, if it was given as heightfieldData."""
+        return self._fields.get(self._shapes.get(body, -1))
 
     def close(self) -> None:
         """Note nothing any more; what was noted stays. pybullet is as before once all recorders are closed."""
@@ -108,14 +124,35 @@ class Recorder:
             case "loadURDF" | "loadMJCF" | "createMultiBody":
                 flags = arguments.get("flags", 0)
                 for body in result if isinstance(result, tuple) else (result,):
-                    self.self_collision.pop(body, None)
+                    self._drop(body)
+                    if arguments.get("baseCollisionShapeIndex", -1) in self._fields:
+                        self._shapes[body] = arguments["baseCollisionShapeIndex"]
                     if flags & pybullet.URDF_USE_SELF_COLLISION:
                         self.self_collision[body] = flags
             case "removeBody":
                 # Pair filters outlive the body, and apply to the next one with its id.
-                self.self_collision.pop(arguments["bodyUniqueId"], None)
+                self._drop(arguments["bodyUniqueId"])
+            case "createCollisionShape":
+                if arguments["shapeType"] == pybullet.GEOM_HEIGHTFIELD and arguments.get("heightfieldData") is not None:
+                    self._note_field(arguments, result)
+                else:
+                    self._fields.pop(result, None)
             case "resetSimulation" | "disconnect":
                 self._forget()
+
+    def _note_field(self, arguments: Arguments, shape: int) -> None:
+        replaced = self._fields.get(arguments.get("replaceHeightfieldIndex", -1))
+        self._fields[shape] = HeightField.of_pybullet(
+            arguments["heightfieldData"],
+            arguments["numHeightfieldRows"],
+            arguments["numHeightfieldColumns"],
+            arguments.get("meshScale", (1.0, 1.0, 1.0)),
+            replaced,
+        )
+
+    def _drop(self, body: int) -> None:
+        self.self_collision.pop(body, None)
+        self._shapes.pop(body, None)
 
 
 class _Noted:

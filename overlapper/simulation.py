@@ -10,7 +10,7 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -40,6 +40,7 @@ try:
         saved_bodies,
     )
     from overlapper.filters import Colliders, CollisionRules, Who, pair_codes
+    from overlapper.height_field import GroundBelow
     from overlapper.marks import Marks
     from overlapper.recorder import Recorder
 except ImportError as error:
@@ -106,7 +107,7 @@ class Bodies:
                 ...
 
     Boxes, spheres, capsules, cylinders, planes and convex meshes are modelled, compounds part by part. What cannot be
-    (height fields, soft bodies, flat hulls) is listed in `skipped`, with one SkippedShapeWarning each.
+    (soft bodies, flat hulls, height fields without a recorder) is in `skipped`, with one SkippedShapeWarning each.
 
     Concave meshes are decomposed into convex parts, which count as so many shapes of their link and are listed in
     `decomposed`; `concave_threshold`, from 0.01 to 1, is the concavity that may be left (see overlapper.decomposition).
@@ -122,6 +123,9 @@ class Bodies:
     is built, adds what pybullet cannot be asked for: pair filters, the filter mode and self-collision. `pairs` and
     `overlaps` take other choices. Groups and masks are read again with new bodies, when a base becomes static or
     ceases to be, and when a recorder hears of a change.
+
+    Height fields that a recorder has noted are modelled as the prisms below their triangles, near what may meet them,
+    more and more of them as bodies move. `report()` counts all triangles, and as read those modelled.
 
     Bodies that come, go or take over the id of another are noticed by `update()`, which marks every body with a user
     data entry. New bodies are read from a temporary .bullet file; if two stand at the same point, the
@@ -272,7 +276,7 @@ class Bodies:
         if not pybullet.isConnected(client):
             raise ValueError(f"physicsClientId {client} is not connected to a physics server")
         skipped, fresh = [], False
-        if self._margins_changed() or not self._marks.are_as_remembered():
+        if self._margins_changed() or self._ground_changed() or not self._marks.are_as_remembered():
             # After a syncBodyInfo, pybullet would show the user data of a removed body on the one that inherits its id.
             pybullet.syncUserData(physicsClientId=client)
             ids = body_ids(client)
@@ -283,6 +287,9 @@ class Bodies:
             self._marks.remember(self._bodies)
         self._pose()
         self._follow_filters(fresh)
+        if self._grounds and self._reach_ground():
+            self._arrange()
+            self._pose()
         for each in skipped:
             message = f"{each.name} (body {each.body}, link {each.link}) is left out: {each.reason}"
             # The caller of update() or of Bodies() is three calls up.
@@ -299,6 +306,31 @@ class Bodies:
         for id in changed:
             del self._bodies[id]
         return bool(changed)
+
+    def _ground_changed(self) -> bool:
+        """Whether a height field has been given other heights; its body is then new."""
+        grounds = {id: body.ground for id, body in self._bodies.items() if body.ground}
+        for id, ground in grounds.items():
+            if self._recorder and self._recorder.height_field(id) is not ground.field:
+                del self._bodies[id]
+        return len(grounds) > sum(1 for id in grounds if id in self._bodies)
+
+    def _reach_ground(self) -> bool:
+        """Model the ground of height fields below what the simulator lets meet it; whether that is more than before."""
+        grown = False
+        for id, below in self._grounds.items():
+            own = np.full(len(self._colliders), self._collider_rows[id, BASE])
+            first, second = np.minimum(own, self._colliders), np.maximum(own, self._colliders)
+            meets = (self._owners != id) & self._rules.allow(first, second)
+            position, orientation = map(np.array, pybullet.getBasePositionAndOrientation(id, self.physicsClientId))
+            numbers = below.reached(position, orientation, self._positions, self._reach, meets)
+            body = self._bodies[id]
+            new = numbers - {part.index for part in body.parts}
+            if new and body.ground:
+                parts = sorted((*body.parts, *map(body.ground.part, new)), key=lambda part: part.index)
+                self._bodies[id] = replace(body, parts=tuple(parts))
+                grown = True
+        return grown
 
     def _read(self) -> list[Skipped]:
         """Read the bodies that are not marked yet, forget those that are gone; what is newly skipped."""
@@ -318,7 +350,8 @@ class Bodies:
             self._rows = {id: rows[id] for id in hidden if id in rows}
         for id in fresh:
             body = file.bodies[rows[id]] if id in rows else None
-            known[id] = read_body(client, id, file, body, self._settings)
+            field = self._recorder.height_field(id) if self._recorder else None
+            known[id] = read_body(client, id, file, body, self._settings, field)
             self._marks.put(id)
         self._bodies = dict(sorted(known.items()))
         grown, self._unidentified = unidentified > self._unidentified, unidentified
@@ -360,11 +393,14 @@ class Bodies:
 
     def _arrange(self) -> None:
         """Lay the shapes of all bodies side by side, for one pass of arithmetic per step."""
-        shaped = {id: body.parts for id, body in self._bodies.items() if body.parts}
+        shaped = {id: body.parts for id, body in self._bodies.items() if body.parts or body.ground}
         parts = [part for each in shaped.values() for part in each]
         self._keys = [(id, part.link, part.index) for id, each in shaped.items() for part in each]
         self._key_rows = np.array(self._keys, dtype=np.int64).reshape(-1, 3)
         self._shapes = [part.shape for part in parts]
+        # How far each reaches from its own origin; planes reach everywhere, but meet no ground.
+        reach = [np.abs(shape.bounds).max(axis=0) for shape in self._shapes] if self._has_ground() else []
+        self._reach = np.linalg.norm(np.array(reach).reshape(-1, 3), axis=1)
         self._batch = Batch(self._shapes)
         self._local_positions = np.array([part.position for part in parts]).reshape(-1, 3)
         self._local_orientations = np.array([part.orientation for part in parts]).reshape(-1, 4)
@@ -376,6 +412,10 @@ class Bodies:
         self._frames = np.array([frames[id, link] for id, link, _ in self._keys], dtype=np.int64)
         self._owners = np.array([id for id, _, _ in self._keys], dtype=int)
         self._listed: tuple[list[tuple[Who, Who]], NDArray[np.int64]] | None = None
+        self._grounds = {id: GroundBelow(body.ground) for id, body in self._bodies.items() if body.ground}
+
+    def _has_ground(self) -> bool:
+        return any(body.ground for body in self._bodies.values())
 
     def _pose(self) -> None:
         """Place the shapes where their colliders are now."""
