@@ -24,6 +24,9 @@ INK, PALE = "#222222", "#e3e3e3"
 # Where an answer without any error is drawn: below the half-ulp of 1e-16.
 EXACT = 1e-17
 
+# Ways that are not peers, drawn as the peer that they are most like.
+ALIKE = {"cutting": "clipping", "duality": "scipy", "one hull": "scipy", "tree": "voxels"}
+
 US = (0.1, 3e7)  # time per pair, from left to right
 
 
@@ -41,7 +44,7 @@ class Look:
 
 LOOKS = {
     "auto": Look("#d1001f", "o", joined=True, size=7, ours=True),
-    "auto, batch": Look("#d1001f", "D", size=6, ours=True),
+    "auto, batch": Look("#ff6f61", "D", size=5.5, ours=True),
     "paper": Look("#f08a00", "s", size=5.5),
     "clipping": Look("#7a4a21", "v", size=5.5),
     "scipy": Look("#1f5fbf", "^", size=6),
@@ -112,7 +115,7 @@ def panel(ax: Axes, family: str, rows: list[Row], words: dict[str, tuple[str, st
         found = [row for row in rows if row.method == name and row.us and row.error]
         x = [float(row.us) for row in found]
         y = [min(1.0, max(EXACT, float(row.error))) for row in found]
-        order = 5 if look.ours else 3
+        order = 3 + 2 * look.ours + look.joined
         if look.joined and len(found) > 1:
             ax.plot(x, y, color=look.colour, lw=1.0, alpha=0.6, zorder=order - 1)
         for row, across, up in zip(found, x, y):
@@ -155,50 +158,59 @@ def duration(us: float) -> str:
 # Time over size
 
 
-def sizes(
-    lines: dict[str, dict[str, list[tuple[float, float]]]], slopes: dict[str, dict[str, float]], path: Path
-) -> None:
-    """A panel for each way to overlap; a line for each method, through (facets, µs), its slope named at the end."""
-    figure, axes = plt.subplots(1, len(lines), figsize=(9.4, 4.2), sharey=True)
-    for ax, (way, methods) in zip(axes, lines.items()):
-        ax.set(xscale="log", yscale="log", xlabel="facets of either mesh")
-        ax.set_title(way, fontsize=9.5, fontweight="bold", loc="left")
+@dataclass(frozen=True)
+class Growth:
+    """A panel: for each method its points (size, µs), and the power of the size with which it grows, where fitted."""
+
+    title: str
+    along: str
+    lines: dict[str, list[tuple[float, float]]]
+    powers: dict[str, float]
+
+
+def growth(panels: list[Growth], path: Path) -> None:
+    """Time over size, a line for each method that is named at its end with its power."""
+    figure, axes = plt.subplots(1, len(panels), figsize=(9.4, 4.2), sharey=True, squeeze=False)
+    for ax, shown in zip(axes[0], panels):
+        ax.set(xscale="log", yscale="log", xlabel=shown.along)
+        ax.set_title(shown.title, fontsize=9.5, fontweight="bold", loc="left")
         ax.grid(color=PALE, lw=0.5)
-        ax.minorticks_off()
-        ends = []
-        for name, points in methods.items():
-            look = LOOKS[name]
-            x, y = zip(*points)
+        for name, points in shown.lines.items():
+            look = look_of(name)
             ax.plot(
-                x, y, color=look.colour, marker=look.marker, ms=look.size, lw=2.2 if look.ours else 1.2, mec="white",
-                mew=0.5, zorder=5 if look.ours else 3,
+                *zip(*points), color=look.colour, marker=look.marker, ms=look.size, lw=2.2 if look.ours else 1.2,
+                mec="white", mew=0.5, zorder=5 if look.ours else 3,
             )  # fmt: skip
-            slope = slopes[way].get(name)
-            ends.append((x[-1], y[-1], name + (f", {slope:.2f}" if slope is not None else ""), look))
-        ticks = sorted({x for points in methods.values() for x, _ in points})
+        ticks = sorted({x for points in shown.lines.values() for x, _ in points})
         ax.set_xticks(ticks, [f"{t:,.0f}" for t in ticks])
-        ax.set_xlim(min(ticks) / 1.3, max(ticks) * 14)
-        name_ends(ax, ends)
-    axes[0].set_ylabel("time per pair")
-    axes[0].set_yticks(
-        [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6], ["1 µs", "10 µs", "100 µs", "1 ms", "10 ms", "100 ms", "1 s"]
-    )
-    axes[0].minorticks_off()
+        ax.set_xlim(min(ticks) / 1.3, max(ticks) * (max(ticks) / min(ticks)) ** 0.4)
+        ax.minorticks_off()
+    times = [us for shown in panels for points in shown.lines.values() for _, us in points]
+    decades = 10.0 ** np.arange(np.floor(np.log10(min(times))), np.ceil(np.log10(max(times))) + 1)
+    axes[0, 0].set_yticks(decades, [duration(us) for us in decades])
+    axes[0, 0].minorticks_off()
+    axes[0, 0].set_ylabel("time")
+    for ax, shown in zip(axes[0], panels):
+        name_ends(ax, shown)
     figure.tight_layout(w_pad=1.0)
     save(figure, path)
 
 
-def name_ends(ax: Axes, ends: list[tuple[float, float, str, Look]]) -> None:
+def look_of(name: str) -> Look:
+    return LOOKS.get(name) or LOOKS[ALIKE[name]]
+
+
+def name_ends(ax: Axes, shown: Growth) -> None:
     """Names to the right of the last points, moved apart where they would lie on each other."""
     low, high = np.log10(ax.get_ylim())
-    room = 0.052 * (high - low)
     level = -np.inf
-    for x, y, name, look in sorted(ends, key=lambda end: end[1]):
-        level = max(np.log10(y), level + room)
-        weight = "bold" if look.ours else "normal"
+    for name, points in sorted(shown.lines.items(), key=lambda item: item[1][-1][1]):
+        level = max(np.log10(points[-1][1]), level + 0.055 * (high - low))
+        power = f", {shown.powers[name]:.2f}" if name in shown.powers else ""
+        look = look_of(name)
         ax.annotate(
-            name, (x, y), (max(e[0] for e in ends) * 1.35, 10**level), color=look.colour, fontsize=8, fontweight=weight,
-            va="center", annotation_clip=False,
+            name + power, points[-1], (1.3 * points[-1][0], 10**level), color=look.colour, fontsize=8, va="center",
+            fontweight="bold" if look.ours else "normal", annotation_clip=False,
         )  # fmt: skip
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 
 import numpy as np
 from interleaved import Row
-from speed_figures import accuracy, duration, sizes, style
+from paper_claims import VERTICES, Claim
+from speed_figures import Growth, accuracy, duration, growth, style
 from workloads import FAMILIES, SIZES
 
 # What the README shows of the first chart.
@@ -40,8 +42,19 @@ TARGETS: dict[str, tuple[float, float | None]] = {
 WRONG = 1e-6
 
 
-def write_page(results: Path, folder: Path, rows: list[Row], notes: list[str]) -> Path:
-    """`results` is the folder that the rows come from, as the page names it."""
+@dataclass(frozen=True)
+class Results:
+    """What was measured, and the folder that it was read from, as the page names it."""
+
+    folder: str
+    notes: list[str]
+    rows: list[Row]
+    claims: list[Claim]
+    steps: bool  # whether there is a chart of the steps of a simulation
+
+
+def write_page(results: Results, folder: Path) -> Path:
+    rows = results.rows
     folder.mkdir(parents=True, exist_ok=True)
     style()
     at_hand = {row.family for row in rows}
@@ -49,11 +62,14 @@ def write_page(results: Path, folder: Path, rows: list[Row], notes: list[str]) -
     if families:
         accuracy(rows, [name for name in CHOSEN if name in at_hand] or families, 4, folder / "speed.png")
         accuracy(rows, families, 4, folder / "speed_families.png", folder / "speed.html")
-    lines = {way: by_size(rows, way) for way in ("deep", "shallow")}
-    if all(lines.values()):
-        sizes(lines, {way: slopes_of(methods) for way, methods in lines.items()}, folder / "speed_sizes.png")
+    by_size = [sizes(rows, way) for way in ("deep", "shallow")]
+    if all(panel.lines for panel in by_size):
+        growth(by_size, folder / "speed_sizes.png")
+    by_claim = [of_pairs(results.claims), of_groups(results.claims)]
+    if results.claims:
+        growth(by_claim, folder / "speed_claims.png")
     page = folder / "speed.md"
-    page.write_text(text(results, rows, notes, lines), encoding="utf-8")
+    page.write_text(text(results, by_size, by_claim), encoding="utf-8")
     return page
 
 
@@ -72,46 +88,135 @@ def best(rows: Iterable[Row], family: str, method: str) -> Row | None:
 # Time over size
 
 
-def by_size(rows: list[Row], way: str) -> dict[str, list[tuple[float, float]]]:
-    methods = ("auto", "auto, batch", "paper", "scipy", "manifold3d", "trimesh")
+def sizes(rows: list[Row], way: str) -> Growth:
     lines = {}
-    for name in methods:
+    for name in ("auto", "auto, batch", "paper", "scipy", "manifold3d", "trimesh"):
         found = [(size, best(rows, f"i{size} {way}", name)) for size in SIZES]
-        points = [(float(size), float(row.us)) for size, row in found if row]
-        if points:
-            lines[name] = points
-    return lines
+        lines[name] = [(float(size), float(row.us)) for size, row in found if row]
+    lines = {name: points for name, points in lines.items() if points}
+    return Growth(way, "facets of either mesh", lines, powers(lines, 320))
 
 
-def slopes_of(lines: dict[str, list[tuple[float, float]]]) -> dict[str, float]:
-    """The power of the facets with which time grows, from 320 facets."""
-    return {name: slope(points) for name, points in lines.items() if sum(x >= 320 for x, _ in points) > 2}
+def of_pairs(claims: list[Claim]) -> Growth:
+    lines: dict[str, list[tuple[float, float]]] = {}
+    for claim in claims:
+        if claim.claim == "pair":
+            lines.setdefault(claim.way, []).append((float(claim.vertices), float(claim.us)))
+    return Growth("a pair", "vertices of either body", lines, powers(lines, 50))
 
 
-def slope(points: list[tuple[float, float]]) -> float:
-    x, y = np.log([point for point in points if point[0] >= 320]).T
-    return float(np.polyfit(x, y, 1)[0])
+def of_groups(claims: list[Claim]) -> Growth:
+    lines: dict[str, list[tuple[float, float]]] = {}
+    for claim in claims:
+        if claim.claim == "bodies":
+            lines.setdefault(claim.way, []).append((float(claim.bodies), float(claim.us)))
+    return Growth(f"many bodies of {VERTICES} vertices", "bodies", lines, powers(lines, 8))
+
+
+def powers(lines: dict[str, list[tuple[float, float]]], least: float) -> dict[str, float]:
+    """The power of the size with which time grows, fitted from a size on to at least three points."""
+    fitted = {}
+    for name, points in lines.items():
+        large = [point for point in points if point[0] >= least]
+        if len(large) > 2:
+            x, y = np.log(large).T
+            fitted[name] = float(np.polyfit(x, y, 1)[0])
+    return fitted
 
 
 # Words
 
 
-def text(results: Path, rows: list[Row], notes: list[str], lines: dict) -> str:
+def text(results: Results, by_size: list[Growth], by_claim: list[Growth]) -> str:
     template = (Path(__file__).parent / "speed_page.md").read_text(encoding="utf-8")
+    rows = results.rows
     pairs = {row.family: row.pairs for row in rows if row.method == "auto"}
     parts = {
         "families": str(len(pairs)),
         "pairs": str(sum(pairs.values())),
         "targets": targets(rows),
         "wrong": wrong(rows),
-        "slopes": slope_table(lines),
+        "powers": power_table(by_size),
         "per_facet": per_facet(rows),
         "warm": warm(rows),
         "missing": missing(rows),
-        "results": str(results),
-        "notes": "\n".join(f"    {line}" for line in notes),
+        "results": results.folder,
+        "notes": "\n".join(f"    {line}" for line in results.notes),
+        "steps": STEPS if results.steps else "This was not measured.",
+        "claims": claims_text(results.claims, *by_claim) if results.claims else "They were not measured.",
     }
     return Template(template).substitute(parts)
+
+
+STEPS = """![Where the time of a step goes, by the number of boxes in a pile, beside pybullet's own](steps.png)
+
+A step of a pile of boxes that come to rest: the poses are read from pybullet, the shapes placed, pairs culled by boxes,
+volume, centroid, normal, depth and gradient computed, and arrays and contacts handed over. The numbers are in
+`steps.csv` beside those of this page."""
+
+CLAIMS = """![Time over the vertices of a pair and over the number of bodies](speed_claims.png)
+
+- **A pair takes O(n log n).** The article's method grows with the vertices to the power of $paper, from 50 to $most
+  vertices, where n log n would be $n_log_n: $pair_holds. For $most vertices `auto` takes $auto_pair, the article's
+  method $paper_pair.
+- **m bodies take O(m n log n).** The article's method grows with their number to the power of $paper_m, from 8 to
+  $bodies: $groups_hold. `auto`, which grows one dual hull for all, takes the power of $auto_m, and at $bodies bodies
+  $auto_group where the article's method takes $paper_group.
+- **One hull of all m·n duals, or the pairwise tree.** Both by qhull, a point inside given: for $bodies bodies one hull
+  takes $one_hull, the tree $tree. The tree makes hulls of what the next level throws away.
+- **The pairs of a level on two cores.** By the clock, the best of many tries, one call bound to one core and to two:
+
+$cores
+
+- **Cutting, or duality.** Cutting plane by plane, every plane looking at every vertex, grows with the power of $cutting
+  (the article gives O(n³)), duality by qhull with $duality."""
+
+
+def claims_text(claims: list[Claim], pair: Growth, groups: Growth) -> str:
+    def power(panel: Growth, name: str) -> str:
+        return f"{panel.powers[name]:.2f}" if name in panel.powers else "?"
+
+    def last(panel: Growth, name: str) -> str:
+        return duration(panel.lines[name][-1][1])
+
+    most, bodies = pair.lines["paper"][-1][0], groups.lines["paper"][-1][0]
+    n_log_n = 1 + np.log(np.log(most) / np.log(50)) / np.log(most / 50)
+    return Template(CLAIMS).substitute(
+        most=f"{most:,.0f}",
+        bodies=f"{bodies:.0f}",
+        n_log_n=f"{n_log_n:.2f}",
+        pair_holds=holds(pair.powers.get("paper"), n_log_n),
+        groups_hold=holds(groups.powers.get("paper"), 1.0),
+        auto_group=last(groups, "auto"),
+        paper_group=last(groups, "paper"),
+        paper=power(pair, "paper"),
+        paper_m=power(groups, "paper"),
+        auto_m=power(groups, "auto"),
+        cutting=power(pair, "cutting"),
+        duality=power(pair, "duality"),
+        auto_pair=last(pair, "auto"),
+        paper_pair=last(pair, "paper"),
+        one_hull=last(groups, "one hull"),
+        tree=last(groups, "tree"),
+        cores=cores(claims),
+    )
+
+
+def holds(measured: float | None, claimed: float) -> str:
+    """To a tenth, which is what times at so few sizes can tell."""
+    return "it cannot be told" if measured is None else "it holds" if measured < claimed + 0.1 else "it does not hold"
+
+
+def cores(claims: list[Claim]) -> str:
+    times: dict[tuple[int, int], list[float]] = {}
+    for claim in claims:
+        if claim.claim == "cores":
+            times.setdefault((claim.bodies, claim.vertices), []).append(float(claim.us))
+    lines = [
+        [f"{bodies} bodies of {vertices} vertices", *map(duration, us), f"{us[0] / us[-1]:.2f}"]
+        for (bodies, vertices), us in times.items()
+    ]
+    return table(["", "one core", "two cores", "times faster"], lines)
 
 
 def table(heading: list[str], lines: Iterable[Iterable[str]]) -> str:
@@ -167,11 +272,10 @@ def wrong(rows: list[Row]) -> str:
     return table(["", "families", "relative error, the worst first"], lines)
 
 
-def slope_table(lines: dict[str, dict]) -> str:
-    slopes = {way: slopes_of(methods) for way, methods in lines.items()}
-    names = [name for name in lines["deep"] if any(name in found for found in slopes.values())]
-    shown = [[name, *(f"{slopes[way][name]:.2f}" if name in slopes[way] else "" for way in lines)] for name in names]
-    return table(["time grows with the facets to the power of", *lines], shown)
+def power_table(panels: list[Growth]) -> str:
+    names = dict.fromkeys(name for panel in panels for name in panel.powers)
+    lines = [[name, *(f"{p.powers[name]:.2f}" if name in p.powers else "" for p in panels)] for name in names]
+    return table(["time grows with the facets to the power of", *(panel.title for panel in panels)], lines)
 
 
 def per_facet(rows: list[Row]) -> str:

@@ -25,6 +25,9 @@ Setting = float | int | str | None
 Asked = Callable[[], Any]
 
 
+MOST_IN_NUMPY = 500  # vertices of either body, for a peer that looks at all of them for every plane of the other
+
+
 class Unfit(Exception):
     """The peer cannot be asked about this pair; the text says why."""
 
@@ -138,6 +141,8 @@ def clipping(pair: Pair, _: None) -> Asked:
     """Planes cut off one by one in plain doubles, as r3d does it, but in numpy: see peers.clipping."""
     if any(map(is_round, pair.bodies)):
         raise Unfit("round shapes")
+    if min(len(corners(body)) for body in pair.bodies) > MOST_IN_NUMPY:
+        raise Unfit(f"more than {MOST_IN_NUMPY} vertices take minutes in numpy")
     hull = Hull(vertices(pair.a))
     corners_of_a, rings_of_a, cuts = list(hull.vertices), [ring.tolist() for ring in hull.facets], planes(pair.b)
 

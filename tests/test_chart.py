@@ -9,14 +9,16 @@ import exact
 import families
 import numpy as np
 import pytest
+from strategies import directions
 
-from overlapper import HalfSpace, Placed, Sphere, cli, overlap, penetration_depth
+from overlapper import HalfSpace, Hull, Placed, Sphere, cli, overlap, penetration_depth
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
 import chart  # noqa: E402
 import interleaved  # noqa: E402
+import paper_claims  # noqa: E402
 import speed_figures  # noqa: E402
 import speed_page  # noqa: E402
 import timed_peers  # noqa: E402
@@ -116,7 +118,7 @@ def test_a_wrong_volume_of_ours_ends_the_run_and_what_was_measured_is_kept(tmp_p
         chart.main()
     assert ended.value.code == 1
     assert capsys.readouterr().err.endswith("overlapper: wrong: tetra 3: 1.0, truly 2.0\n")
-    assert [row.family for row in chart.read(tmp_path / "speed.csv")[1]] == ["box deep"]
+    assert [row.family for row in chart.read(tmp_path / "speed.csv", interleaved.Row)[1]] == ["box deep"]
 
 
 def test_a_wrong_volume_of_a_peer_is_its_error():
@@ -149,7 +151,7 @@ def test_the_command_writes_results_page_and_charts(tmp_path):
     command = [sys.executable, "-m", "overlapper", "chart", "--family=box deep", "--seconds=0.01", f"--out={tmp_path}"]
     command += [f"--method={name}" for name in methods]
     subprocess.run(command, check=True, capture_output=True, timeout=300)
-    notes, rows = chart.read(tmp_path / "speed.csv")
+    notes, rows = chart.read(tmp_path / "speed.csv", interleaved.Row)
     assert "overlapper" in notes[0]
     assert {row.method for row in rows} == set(methods)
     assert all(row.us or row.note.startswith("missing: ") for row in rows)
@@ -163,15 +165,38 @@ def test_the_command_writes_results_page_and_charts(tmp_path):
     assert {"speed.png", "speed.svg", "speed_families.png", "speed_families.svg"} <= written
 
 
-def test_slopes_are_those_of_the_lines(tmp_path):
-    points = [(80.0, 1.0), (320.0, 4.0), (1280.0, 32.0), (5120.0, 256.0)]
-    lines = {"deep": {"auto": points}, "shallow": {"auto": points[:3]}}
-    assert speed_page.slopes_of(lines["deep"])["auto"] == pytest.approx(1.5)
-    assert speed_page.slopes_of(lines["shallow"]) == {}
-    speed_figures.sizes(
-        lines, {way: speed_page.slopes_of(found) for way, found in lines.items()}, tmp_path / "sizes.png"
-    )
+def test_time_over_size_names_its_power(tmp_path):
+    times = {80: 1.0, 320: 4.0, 1280: 32.0, 5120: 256.0}
+    rows = [interleaved.Row(f"i{n} deep", 1, "auto", "0.001", "volume", us=str(us)) for n, us in times.items()]
+    rows += [interleaved.Row("i80 shallow", 1, "paper", "", "volume", us="3")]
+    deep, shallow = (speed_page.sizes(rows, way) for way in ("deep", "shallow"))
+    assert deep.powers["auto"] == pytest.approx(1.5)
+    assert shallow.powers == {}
+    speed_figures.growth([deep, shallow], tmp_path / "sizes.png")
     assert "auto, 1.50" in (tmp_path / "sizes.svg").read_text(encoding="utf-8")
+
+
+def test_one_hull_and_the_tree_find_what_many_bodies_share():
+    rng = np.random.default_rng(0)
+    clouds = [directions(rng, 12) + 0.2 * directions(rng, 1) for _ in range(5)]
+    volume = float(exact.common(*map(exact.hull, clouds)).volume)
+    bodies = [Placed(Hull(cloud)) for cloud in clouds]
+    walls, at = [timed_peers.planes(body) for body in bodies], paper_claims.middle(*bodies)
+    assert paper_claims.by_one_hull(walls, at) == pytest.approx(volume, rel=1e-9)
+    assert paper_claims.by_tree(walls, at) == pytest.approx(volume, rel=1e-9)
+
+
+def test_the_page_says_what_the_claims_come_to():
+    def claim(kind, way, vertices, bodies, us):
+        return paper_claims.Claim(kind, way, vertices, bodies, f"{us:g}", "0.00e+00")
+
+    ways = {"paper": 1.0, "auto": 1.0, "cutting": 2.0, "duality": 1.0}
+    claims = [claim("pair", way, n, 2, n**power) for way, power in ways.items() for n in (50, 100, 200)]
+    claims += [claim("bodies", way, 32, m, m) for way in ("paper", "auto", "one hull", "tree") for m in (8, 16, 32)]
+    claims += [claim("cores", way, 32, 8, us) for way, us in (("1 cores", 3000), ("2 cores", 2000))]
+    said = speed_page.claims_text(claims, speed_page.of_pairs(claims), speed_page.of_groups(claims))
+    assert "grows with the power of 2.00" in said.replace("\n", " ")
+    assert "| 8 bodies of 32 vertices | 3 ms | 2 ms | 1.50 |" in said
 
 
 def test_without_a_checkout_the_command_says_so(tmp_path, monkeypatch):
