@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Batch, Hull, Overlaps, Placed, Shape
+from overlapper import Batch, Hull, Placed, Shape
 from overlapper.comparison import Differences, Move, compare_measures, compare_poses, loose_budgets, poses, shape_label
 from overlapper.contacts import Contacts
 from overlapper.expected import DRIFT, MEASURES, ROUNDING, Budget, Expected, Key, read_expected
@@ -225,8 +225,8 @@ class Still:
         batch, where = Batch(self.shapes), (self.positions, self.orientations)
         keys = np.array(self.keys, dtype=np.int64).reshape(-1, 3)
         bodies, pairs = keys[:, 0], batch.candidate_pairs(*where)
-        found = batch.overlaps(*where, pairs[bodies[pairs[:, 0]] != bodies[pairs[:, 1]]], tolerance)
-        return Contacts(keys, found[found.status != Overlaps.SEPARATED])
+        among = pairs[bodies[pairs[:, 0]] != bodies[pairs[:, 1]]]
+        return Contacts(keys, batch.overlaps(*where, among, tolerance, separated=False))
 
 
 def _stills(scene: Scene, steps: Sequence[int]) -> dict[int, Still]:

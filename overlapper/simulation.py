@@ -7,6 +7,7 @@ makes a 32-gon hull). Pairs are those that the simulator lets collide.
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -161,7 +162,7 @@ class Bodies:
         self._arrange()
         self._rules = self._current_rules()
         self._refresh()
-        self._examined = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
+        self._found = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
 
     def update(self) -> None:
         """Read the shapes of new bodies and changed filters, then all poses. Call it once per step.
@@ -185,9 +186,10 @@ class Bodies:
         among: Among = pairs if isinstance(pairs, str) else list(pairs)
         candidates = self.pairs(among)
         self._asked = among if isinstance(among, str) else len(self._codes(among))
-        found = self._batch.overlaps(self._positions, self._orientations, candidates, tolerance, threads, method)
-        self._examined = found
-        return Contacts(self._key_rows, found[found.status != Overlaps.SEPARATED])
+        self._found = self._batch.overlaps(
+            self._positions, self._orientations, candidates, tolerance, threads, method, separated=False
+        )
+        return Contacts(self._key_rows, self._found)
 
     def pairs(self, among: Among = "simulated") -> NDArray[np.int32]:
         """(n, 2) pairs of shapes whose boxes meet, as places in `keys`: each once, the lesser first, sorted.
@@ -206,16 +208,16 @@ class Bodies:
 
     def report(self) -> Report:
         """How much of the scene was read, and how much of it the last `overlaps()` looked at."""
-        examined = self._examined
+        found = self._found
         return Report(
             bodies=len(self._bodies),
             shapes=sum(body.shape_count for body in self._bodies.values()) + self._unidentified,
             shapes_read=len(self._keys),
             pairs_possible=self._pairs_possible(),
-            pairs_examined=len(examined),
-            pairs_overlapping=int((examined.status == Overlaps.OVERLAPPING).sum()),
-            pairs_widened=int(examined.widened.sum()),
-            facets_touched=int(examined.facets_touched.sum()),
+            pairs_examined=found.examined,
+            pairs_overlapping=int((found.status == Overlaps.OVERLAPPING).sum()),
+            pairs_widened=int(found.widened.sum()),
+            facets_touched=int(found.facets_touched.sum()),
         )
 
     @property
@@ -423,6 +425,10 @@ class Bodies:
         self._positions, self._orientations = _core.world_poses(
             self._poses.frames, self._frames, self._local_positions, self._local_orientations
         )
+        if not math.isfinite(self._positions.sum() + self._orientations.sum()):
+            self._look_for_divergence()
+
+    def _look_for_divergence(self) -> None:
         finite = np.isfinite(self._positions).all(axis=1) & np.isfinite(self._orientations).all(axis=1)
         if not finite.all():
             body = self._keys[int(np.argmin(finite))][0]

@@ -107,6 +107,16 @@ def test_without_pairs_all_that_overlap_or_touch_are_found(seed):
     assert len(answer) <= answer.examined < every.examined
 
 
+def test_pairs_that_are_apart_may_be_left_out():
+    shapes, positions, orientations = scene(np.random.default_rng(2))
+    batch, pairs = Batch(shapes), all_pairs(len(shapes))
+    every = batch.overlaps(positions, orientations, pairs, TOLERANCE)
+    for asked in (batch, Batch(shapes)):
+        answer = asked.overlaps(positions, orientations, pairs, TOLERANCE, separated=False)
+        assert bits(answer) == bits(every[every.status != Overlaps.SEPARATED])
+        assert answer.examined == every.examined == len(pairs)
+
+
 def test_bodies_that_touch_are_found():
     """Three unit cubes in a row on the ground, far enough out that their sides are rounded."""
     cube = Box([0.5, 0.5, 0.5])

@@ -49,6 +49,18 @@ def test_two_boxes_share_a_box(run):
     assert "moved     separated, 0.250 mm between them" in text
 
 
+def test_of_many_pairs_all_are_measured_and_their_forces_cancel(run):
+    text = run("many_pairs.py")
+    (first, volume), (second, volume_after) = numbers(
+        r"moved: ([\d,.]+) pairs share ([\d.]+) m³", text.replace(",", "")
+    )
+    assert first > 1000 and abs(second - first) < 30 and 0 < abs(volume_after - volume) < 0.01 * volume
+    ((deepest,),) = numbers(r"deepest: \d+ and \d+, ([\d.]+) m", text)
+    assert 0.05 < deepest < 0.2  # the largest half extent is 0.1 m
+    ((largest, remains),) = numbers(r"largest force ([\d.e+-]+) N, sum ([\d.e+-]+) N", text)
+    assert largest > 1e3 and remains < 1e-12 * largest * 300
+
+
 def test_the_loop_ends_with_every_box_on_the_one_below(run):
     text = run("pybullet_loop.py")
     assert len(re.findall(r"^\d\.\d s: ", text, re.MULTILINE)) == 11

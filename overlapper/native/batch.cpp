@@ -231,8 +231,9 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
     }
   }
   const Body &a = bodies[pair.pair[0]], &b = bodies[pair.pair[1]];
-  // The article's method has its own way of telling.
-  const bool separated = by_method == Method::kAuto && apart(a, b, pair.axis);
+  // The article's method has its own way of telling, and clipping is sooner done than an axis looked for in vain.
+  const bool overlapped = before[i] >= 0 && rows[before[i]].status == Status::kOverlapping;
+  const bool separated = by_method == Method::kAuto && !overlapped && apart(a, b, pair.axis);
   next_rows[i] = separated ? Overlaps::Row{} : row_of(Overlap(a.placed, b.placed, with_tolerance, by_method));
   done[i] = true;
   return separated;
@@ -280,8 +281,8 @@ std::vector<IndexPair> Batch::candidate_pairs(std::span<const double> positions,
 }
 
 Overlaps Batch::overlaps(std::span<const double> positions, std::span<const double> orientations,
-                         std::optional<std::span<const IndexPair>> given, double tolerance, Method method, int threads,
-                         const std::function<bool()>& go_on, bool& finished) {
+                         std::optional<std::span<const IndexPair>> given, bool separated, double tolerance,
+                         Method method, int threads, const std::function<bool()>& go_on, bool& finished) {
   if (!(tolerance > 0 && tolerance < 1))
     throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
   Borrowed memory(*this);
@@ -298,7 +299,7 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   answer.shapes = shapes_;
   answer.poses = memory->poses;
   const auto listed = [&](size_t i) {
-    return memory->done[i] && (given || memory->next_rows[i].status != Status::kSeparated);
+    return memory->done[i] && (separated || memory->next_rows[i].status != Status::kSeparated);
   };
   size_t rows = 0;
   for (size_t i = 0; i < pairs.size(); ++i) answer.examined += memory->done[i], rows += listed(i);

@@ -70,12 +70,12 @@ class Batch {
   /// The pairs i < j whose boxes meet, sorted. Both throw std::invalid_argument that names a pose that is none.
   std::vector<IndexPair> candidate_pairs(std::span<const double> positions, std::span<const double> orientations);
 
-  /// A row for each of `pairs`; without them, for each pair that overlaps or touches. The bits depend neither on
-  /// `threads` nor on earlier calls. When `go_on`, asked every 50 ms, says no, `finished` becomes false and only pairs
-  /// that were done have rows.
+  /// A row for each of `pairs`, or without them for each whose boxes meet, that overlaps or touches; for the others,
+  /// too, if the `separated` are wanted. The bits depend neither on `threads` nor on earlier calls. When `go_on`, asked
+  /// every 50 ms, says no, `finished` becomes false and only pairs that were done have rows.
   Overlaps overlaps(std::span<const double> positions, std::span<const double> orientations,
-                    std::optional<std::span<const IndexPair>> pairs, double tolerance, Method method, int threads,
-                    const std::function<bool()>& go_on, bool& finished);
+                    std::optional<std::span<const IndexPair>> pairs, bool separated, double tolerance, Method method,
+                    int threads, const std::function<bool()>& go_on, bool& finished);
 
  private:
   struct Memory;

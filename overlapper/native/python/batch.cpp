@@ -64,7 +64,8 @@ bool go_on() {
 }
 
 nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orientations, nb::handle pairs,
-                          nb::handle tolerance_given, nb::handle threads_given, nb::handle method_name) {
+                          nb::handle tolerance_given, nb::handle threads_given, nb::handle method_name,
+                          bool separated) {
   const size_t k = batch.shapes().size();
   const auto [position_array, p] = to_poses(positions, "positions", k, 3);
   const auto [orientation_array, q] = to_poses(orientations, "orientations", k, 4);
@@ -81,7 +82,7 @@ nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orienta
   Overlaps found;
   {
     const nb::gil_scoped_release release;
-    found = batch.overlaps(p, q, span, tolerance, method, threads, go_on, finished);
+    found = batch.overlaps(p, q, span, given && separated, tolerance, method, threads, go_on, finished);
   }
   nb::object answer = nb::cast(std::move(found));
   if (finished) return answer;
@@ -196,8 +197,8 @@ constexpr const char* kOverlapsDoc =
 gradient as arrays.
 
 `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs` (p, 2)
-indexes them and has a row each in the answer; without it there is a row for each pair that overlaps or touches, found by
-a tree of boxes and sorted. `tolerance` and `method` are those of `overlap`, whose answers these are to the last bit. The work is
+indexes them and has a row each in the answer, or with separated=False only those that overlap or touch; without it there is
+a row for each pair that overlaps or touches, found by a tree of boxes and sorted. `tolerance` and `method` are those of `overlap`, whose answers these are to the last bit. The work is
 spread over `threads`, None being all that there are; their number does not change a bit of the answer.
 
 Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
@@ -215,10 +216,10 @@ answers are those of a first call to the last bit. Threads that ask at the same 
       "__init__", [](Batch* self, nb::handle shapes) { new (self) Batch(to_shapes(shapes)); }, "shapes"_a.none(),
       nb::sig("def __init__(self, shapes: " OVERLAPPER_SHAPES ") -> None"));
   cls.def("overlaps", &batch_overlaps, "positions"_a.none(), "orientations"_a.none(), "pairs"_a.none() = nb::none(),
-          "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1, "method"_a.none() = "auto",
+          "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1, "method"_a.none() = "auto", "separated"_a = true,
           nb::sig("def overlaps(self, " OVERLAPPER_POSES ", pairs: numpy.typing.ArrayLike | None = None, "
                   "tolerance: float = 0.001, threads: int | None = 1, "
-                  "method: typing.Literal['auto', 'paper'] = 'auto') -> Overlaps"),
+                  "method: typing.Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps"),
           kOverlapsDoc);
   cls.def(
       "candidate_pairs", &candidates, "positions"_a.none(), "orientations"_a.none(),
@@ -235,15 +236,15 @@ void define_batch(nb::module_& m) {
   m.def(
       "overlaps",
       [](nb::handle shapes, nb::handle positions, nb::handle orientations, nb::handle pairs, nb::handle tolerance,
-         nb::handle threads, nb::handle method) {
+         nb::handle threads, nb::handle method, bool separated) {
         Batch batch(to_shapes(shapes));
-        return batch_overlaps(batch, positions, orientations, pairs, tolerance, threads, method);
+        return batch_overlaps(batch, positions, orientations, pairs, tolerance, threads, method, separated);
       },
       "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none(), "pairs"_a.none() = nb::none(),
-      "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1, "method"_a.none() = "auto",
+      "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1, "method"_a.none() = "auto", "separated"_a = true,
       nb::sig("def overlaps(shapes: " OVERLAPPER_SHAPES ", " OVERLAPPER_POSES
               ", pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, "
-              "method: typing.Literal['auto', 'paper'] = 'auto') -> Overlaps"),
+              "method: typing.Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps"),
       kOverlapsDoc);
   m.def(
       "candidate_pairs",

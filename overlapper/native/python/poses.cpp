@@ -3,14 +3,6 @@
 namespace overlapper::python {
 namespace {
 
-/// The numbers of row `row` of an array that Python gave.
-template <size_t n>
-std::array<double, n> row_of(const Doubles& array, size_t row) {
-  std::array<double, n> numbers{};
-  std::copy_n(array.data() + n * row, n, numbers.begin());
-  return numbers;
-}
-
 template <size_t n>
 void read(nb::handle given, std::array<double, n>& numbers) {
   const nb::object sequence = nb::steal(PySequence_Fast(given.ptr(), "frames must be pairs of sequences of numbers"));
@@ -73,18 +65,16 @@ nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handl
     fail("positions", "must have the shape (k, 3), a row for each of `which`");
   if (local_orientations.ndim() != 2 || local_orientations.shape(0) != k || local_orientations.shape(1) != 4)
     fail("orientations", "must have the shape (k, 4), a row for each of `which`");
-  std::vector<double> positions, orientations;
-  positions.reserve(3 * k);
-  orientations.reserve(4 * k);
+  std::vector<double> positions(3 * k), orientations(4 * k);
   for (size_t i = 0; i < k; ++i) {
     if (which(i) < 0 || which(i) >= std::int64_t(frames.size())) fail("which", "must index the frames");
     const Frame& frame = frames[which(i)];
-    const auto p = row_of<3>(local_positions, i);
-    const auto q = row_of<4>(local_orientations, i);
+    const double *p = local_positions.data() + 3 * i, *q = local_orientations.data() + 4 * i;
     const Vec3 x = frame.position + rotated(frame.orientation, {p[0], p[1], p[2]});
     const Quaternion r = frame.orientation * Quaternion{q[0], q[1], q[2], q[3]};
-    positions.insert(positions.end(), {x.x, x.y, x.z});
-    orientations.insert(orientations.end(), {r.x, r.y, r.z, r.w});
+    double *position = &positions[3 * i], *orientation = &orientations[4 * i];
+    position[0] = x.x, position[1] = x.y, position[2] = x.z;
+    orientation[0] = r.x, orientation[1] = r.y, orientation[2] = r.z, orientation[3] = r.w;
   }
   return nb::make_tuple(to_numpy<Matrix>(std::move(positions), {k, 3}),
                         to_numpy<Matrix>(std::move(orientations), {k, 4}));
