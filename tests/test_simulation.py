@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, distance, extraction
 from overlapper.bullet_file import Leaf
-from overlapper.simulation import Bodies, SkippedShapeWarning
+from overlapper.simulation import Bodies, Recorder, SkippedShapeWarning
 
 DATA = Path(pybullet_data.getDataPath())
 CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -271,6 +271,42 @@ def test_inertial_frames_of_created_links_are_accounted_for(client):
         assert_modelled_as_collided(client, bodies, id, link, np.random.default_rng(1))
 
 
+@pytest.mark.parametrize("scale", [[-1, 1, 1], [0.5, -2, 0.3], [-1, -1, -1]])
+@pytest.mark.parametrize("file", [True, False])
+def test_meshes_are_scaled_and_mirrored_as_bullet_has_them(client, tmp_path, scale, file):
+    corners = np.random.default_rng(2).normal(size=(9, 3)).round(6) + [1, 0, 0]
+    (tmp_path / "part.obj").write_text(
+        "".join("v {} {} {}\n".format(*corner) for corner in corners) + "f 1 2 3\nf 4 5 6\nf 7 8 9\nf 1 5 9\n"
+    )
+    source = {"fileName": str(tmp_path / "part.obj")} if file else {"vertices": corners.tolist()}
+    id = body(client, p.GEOM_MESH, meshScale=scale, position=POSITION, orientation=ORIENTATION, **source)
+    bodies = Bodies(client)
+    assert_allclose(bodies.shapes[0].volume, Hull(corners * scale).volume, rtol=1e-3)  # Bullet moves corners a little
+    assert_modelled_as_collided(client, bodies, id, -1, np.random.default_rng(1))
+
+
+def test_merged_links_are_where_bullet_collides_with_them(client, tmp_path):
+    def spread(axis):
+        return " ".join(str(0.3 * (other == axis)) for other in "xyz")
+
+    text = "".join(
+        f'<link name="{name}">{INERTIAL.format(spread(axis), "0.3 0.2 0.1")}<collision><origin xyz="{spread(axis)}"/>'
+        f"<geometry>{geometry}</geometry></collision></link>"
+        for name, axis, geometry in zip("abc", "xyz", GEOMETRIES[:1] * 3)
+    )
+    for parent, child, kind in (("a", "b", "fixed"), ("b", "c", "fixed")):
+        text += (
+            f'<joint name="{child}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+            '<origin xyz=".5 .4 .3" rpy=".3 .2 .1"/></joint>'
+        )
+    (tmp_path / "merged.urdf").write_text(f'<robot name="merged">{text}</robot>')
+    pose = {"basePosition": POSITION, "baseOrientation": ORIENTATION}
+    id = p.loadURDF(str(tmp_path / "merged.urdf"), flags=p.URDF_MERGE_FIXED_LINKS, physicsClientId=client, **pose)
+    bodies = Bodies(client)
+    assert bodies.keys == [(id, -1, 0), (id, -1, 1), (id, -1, 2)]
+    assert_modelled_as_collided(client, bodies, id, -1, np.random.default_rng(1))
+
+
 def test_equal_shapes_are_one_object(client):
     for x in range(3):
         p.loadURDF("duck_vhacd.urdf", [x, 0, 0], physicsClientId=client)
@@ -469,6 +505,15 @@ def test_user_data_of_others_come_and_go(client):
     p.removeBody(ids[1], physicsClientId=client)
     bodies.update()
     assert [key[0] for key in bodies.keys] == [ids[0], ids[2]]
+
+
+def test_a_model_that_is_loaded_again_at_another_scale_is_noticed(client):
+    old = p.loadURDF("cube.urdf", globalScaling=0.5, physicsClientId=client)
+    bodies = Bodies(client)
+    p.removeBody(old, physicsClientId=client)
+    assert p.loadURDF("cube.urdf", globalScaling=0.7, physicsClientId=client) == old
+    bodies.update()
+    assert_allclose([shape.half_extents for shape in bodies.shapes], [[0.35] * 3], rtol=1e-7)
 
 
 def test_two_readers_of_one_client_both_notice_a_replaced_body(client):
@@ -744,6 +789,16 @@ def test_a_simulation_in_another_process_is_read():
         bodies = Bodies(client)
         assert [shape.half_extents[0] for shape in bodies.shapes] == [0.1, 0.2]
         assert bodies.positions.tolist() == [[1, 2, 3]] * 2
+        with Recorder(client) as recorder:
+            watched = Bodies(client, recorder=recorder)
+            assert len(watched.overlaps()) == 1
+            p.setCollisionFilterPair(0, 1, -1, -1, 0, physicsClientId=client)
+            watched.update()
+            assert watched.overlaps() == []
+            p.removeBody(1, physicsClientId=client)
+            assert body(client, p.GEOM_SPHERE, radius=0.3) == 1
+            watched.update()
+            assert [type(shape) for shape in watched.shapes] == [Box, Sphere]
         p.disconnect(client)
         server.stdin.close()
 
