@@ -279,7 +279,7 @@ const Region& Overlap::grown() const {
   if (kept) return *kept;
   if (traced()) {
     const Arrangement& at = arrangement();
-    if (auto region = region_of_clipped(bodies_[at.order[0]], bodies_[at.order[1]], at.reference))
+    if (auto region = region_of_clipped(bodies()[at.order[0]], bodies()[at.order[1]], at.reference))
       return kept.emplace(owned_as_given(std::move(*region)));
   }
   const Search& found = search();
