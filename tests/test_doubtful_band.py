@@ -97,6 +97,7 @@ def test_features_in_exact_contact_still_touch(seed):
         ("slender_groups", 10046),
         ("parallel_edges", 10130),
         ("scaled", 10127),
+        ("shared_facets", 60190),
     ],
 )
 def test_the_thinnest_cases_keep_the_rules(family, seed):

@@ -27,8 +27,10 @@ std::partial_ordering compare(const Hull& a, const Hull& b) {
   if (const auto by_volume = a.data->volume <=> b.data->volume; by_volume != 0) return by_volume;
   if (const auto by_origin = compare(a.data->origin, b.data->origin); by_origin != 0) return by_origin;
   const auto &p = a.data->corners, &q = b.data->corners;
-  return std::lexicographical_compare_three_way(p.begin(), p.end(), q.begin(), q.end(),
-                                                [](Vec3 u, Vec3 v) { return compare(u, v); });
+  const auto by_corners = std::lexicographical_compare_three_way(p.begin(), p.end(), q.begin(), q.end(),
+                                                                 [](Vec3 u, Vec3 v) { return compare(u, v); });
+  // Points inside leave no other trace than the order in which facets were found.
+  return by_corners != 0 ? by_corners : a.data->triangles <=> b.data->triangles;
 }
 
 std::partial_ordering compare(const RoundedHull& a, const RoundedHull& b) {

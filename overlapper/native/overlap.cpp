@@ -171,6 +171,12 @@ const Overlap::Search& Overlap::search() const {
   return kept.emplace(std::move(search));
 }
 
+/// How large the numbers are that describe the bodies.
+double Overlap::largest_reach() const {
+  const std::vector<double>& reach = search().reach;
+  return *std::max_element(reach.begin(), reach.end());
+}
+
 std::vector<WideBody> Overlap::wide_bodies() const {
   std::vector<WideBody> bodies;
   for (const Placed& body : arrangement().relative) bodies.emplace_back(body, wide(arrangement().reference));
@@ -283,7 +289,7 @@ const Region& Overlap::grown() const {
       return kept.emplace(owned_as_given(std::move(*region)));
   }
   const Search& found = search();
-  const double reach = *std::max_element(found.reach.begin(), found.reach.end());
+  const double reach = largest_reach();
   if (found.wide_ball) return kept.emplace(grown_about(*found.wide_ball, reach));
   const Arrangement& about = arrangement();
   const Frame frame = round_frame<Placed>(about.relative, found.planes, found.ball.cuts, found.ball.centre);
@@ -311,31 +317,29 @@ const Quantities& Overlap::measured() const {
       return *kept;
     }
     if (pair()) {
-      const double reach = *std::max_element(found.reach.begin(), found.reach.end());
-      kept = closed_form(at.relative[0], at.relative[1], rounding(reach), at.reference);
-      if (kept) {
+      kept = closed_form(at.relative[0], at.relative[1], rounding(largest_reach()), at.reference);
+      // Where its terms nearly cancel, a polytope knows more.
+      if (kept && kept->volume_error > tolerance_ * kept->volume) kept.reset();
+      if (kept)
         for (Quantities::Pull& pull : kept->pulls) pull.owner = at.order[pull.owner];
-        return *kept;
-      }
     }
   }
-  kept = measure(grown());
-  if (std::ranges::any_of(bodies(), smooth_body)) return *kept;
-  const auto enough = [&] { return kept->volume_error <= kEnough * kept->volume; };
+  if (!kept) kept = measure(grown());
   const auto keep_better = [&](const Region& region) {
     Quantities again = measure(region);
     again.widened = true;
     if (!kept->widened || again.volume_error < kept->volume_error) kept = std::move(again);
   };
-  if (!enough())
+  const bool polyhedral = std::ranges::none_of(bodies(), smooth_body);
+  const auto enough = [&] { return kept->volume_error <= kEnough * kept->volume; };
+  if (polyhedral && !enough())
     if (auto wide = overlapper::widened(at.relative, grown())) keep_better(owned_as_given(std::move(*wide)));
-  if (!enough()) {
+  if (polyhedral ? !enough() : rounding(largest_reach()) * kept->area > tolerance_ * kept->volume) {
     // The point about which the region was grown may not be inside after all, or its frame not be round.
-    const Search& found = search();
-    const double reach = *std::max_element(found.reach.begin(), found.reach.end()), noise = wide_noise(reach);
-    const WideBall ball = wide_deepest_ball(wide_bodies(), {}, 4 * noise, reach, noise);
-    if (ball.lower > 0) keep_better(grown_about(ball, reach));
-    else kept->volume_error += kept->volume + touching_volume(found.ball);
+    const double noise = wide_noise(largest_reach());
+    const WideBall ball = wide_deepest_ball(wide_bodies(), {}, 4 * noise, largest_reach(), noise);
+    if (ball.lower > 0) keep_better(grown_about(ball, largest_reach()));
+    else kept->volume_error += kept->volume + touching_volume(search().ball);
   }
   return *kept;
 }

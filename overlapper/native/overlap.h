@@ -103,6 +103,7 @@ class Overlap {
   const Arrangement& arrangement() const;
   const Search& search() const;
   void settle_in_wide_arithmetic(Search& search) const;
+  double largest_reach() const;
   std::vector<WideBody> wide_bodies() const;
   Distance wide_distance(double reach) const;
   Penetration parting(std::vector<Vec3> normals) const;
