@@ -7,7 +7,7 @@ import exact
 import numpy as np
 import pytest
 from families import make
-from rules import UNPROVED, answer, complaints
+from rules import UNPROVED, answer, complaints, figures_are_finite
 
 from overlapper import Placed, Sphere, overlap
 
@@ -126,3 +126,8 @@ def test_a_ball_of_a_nanometre_on_one_of_a_thousand_kilometres_overlaps_it():
         assert found.status == status
         cap = np.pi * depth**2 * (3e-9 - depth) / 3 if depth > 0 else 0
         assert abs(found.volume - cap) <= found.volume_error <= 0.02 * cap
+
+
+def test_hulls_of_hundreds_of_facets_have_all_their_figures():
+    case = make("pole_slivers", 70000)
+    assert not figures_are_finite(case, answer(case.placed))

@@ -205,16 +205,16 @@ void Overlap::settle_in_wide_arithmetic(Search& search) const {
   const std::vector<WideBody> bodies = wide_bodies();
   // Nearer or thinner than the rounding of their coordinates, bodies touch, but not by 1e-12 of the smaller one's size.
   const double margin = std::max(4 * noise, std::min(rounding(largest_size / 2), 0x1p-41 * least_size));
-  WideVector apart;
+  std::vector<OwnedPlane> hints = search.ball.cuts;
   if (pair()) {
     const WideGap gap = wide_gap(bodies[0], bodies[1], noise);
     if (gap.certified > margin) {
       search.status = Status::kSeparated;
       return;
     }
-    apart = wide(gap.normal);
+    if (norm2(gap.normal) > 0) hints.insert(hints.end(), {{{-gap.normal, 0}, 0}, {{gap.normal, 0}, 1}});
   }
-  search.wide_ball = wide_deepest_ball(bodies, apart, margin, reach, noise);
+  search.wide_ball = wide_deepest_ball(bodies, hints, margin, reach, noise);
   if (search.wide_ball->upper < -margin) search.status = Status::kSeparated;
   if (search.wide_ball->lower > margin) search.status = Status::kOverlapping;
   search.ball.upper = search.wide_ball->upper;
@@ -337,9 +337,9 @@ const Quantities& Overlap::measured() const {
   if (polyhedral ? !enough() : rounding(largest_reach()) * kept->area > tolerance_ * kept->volume) {
     // The point about which the region was grown may not be inside after all, or its frame not be round.
     const double noise = wide_noise(largest_reach());
-    const WideBall ball = wide_deepest_ball(wide_bodies(), {}, 4 * noise, largest_reach(), noise);
+    const WideBall ball = wide_deepest_ball(wide_bodies(), search().ball.cuts, 4 * noise, largest_reach(), noise);
     if (ball.lower > 0) keep_better(grown_about(ball, largest_reach()));
-    else kept->volume_error += kept->volume + touching_volume(search().ball);
+    else if (polyhedral) kept->volume_error += kept->volume + touching_volume(search().ball);
   }
   return *kept;
 }

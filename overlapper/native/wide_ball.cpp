@@ -133,8 +133,8 @@ Owned<WidePlane> tightest(std::span<const WideBody> bodies, const WideVector& po
 
 }  // namespace
 
-WideBall wide_deepest_ball(std::span<const WideBody> bodies, const WideVector& hint, double margin, double reach,
-                           double noise) {
+WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const OwnedPlane> hints, double margin,
+                           double reach, double noise) {
   const std::array<WidePlane, 4> simplex = surrounding_simplex(bodies, reach);
   Basis basis(simplex);
   WideBall best{{}, -kInfinity, kInfinity, {}};
@@ -143,9 +143,10 @@ WideBall wide_deepest_ball(std::span<const WideBody> bodies, const WideVector& h
     best.cuts.push_back(cut);
     return basis.exchange(cut.plane);
   };
-  if (norm(hint).head > 0) {
-    if (bounded(bodies[0].shape)) enter({supporting(bodies[0], -hint), 0});
-    if (bounded(bodies[1].shape)) enter({supporting(bodies[1], hint), 1});
+  for (const auto& [plane, owner] : hints) {
+    if (owner < 0 || !bounded(bodies[owner].shape)) continue;
+    const WidePlane exactly = supporting(bodies[owner], wide(plane.normal));
+    if (signed_distance(exactly, basis.centre()).head > 0) enter({exactly, owner});
   }
   constexpr int kMaxRounds = 512;
   for (int round = 0; round < kMaxRounds; ++round) {

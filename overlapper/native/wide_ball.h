@@ -16,9 +16,9 @@ struct WideBall {
   std::vector<Owned<WidePlane>> cuts;  ///< the planes asked for; they bound the common set
 };
 
-/// `hint` is a direction in which a pair may be apart, or {0, 0, 0}. `reach` is how large the coordinates are, and
+/// `hints` are planes to begin with, of which only the normals count. `reach` is how large the coordinates are, and
 /// `noise` how far rounding in double-double may move a plane.
-WideBall wide_deepest_ball(std::span<const WideBody> bodies, const WideVector& hint, double margin, double reach,
-                           double noise);
+WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const OwnedPlane> hints, double margin,
+                           double reach, double noise);
 
 }  // namespace overlapper
