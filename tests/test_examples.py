@@ -172,3 +172,11 @@ def test_a_repository_of_ones_own_is_guarded_by_what_its_workflow_runs(tmp_path)
     assert "drawer" in thicker.stdout and "volume_m3" in thicker.stdout
     assert 'failures="1"' in (repository / "out" / "scenes.xml").read_text(encoding="utf-8")
     assert (repository / "out" / "drawer.moved.html").is_file()
+
+
+def test_poses_free_of_self_collision_are_those_of_pybullet(run):
+    text = run("self_collision.py")
+    ((free, same),) = numbers(r"^(\d+) of 100 poses are free, and pybullet says the same of (\d+)", text)
+    assert 0 < free < 100 and same == 100
+    ((deepest,),) = numbers(r"deepest: lbr_iiwa/\w+ and lbr_iiwa/\w+, ([\d.]+) mm", text)
+    assert deepest > 10
