@@ -95,8 +95,8 @@ def to_draw(overlap: Overlap, size: float) -> Overlap:
     """The overlap with no more facets than are seen in a scene of that size, m: what is round is drawn less so."""
     if len(overlap.owner) <= MANY_FACETS:
         return overlap
-    extent = np.ptp(np.asarray(overlap.bounds), axis=0).max()
-    return common_part(*overlap.shapes, tolerance=0.03 if extent > 0.1 * size else 0.1) or overlap
+    extent = np.ptp(np.asarray(overlap.bounds), axis=0).max() / size
+    return common_part(*overlap.shapes, tolerance=0.03 if extent > 0.1 else 0.1 if extent > 0.04 else 0.2) or overlap
 
 
 def arrow_length(area: float, size: float) -> float:

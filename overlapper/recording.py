@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import math
 import pickle
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Overlap, Placed
+from overlapper import Overlap, Placed, Sphere
 from overlapper.labels import ROOT, Bodies, Contact, body_paths, pairs
 from overlapper.look import BODIES, INK, LIGHT, LINE, OVERLAPS, OWNER_COLORS, Array, Look, boxes, to_draw
 from overlapper.stage import Stage, rgb
@@ -28,8 +29,21 @@ from meshcat.servers.zmqserver import VIEWER_ROOT  # isort: skip
 from meshcat.transformations import translation_matrix  # isort: skip
 
 Pair = tuple[str, str]
+SCRIPTS = (
+    "film",
+    "scene",
+    "look",
+    "camera",
+    "numbers",
+    "chart",
+    "time",
+)  # of the page, in the order they need each other
 ARRAYS = {"float32": "Float32Array", "uint32": "Uint32Array", "int32": "Int32Array", "uint16": "Uint16Array"}
 ARRAYS |= {"int16": "Int16Array", "uint8": "Uint8Array"}
+
+
+# Volume; its error, of which one digit is shown; depth, area, centroid; normal: columns, and bits that are enough.
+NUMBERS = [(slice(0, 1), 17), (slice(1, 2), 6), (slice(2, 7), 17), (slice(7, 10), 14)]
 
 
 class Recording:
@@ -85,9 +99,8 @@ class Recording:
             if self._poses.get(node, absent) != pose:
                 self._keys.append((len(self._times) - 1, self._nodes[node], pose))
             self._poses[node] = pose
-        overlaps = pairs(bodies, contacts)
-        for pair in sorted(overlaps, key=lambda pair: -overlaps[pair].volume):
-            self._add_overlap(self._stage, pair, overlaps[pair])
+        for pair, overlap in pairs(bodies, contacts).items():
+            self._add_overlap(self._stage, pair, overlap)
 
     def save(self, path: str | Path) -> Path:
         """Write what was added so far to one HTML file, and return its path."""
@@ -95,9 +108,9 @@ class Recording:
             raise ValueError("there is nothing to save: add at least one frame first")
         tape = _Tape(list(self._tape.commands))
         self._stage.set(Visualizer(window=tape), [*self._framed, *self._seen_in.values()])
-        folder = Path(__file__).parent
+        folder = Path(__file__).with_name("page")
         texts = {
-            "script": (folder / "recording.js").read_text(encoding="utf-8"),
+            "script": "\n".join((folder / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS),
             "meshcat": Path(VIEWER_ROOT, "main.min.js").read_text(encoding="utf-8"),
             "commands": _packed(f"[{','.join(tape.commands)}]".encode()),
             "film": _packed(_film(self._heading(self._stage), self._arrays())),
@@ -131,7 +144,7 @@ class Recording:
             "sighting_start": np.searchsorted(sightings[:, 0], np.arange(len(self._times) + 1)).astype(np.uint32),
             "sighting_pair": sightings[:, 1],
             "sighting_polytope": sightings[:, 2],
-            "numbers": _five_digits(numbers).T,
+            "numbers": np.hstack([_rounded(numbers[:, column], bits) for column, bits in NUMBERS]).T,
             **self._polytopes.arrays(),
         }
 
@@ -223,32 +236,32 @@ def _pose(stage: Stage, placed: Placed) -> tuple[float, ...]:
 def _look_alike(a: Overlap, b: Overlap) -> bool:
     """True if the one can stand for the other in a picture.
 
-    Neither shape has moved by more than 1/500 of the size of what they share, nor has its volume or area changed by
-    more than a hundredth, as it does in a thin overlap where that is much.
+    Neither shape has moved by more than 1/200 of the size of what they share, a pixel where that fills a quarter
+    of the page, nor has its volume or area changed by more than 3 %, as it does in a thin overlap where that is much.
     """
-    size = np.ptp(np.asarray(a.bounds), axis=0).max()
     changed = max(abs(b.volume / a.volume - 1), abs(b.area / a.area - 1))
-    return changed < 0.01 and all(
-        _motion(before, after, a.centroid) + size * _turn(before, after) < size / 500
-        for before, after in zip(a.shapes, b.shapes, strict=True)
+    if changed >= 0.03:
+        return False
+    size, centroid = float(np.ptp(np.asarray(a.bounds), axis=0).max()), np.asarray(a.centroid)
+    return all(
+        _motion(before, after, centroid, size) < size / 200 for before, after in zip(a.shapes, b.shapes, strict=True)
     )
 
 
-def _motion(before: Placed, after: Placed, point: Any) -> float:
-    """About how far a point of the shape has moved."""
-    lever = float(np.linalg.norm(before.position - point))
-    return float(np.linalg.norm(after.position - before.position)) + lever * _turn(before, after)
+def _motion(before: Placed, after: Placed, point: Array, reach: float) -> float:
+    """About how far the shape has moved, at the most, as far as `reach` from a point."""
+    if isinstance(before.shape, Sphere):
+        return math.dist(after.position, before.position)
+    # A quaternion and its negative are the same rotation.
+    turn = 2 * min(math.dist(after.orientation, sign * before.orientation) for sign in (1, -1))
+    return math.dist(after.position, before.position) + (math.dist(before.position, point) + reach) * turn
 
 
-def _turn(before: Placed, after: Placed) -> float:
-    """About the angle, in radians; a quaternion and its negative are the same rotation."""
-    return 2 * float(min(np.linalg.norm(after.orientation - sign * before.orientation) for sign in (1, -1)))
-
-
-def _five_digits(numbers: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Rounded to 17 significant bits, so that the last byte packs well."""
-    bits = np.ascontiguousarray(numbers).view(np.uint32)
-    rounded: NDArray[np.float32] = ((bits + 0x40) & np.uint32(0xFFFFFF80)).view(np.float32)
+def _rounded(numbers: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
+    """With so many bits of 24 significant ones, so that the last bytes pack well."""
+    spare = 24 - bits
+    raised = np.ascontiguousarray(numbers).view(np.uint32) + np.uint32(1 << (spare - 1))
+    rounded: NDArray[np.float32] = (raised >> spare << spare).view(np.float32)
     return rounded
 
 

@@ -1,0 +1,109 @@
+"""How large a recording is, and what a frame of it costs: a hundred bodies, a thousand steps, every one recorded.
+
+python benchmarks/recording.py [balls | boxes | mixed]
+
+Times are of the processor, of the page's own thread and of the process that draws in software in place of a graphics
+card; so they do not depend on what else the machine does.
+"""
+
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import pybullet as p
+
+from overlapper.simulation import Bodies
+from overlapper.viewer import Recording
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from browser import Browser
+
+BODIES, STEPS = 100, 1000
+FRAMES = 20  # shown for the measurement
+
+
+def build(kind: str) -> int:
+    chance = random.Random(1)
+    client = p.connect(p.DIRECT)
+    p.setGravity(0, 0, -9.81)
+    p.createMultiBody(0, p.createCollisionShape(p.GEOM_PLANE))
+    for x, y in ((0.6, 0), (-0.6, 0), (0, 0.6), (0, -0.6)):
+        wall = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.02 if x else 0.6, 0.02 if y else 0.6, 0.3])
+        p.createMultiBody(0, wall, basePosition=[x, y, 0.3])
+    for k in range(BODIES - 5):
+        if kind == "balls" or (kind == "mixed" and k % 2):
+            shape = p.createCollisionShape(p.GEOM_SPHERE, radius=0.08)
+        else:
+            shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=[chance.uniform(0.04, 0.12) for _ in range(3)])
+        place = [chance.uniform(-0.45, 0.45), chance.uniform(-0.45, 0.45), 0.2 + 0.02 * k]
+        turn = p.getQuaternionFromEuler([chance.uniform(-3, 3) for _ in range(3)])
+        body = p.createMultiBody(0.5, shape, -1, place, turn)
+        p.changeDynamics(body, -1, contactStiffness=5e3, contactDamping=20)  # soft, so that much is shared
+    return client
+
+
+def main() -> None:
+    for kind in sys.argv[1:] or ["boxes", "mixed", "balls"]:
+        bodies, recording, shared, spent = Bodies(build(kind)), Recording(), 0, 0.0
+        for step in range(STEPS):
+            p.stepSimulation()
+            bodies.update()
+            contacts = [contact for contact in bodies.overlaps() if contact.overlap]
+            shared += len(contacts)
+            start = time.process_time()
+            recording.add(bodies, contacts, step / 240)
+            spent += time.process_time() - start
+        p.disconnect()
+        with tempfile.TemporaryDirectory() as folder:
+            start = time.process_time()
+            page = recording.save(Path(folder, "recording.html"))
+            saving = time.process_time() - start
+            size = page.stat().st_size / 1e6
+            print(f"{kind}: {BODIES} bodies, {STEPS} frames, {shared:,} overlaps: {size:.1f} MB", flush=True)
+            print(f"  recorded: {1e3 * spent / STEPS:.0f} ms a frame, and {saving:.0f} s to save", flush=True)
+            page_thread, drawing = shown(page, Path(folder, "profile"))
+        print(f"  shown, at 1280 x 800: {page_thread:.0f} ms a frame on the page's thread, {drawing:.0f} ms to draw it")
+
+
+def shown(page: Path, profile: Path) -> tuple[float, float]:
+    """What a frame of the page costs, in ms of processor: its own thread, and software in place of a graphics card."""
+    browser = Browser(profile, size=(1280, 800))
+    try:
+        browser.open(page.as_uri() + "#t=1", until="document.querySelector('#time output').textContent")
+        browser.picture()
+        browser("Performance.enable", timeDomain="threadTicks")
+        before = thread_seconds(browser), drawing_seconds()
+        for _ in range(FRAMES):
+            browser.press("ArrowRight")
+            browser.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        after = thread_seconds(browser), drawing_seconds()
+    finally:
+        browser.close()
+    page_thread, drawing = (1e3 * (b - a) / FRAMES for a, b in zip(before, after))
+    return page_thread, drawing
+
+
+def thread_seconds(browser: Browser) -> float:
+    return {each["name"]: each["value"] for each in browser("Performance.getMetrics")["metrics"]}["TaskDuration"]
+
+
+def drawing_seconds() -> float:
+    """Of the graphics processes of all Chromiums that this process has started."""
+    family, seconds = {os.getpid()}, 0.0
+    processes = subprocess.run(["ps", "-eo", "pid=,ppid=,args="], capture_output=True, text=True, check=True).stdout
+    rows = sorted((row.split(None, 2) for row in processes.splitlines()), key=lambda row: int(row[0]))
+    for number, parent, arguments in rows:
+        if int(parent) in family:
+            family.add(int(number))
+            if "--type=gpu-process" in arguments:
+                fields = Path("/proc", number, "stat").read_text().rpartition(")")[2].split()
+                seconds += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return seconds
+
+
+if __name__ == "__main__":
+    main()

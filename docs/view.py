@@ -1,0 +1,25 @@
+"""Makes docs/view.png: the page that `overlapper view franka_grasp` writes, as Chromium shows it.
+
+python docs/view.py
+"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from picture import HERE, screenshot
+
+LOOK = "t=1.24&from=0.765,-0.125,0.235&at=0.545,0,0.2&pair=cube.urdf.1,panda.panda_rightfinger"
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder, "franka_grasp.html")
+        scene = HERE.parent / "scenes" / "franka_grasp.py"
+        subprocess.run([sys.executable, "-m", "overlapper", "view", str(scene), "--html", str(page)], check=True)
+        screenshot(f"{page.as_uri()}#{LOOK}", HERE / "view.png")
+
+
+if __name__ == "__main__":
+    main()

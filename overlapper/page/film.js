@@ -1,0 +1,78 @@
+// Reads what recording.py has packed. The files of this folder are joined to one script in the order that it names.
+const {THREE} = MeshCat;
+const byId = id => document.getElementById(id);
+const [slider, play, speed, table, numbers, chart] = ["slider", "play", "speed", "overlaps", "numbers", "chart"].map(byId);
+const output = document.querySelector("#time output");
+
+function bytes(base64) {
+  return Uint8Array.from(atob(base64), letter => letter.charCodeAt(0));
+}
+
+function unpacked(id) {
+  const packed = new Blob([bytes(byId(id).textContent)]);
+  return new Response(packed.stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+}
+
+// The heading with the arrays in it; these come byte by byte, all first bytes before all second ones.
+function read(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const film = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  let at = 4 + length;
+  for (const [name, [kind, count]] of Object.entries(film.arrays)) {
+    const array = new globalThis[kind](count), width = array.BYTES_PER_ELEMENT;
+    const from = new Uint8Array(buffer, at, count * width), to = new Uint8Array(array.buffer);
+    for (let k = 0; k < width; k++) for (let i = 0; i < count; i++) to[i * width + k] = from[k * count + i];
+    film[name] = array;
+    at += count * width;
+  }
+  return film;
+}
+
+// The sums of all counts before each.
+function starts(counts) {
+  const sums = new Uint32Array(counts.length + 1);
+  for (let i = 0; i < counts.length; i++) sums[i + 1] = sums[i] + counts[i];
+  return sums;
+}
+
+const viewer = new MeshCat.Viewer(byId("meshcat-pane"));
+for (const command of JSON.parse(new TextDecoder().decode(await unpacked("commands")))) {
+  for (const {data} of command.object?.geometries ?? []) {
+    for (const attribute of [data.index, ...Object.values(data.attributes)]) {
+      if (attribute) attribute.array = new globalThis[attribute.type](bytes(attribute.array).buffer);
+    }
+  }
+  viewer.handle_command(command);
+}
+// The scene ends where the bar with the time begins.
+const wholePane = viewer.set_3d_pane_size.bind(viewer);
+viewer.set_3d_pane_size = () => wholePane(innerWidth, innerHeight - byId("time").offsetHeight);
+viewer.set_3d_pane_size();
+const film = read(await unpacked("film"));
+const {times, pairs, center, size: sceneSize} = film;
+const last = times.length - 1, end = times[last] + (last ? times[last] / last : 0);
+const count = film.sighting_pair.length;
+
+// Polytopes: where the vertices, facets and rings of each begin; vertices are counted from those of an earlier one.
+const firstVertex = starts(film.polytope_vertices), firstFacet = starts(film.polytope_facets);
+const firstCorner = starts(film.ring_length);
+film.polytope_previous.forEach((like, k) => {
+  if (like < 0) return;
+  const shift = 3 * (firstVertex[like] - firstVertex[k]);
+  for (let i = 3 * firstVertex[k]; i < 3 * firstVertex[k + 1]; i++) film.vertices[i] += film.vertices[i + shift];
+});
+
+// What a sighting, a pair in a frame, has for numbers; the centroid is in the world.
+function measured(sighting) {
+  const [volume, error, depth, area, x, y, z, ...normal] = Array.from({length: 10}, (_, k) => film.numbers[k * count + sighting]);
+  return {volume, error, depth, area, centroid: [x, y, z].map((part, k) => part + center[k]), normal};
+}
+
+function extent(sighting) {
+  return 2 * film.polytope_frame[3 * film.polytope_previous.length + film.sighting_polytope[sighting]];
+}
+
+function sightingOf(pair, frame) {
+  for (let s = film.sighting_start[frame]; s < film.sighting_start[frame + 1]; s++) if (film.sighting_pair[s] === pair) return s;
+  return -1;
+}

@@ -1,0 +1,115 @@
+// What is drawn, and how: the panel of controls.
+
+for (const {drawing} of actors) {
+  for (const part of drawing.children) part.userData.own = part.material.color.clone();
+  const faces = drawing.getObjectByName("faces");
+  // A half-space is a plate, seen from both sides and fainter.
+  if (faces.material.side === THREE.DoubleSide) faces.userData.endless = true;
+}
+
+function dress(material, opacity) {
+  material.opacity = opacity;
+  material.depthWrite = opacity === 1;
+}
+
+function applyLooks() {
+  const {bodies, overlaps: look} = looks;
+  for (const {drawing} of actors) {
+    const part = name => drawing.getObjectByName(name);
+    const faces = part("faces");
+    faces.visible = bodies.faces;
+    dress(faces.material, bodies.opacity * (faces.userData.endless ? 0.4 : 1));
+    faces.material.color.copy(bodies.front ? paint(bodies.front) : faces.userData.own);
+    if (faces.userData.endless) faces.material.side = bodies.back ? THREE.FrontSide : THREE.DoubleSide;
+    if (bodies.back && !part("inside")) {
+      const inside = new THREE.Mesh(faces.geometry, faces.material.clone());
+      inside.name = "inside";
+      inside.material.side = THREE.BackSide;
+      drawing.add(inside);
+    }
+    const inside = part("inside");
+    if (inside) {
+      inside.visible = bodies.faces && bodies.back !== null;
+      dress(inside.material, faces.material.opacity);
+      if (bodies.back) inside.material.color.set(bodies.back);
+    }
+    part("edges").visible = bodies.edges && bodies.faces;
+    part("wires").visible = bodies.edges && !bodies.faces;
+    part("vertices").visible = bodies.vertices;
+  }
+  for (const name of ["faces", "edges", "vertices", "marks"]) drawn[name].visible = look[name];
+  drawn.arrows.visible = look.marks;
+  drawn.inside.visible = look.faces && look.opacity < 1;
+  dress(drawn.faces.material, look.opacity);
+  dress(drawn.inside.material, look.opacity);
+  const own = look.back === null;
+  if (drawn.inside.material.vertexColors !== own) drawn.inside.material.needsUpdate = true;
+  drawn.inside.material.vertexColors = own;
+  drawn.inside.material.color.set(own ? 0x808080 : look.back);
+  if (shown >= 0) drawOverlaps(shown);
+  viewer.set_dirty();
+}
+
+const ownSwatch = {
+  "overlaps front": "linear-gradient(90deg, #e69f00 50%, #56b4e9 50%)",
+  "overlaps back": "linear-gradient(90deg, #735000 50%, #2b5a75 50%)",
+  "bodies front": "linear-gradient(90deg, #d66, #6d6, #66d)",
+  "bodies back": "repeating-linear-gradient(45deg, #333 0 3px, #16181d 3px 6px)",
+};
+
+function control(kind, name) {
+  const input = document.createElement("input"), look = looks[kind];
+  input.id = `${kind}-${name}`;
+  if (name === "opacity") Object.assign(input, {type: "range", min: 0, max: 1, step: 0.05});
+  else input.type = name === "front" || name === "back" ? "color" : "checkbox";
+  input.title = `${kind}: ${name}`;
+  input.oninput = () => {
+    look[name] = input.type === "checkbox" ? input.checked : input.type === "range" ? +input.value : input.value;
+    renew();
+  };
+  if (input.type !== "color") return input;
+  const swatch = document.createElement("label");
+  swatch.className = "swatch";
+  swatch.append(input);
+  return swatch;
+}
+
+const details = ["faces", "edges", "vertices", "marks", "opacity", "front", "back"];
+for (const kind of ["overlaps", "bodies"]) {
+  const row = document.querySelector("#look tbody").insertRow();
+  row.innerHTML = `<th>${kind}</th>`;
+  for (const name of details) {
+    const cell = row.insertCell();
+    if (kind !== "bodies" || name !== "marks") cell.append(control(kind, name));
+  }
+  const reset = document.createElement("button");
+  [reset.textContent, reset.title] = ["↺", `${kind} as they were (r: both)`];
+  reset.onclick = () => {
+    Object.assign(looks[kind], film.looks[kind]);
+    renew();
+  };
+  row.insertCell().append(reset);
+}
+
+// The controls say what the looks are, and all is drawn so.
+function renew() {
+  for (const kind of ["overlaps", "bodies"]) {
+    for (const name of details) {
+      const input = byId(`${kind}-${name}`), value = looks[kind][name];
+      if (!input) continue;
+      if (input.type === "checkbox") input.checked = value;
+      else if (input.type === "range") input.value = value;
+      else {
+        input.parentElement.style.background = value ?? ownSwatch[`${kind} ${name}`];
+        if (value) input.value = value;
+      }
+    }
+  }
+  applyLooks();
+}
+
+byId("tree").onclick = () => {
+  viewer.gui.domElement.classList.toggle("wanted");
+  viewer.gui.open();
+};
+byId("look").open = innerWidth >= 1000;
