@@ -104,3 +104,20 @@ def test_a_sliver_of_any_thickness_is_right_to_twelve_digits(way):
         assert_allclose(found.centroid, np.array(case.truth.centroid, float), atol=1e-15)
         widened.append(found.widened)
     assert widened == sorted(widened) and widened[-1]
+
+
+@pytest.mark.parametrize("case", [make("many_bodies", seed) for seed in range(0, 24, 2)], ids=repr)
+def test_bodies_clipped_in_turn_have_the_exact_volume_and_each_its_pull(case):
+    found = overlap(*case.placed)
+    if case.truth.dimension < 3:
+        assert not found
+        return
+    off = abs(Fraction(found.volume) - case.truth.volume)
+    assert off <= min(Fraction(found.volume_error), case.truth.volume / 10**12)
+    assert_allclose(found.area, case.truth.area, rtol=1e-9)
+    assert_allclose(found.centroid, np.array(case.truth.centroid, float), atol=1e-9)
+    pulls = np.array([case.truth.pull(body) for body in range(len(case.bodies))], float)
+    assert_allclose(found.gradient[:, :3], pulls, atol=1e-9 * case.truth.area)
+    # Moved and turned together, the bodies have as much in common as before.
+    about_origin = found.gradient[:, 3:]
+    assert_allclose(about_origin.sum(0), 0, atol=1e-9 * case.truth.area)

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <array>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "region.h"
 #include "shape.h"
@@ -10,19 +11,31 @@ namespace overlapper {
 
 enum class Status { kSeparated, kTouching, kOverlapping };
 
-/// What a pair of polytopes, or of a polytope and a half-space, has in common. World coordinates; zeros if separated.
-struct ClippedPair {
+/// What polytopes and half-spaces have in common. World coordinates; zeros if separated.
+struct Clipped {
   Status status = Status::kSeparated;  ///< never kTouching
   bool measured = false;        ///< overlapping, and the volume is right to 1e-12; otherwise only the status counts
   bool widened = false;         ///< doubles were not enough for that
   double volume = 0, area = 0;  ///< m³, m²
   double volume_error = 0;      ///< m³: the true volume is within volume ± volume_error
   Vec3 centroid;
-  Vec3
-      pull;  ///< d volume / d translation of the first body: the area vector of its facets; the second has the opposite
-  Vec3 moment;  ///< d volume / d rotation vector of the first body about the centroid; the second has the opposite
   int facets_touched = 0;  ///< facets of the common polytope
-  bool traced = false;     ///< region_of_clipped() has the polytope, and it is more than touching, measured or not
+};
+
+/// What the common volume changes by as a body moves.
+struct Pull {
+  Vec3 force;   ///< d volume / d translation: the area vector of the facets that the body owns
+  Vec3 moment;  ///< d volume / d rotation vector about the centroid
+};
+
+struct ClippedPair : Clipped {
+  Vec3 pull;            ///< the force on the first body; the second has the opposite
+  Vec3 moment;          ///< likewise
+  bool traced = false;  ///< region_of_clipped() has the polytope, and it is more than touching, measured or not
+};
+
+struct ClippedGroup : Clipped {
+  std::vector<Pull> pulls;  ///< per body
 };
 
 /// Decides by static filters alone, and measures what is common; nothing where one of the signs that it needs is not
@@ -36,6 +49,10 @@ struct ClippedPair {
 ///
 /// Where that is more to ask than it takes to follow the seam, trace() does it.
 std::optional<ClippedPair> clip(const Placed& a, const Placed& b);
+
+/// The same for any number of bodies: the common polytope of the first two meets the third, and so on. Nothing, too,
+/// where doubles are not enough to measure it.
+std::optional<ClippedGroup> clip(std::span<const Placed> bodies);
 
 /// The polytope of a pair that clip() has traced; `a` and `b` in canonical order, owners 0 and 1.
 std::optional<Region> region_of_clipped(const Placed& a, const Placed& b, Vec3 reference);

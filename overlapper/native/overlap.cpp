@@ -114,7 +114,12 @@ void Overlap::start() {
     }
     return;
   }
-  if (pair()) clipped_ = clip(two_[0], two_[1]);
+  if (pair()) {
+    clipped_ = clip(two_[0], two_[1]);
+  } else if (auto group = clip(bodies_)) {
+    clipped_ = ClippedPair{*group, {}, {}};
+    pulls_ = std::move(group->pulls);
+  }
   // What is too thin for clipping to measure may be too thin to be more than touching.
   if (clipped_ && clipped_->status == Status::kOverlapping && !clipped_->measured && !clipped_->traced)
     clipped_.reset();
@@ -129,6 +134,7 @@ Overlap::Overlap(Overlap&& other) noexcept
       method_(other.method_),
       status_(other.status_),
       clipped_(other.clipped_),
+      pulls_(std::move(other.pulls_)),
       measured_by_clipping_(other.measured_by_clipping_),
       lazy_(std::move(other.lazy_)) {}
 
@@ -376,11 +382,15 @@ std::vector<std::array<double, 6>> Overlap::gradient() const {
     for (int i = 0; i < 3; ++i) rows[body][i] += force[i], rows[body][3 + i] += moment[i];
   };
   if (measured_by_clipping_) {
-    for (int body : {0, 1}) {
-      const Vec3 force = body == 0 ? clipped_->pull : -clipped_->pull;
-      const Vec3 moment = body == 0 ? clipped_->moment : -clipped_->moment;
+    const auto pull_at_centroid = [&](int body, Vec3 force, Vec3 moment) {
       pull(body, force, moment + cross(clipped_->centroid - bodies()[body].position, force));
+    };
+    if (pair()) {
+      pull_at_centroid(0, clipped_->pull, clipped_->moment);
+      pull_at_centroid(1, -clipped_->pull, -clipped_->moment);
     }
+    for (size_t body = 0; body < pulls_.size(); ++body)
+      pull_at_centroid(static_cast<int>(body), pulls_[body].force, pulls_[body].moment);
     return rows;
   }
   for (const Quantities::Pull& facet : quantities().pulls)

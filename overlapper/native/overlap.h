@@ -121,6 +121,7 @@ class Overlap {
   Method method_;
   Status status_ = Status::kSeparated;
   std::optional<ClippedPair> clipped_;  ///< if clipping has decided
+  std::vector<Pull> pulls_;             ///< of more than two bodies, if it has
   bool measured_by_clipping_ = false;   ///< and its figures are as good as any
   mutable std::mutex mutex_;
   mutable std::unique_ptr<Lazy> lazy_;

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "solid.h"
+#include "wide_corners.h"
+
+namespace overlapper {
+
+enum class Signs { kCertain, kUncertain, kSeparated };
+
+/// Signed distances of the vertices of one body from the planes of the other.
+struct SignTable {
+  int stride = 0;
+  std::vector<double> rows;         ///< by vertex
+  std::vector<double> nearest;      ///< per plane: the least of all vertices
+  std::vector<std::int8_t> inside;  ///< per vertex
+
+  double* row(int vertex) { return rows.data() + static_cast<ptrdiff_t>(vertex) * stride; }
+
+  Signs fill(const Solid& of, const Solid& by, double rounding);
+};
+
+/// Two solids and what they have in common, whose facets are numbered as the first one's and then the second one's.
+struct Meeting {
+  Solid first, second;
+  std::vector<Vec3> vertices;   ///< of the common polytope
+  std::vector<Corner> corners;  ///< parallel to them
+  std::vector<double> doubt;    ///< parallel to them: see Solid
+  std::vector<Edge> edges;      ///< of the common polytope
+  std::vector<Edge> seam;       ///< its edges between the first body's facets, on the left, and the second's
+
+  /// Finds the common polytope; what is not certain or separated has none.
+  Signs trace(double rounding);
+
+  int owner(int facet) const { return facet < first.facets ? first.owner[facet] : second.owner[facet - first.facets]; }
+
+  /// The common polytope becomes the first solid; see set_solid for `beyond`.
+  void take_common(double beyond);
+  /// Puts the first solid into the place of the common polytope.
+  void show_first();
+
+ private:
+  friend class Tracer;
+
+  SignTable first_signs, second_signs;
+  std::vector<double> ratio;
+  std::vector<int> first_vertex, second_vertex;  ///< which common vertex a body's vertex is, or -1
+  /// Per pair of facets: 1 + the vertex at which their common edge begins, minus that if it ends there.
+  std::vector<int> open;
+  int unpaired = 0;
+  Solid next;
+  std::vector<int> facet_number;
+};
+
+}  // namespace overlapper

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "shape.h"
+
+namespace overlapper {
+
+/// A convex polytope, or some of its facets with the edges between them, as columns.
+struct Solid {
+  bool whole = false;
+  int vertices = 0, facets = 0;
+  int stride = 0;                          ///< facets rounded up; the rest are planes that hold everything inside
+  std::vector<double> x, y, z;             ///< of vertices
+  std::vector<double> nx, ny, nz, offset;  ///< of planes
+  std::vector<double> doubt;               ///< m: how far off each vertex may be, beside the rounding of all numbers
+  std::vector<int> owner;                  ///< of planes: the body
+  std::span<const Edge> edges;
+  std::vector<Edge> own_edges;  ///< what `edges` looks at, unless that is the shape's
+
+  Vec3 vertex(int i) const { return {x[i], y[i], z[i]}; }
+  Vec3 normal(int f) const { return {nx[f], ny[f], nz[f]}; }
+
+  void resize(int vertex_count, int facet_count, double beyond) {
+    vertices = vertex_count, facets = facet_count, stride = (facet_count + 3) / 4 * 4;
+    for (std::vector<double>* column : {&x, &y, &z}) column->resize(vertices);
+    doubt.assign(vertices, 0);
+    owner.resize(facets);
+    for (std::vector<double>* column : {&nx, &ny, &nz, &offset}) column->resize(stride);
+    for (int f = facets; f < stride; ++f) set_plane(f, {}, beyond);
+  }
+  void set_vertex(int i, Vec3 v) { x[i] = v.x, y[i] = v.y, z[i] = v.z; }
+  void set_plane(int f, Vec3 normal, double height) {
+    nx[f] = normal.x, ny[f] = normal.y, nz[f] = normal.z, offset[f] = height;
+  }
+};
+
+struct Ball {
+  Vec3 centre;
+  double radius;
+};
+
+/// A bounded polytope in the coordinates of `pose`, or a half-space. Planes that fill up the stride are `beyond` away.
+void set_solid(Solid& solid, const Placed& body, int owner, const Pose* pose, double beyond);
+
+/// Only those planes and edges of a body that a ball reaches; false if the ball is outside of one of the planes.
+bool set_part(Solid& solid, const Placed& body, int owner, const Pose& pose, const Ball& ball, double beyond);
+
+/// How far from its own origin a shape reaches; of a half-space, how far its plane is.
+double radius(const Shape& shape);
+
+/// What rotating and adding a hull's far origin has cost, as a length.
+double lost_far_away(const Placed& body);
+
+int facets(const Shape& shape);
+
+/// Polytopes whose facets are few, and half-spaces.
+bool clippable(const Shape& shape);
+
+}  // namespace overlapper
