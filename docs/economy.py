@@ -1,0 +1,129 @@
+"""Writes docs/economy.md: how little of each scene is looked at, and in what time.
+
+python docs/economy.py
+"""
+
+from __future__ import annotations
+
+import platform
+import re
+import time
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import mean, median
+
+import numpy as np
+import pybullet
+
+from overlapper import Box, HalfSpace, Hull, Shape
+from overlapper.scene import Scene, load_scene, scenes_in
+from overlapper.simulation import Bodies, Recorder, Report, SkippedShapeWarning
+
+HERE = Path(__file__).resolve().parent
+
+WORDS = """\
+<!-- Written by docs/economy.py. -->
+# Model no more than the scene needs
+
+What `update()` and `overlaps()` look at in a step of each scene of [`scenes/`](../scenes), on average over all of its
+steps, and for how long.
+
+{table}
+
+- **shapes**: those of the scene, and of these the modelled ones if some are not. They are read once.
+- **pairs possible**: pairs of shapes that the simulator lets collide; **examined**: those whose boxes meet;
+  **overlapping**: those that share volume.
+- **facets there**: of the boxes, hulls and half-spaces of all examined pairs, which a method would work through that
+  takes the shapes as wholes; round shapes have none. **Touched**: planes that took part in building what is common,
+  tangent planes of round shapes among them.
+- **again**: overlaps that had to be measured again in wider arithmetic, being so thin that doubles would not place
+  their volume to 1e-12 of itself.
+- **time**: of `update()` and `overlaps()` at the default tolerance, the median step, on one thread{machine}.
+
+`python docs/economy.py` runs the scenes and writes this page. `bodies.report()` has these counts for any scene, and
+`overlapper run` prints them.
+"""
+
+HEADING = (
+    "scene", "shapes", "pairs possible", "examined", "overlapping", "facets there", "touched", "again", "time",
+)  # fmt: skip
+
+
+def facets(shape: Shape) -> int:
+    return len(shape.facets) if isinstance(shape, Hull) else 6 * isinstance(shape, Box) + isinstance(shape, HalfSpace)
+
+
+@dataclass
+class Economy:
+    """What the steps of a scene came to: for each a report, the facets of the pairs examined, and the time it took."""
+
+    reports: list[Report] = field(default_factory=list)
+    facets_there: list[int] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+
+    def row(self, name: str) -> list[str]:
+        last = self.reports[-1]
+        read = "" if last.shapes_read == last.shapes else f", {last.shapes_read:,} of them modelled"
+        counts = [
+            mean(getattr(report, count) for report in self.reports)
+            for count in ("pairs_possible", "pairs_examined", "pairs_overlapping", "facets_touched", "pairs_widened")
+        ]
+        possible, examined, overlapping, touched, widened = map(rounded, counts)
+        there = rounded(mean(self.facets_there))
+        took = f"{1e3 * median(self.seconds):.2g} ms"
+        return [name, f"{last.shapes:,}{read}", possible, examined, overlapping, there, touched, widened, took]
+
+
+def rounded(count: float) -> str:
+    return f"{count:,.0f}" if count >= 10 or count == int(count) else f"{count:.1f}"
+
+
+def economy(scene: Scene) -> Economy:
+    """Runs the scene."""
+    client, found = pybullet.connect(pybullet.DIRECT), Economy()
+    recorder = Recorder(client)
+    try:
+        step = scene.build(client)
+        bodies = Bodies(client, recorder=recorder)
+        sizes = np.array([facets(shape) for shape in bodies.shapes])
+        for i in range(scene.steps):
+            if step:
+                step(i)
+            pybullet.stepSimulation(client)
+            begin = time.process_time()
+            bodies.update()
+            bodies.overlaps(pairs=scene.pairs)
+            found.seconds.append(time.process_time() - begin)
+            found.reports.append(bodies.report())
+            found.facets_there.append(int(sizes[bodies.pairs(scene.pairs)].sum()))
+    finally:
+        recorder.close()
+        pybullet.disconnect(client)
+    return found
+
+
+def table(rows: Iterable[list[str]]) -> str:
+    rule = "|---|" + "--:|" * (len(HEADING) - 1)
+    return "\n".join([f"| {' | '.join(HEADING)} |", rule, *(f"| {' | '.join(row)} |" for row in rows)])
+
+
+def main() -> None:
+    warnings.simplefilter("ignore", SkippedShapeWarning)
+    rows = []
+    for path in scenes_in(HERE.parent / "scenes"):
+        scene = load_scene(path)
+        rows.append(economy(scene).row(scene.name))
+        print("  ".join(rows[-1]), flush=True)
+    text = WORDS.format(table=table(rows), machine=f" of {machine()}")
+    (HERE / "economy.md").write_text(text, encoding="utf-8")
+
+
+def machine() -> str:
+    listed = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text(encoding="utf-8"))
+    return listed[1].strip() if listed else platform.machine()
+
+
+if __name__ == "__main__":
+    main()
