@@ -39,8 +39,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PILES = (50, 100, 200, 500, 1000, 2000, 5000)
 KINDS = ("jenga/jenga.urdf", "block.urdf", "domino/domino.urdf", "cube_small.urdf", "lego/lego.urdf")
 LAYERS = 8  # so that piles of any size are as deep, and a box has as many neighbours
-SETTLING = 150  # steps until the boxes lie on each other
-SAMPLES = (10, 60)  # the fewest and the most of a pile
+SETTLING = 120  # steps until the boxes lie on each other
+SAMPLES = (8, 60)  # the fewest and the most of a pile
 COLUMNS = ("boxes", "part", "us", "us_low", "us_high", "samples")
 
 # The parts of a step in the order in which they come, and what they are called in the picture.
@@ -210,7 +210,7 @@ def draw(path: Path, folder: Path) -> Path:
     plt.rcParams.update({"font.size": 9, "svg.fonttype": "none", "svg.hashsalt": "overlapper"})
     us = read(path)
     piles = sorted(us["ours"])
-    figure, (each, whole) = plt.subplots(1, 2, figsize=(10.4, 4.4), gridspec_kw={"width_ratios": [1.15, 1]})
+    figure, (each, whole) = plt.subplots(1, 2, figsize=(10.8, 4.4), gridspec_kw={"width_ratios": [1.35, 1]})
 
     bottom = np.zeros(len(piles))
     places = np.arange(len(piles))
@@ -226,7 +226,7 @@ def draw(path: Path, folder: Path) -> Path:
     each.set_xticks(places, [f"{boxes:,}" for boxes in piles])
     each.set(xlabel="boxes in the pile", ylabel="µs of a step, per box", title="Where the time of a step goes")
     each.set_ylim(0, 1.45 * max(bottom.max(), *(us["getContactPoints"][boxes] / boxes for boxes in piles)))
-    each.legend(frameon=False, fontsize=7.5, ncols=2, loc="upper left")
+    each.legend(frameon=False, fontsize=7.2, ncols=2, columnspacing=1, loc="upper left")
 
     for part, words, colour, dashes in (
         ("stepSimulation", "stepSimulation()", "#222222", ":"),
@@ -266,6 +266,7 @@ def write_page(path: Path, folder: Path) -> Path:
     at = 200 if 200 in piles else piles[0]
     words = Template((Path(__file__).parent / "steps_page.md").read_text(encoding="utf-8")).substitute(
         results=path.relative_to(ROOT) if path.is_relative_to(ROOT) else path,
+        piles=f"{piles[0]:,} to {piles[-1]:,}",
         table="\n".join(lines),
         widened=f"{100 * us['pairs widened'][at] / us['pairs overlapping'][at]:.0f}",
         against_contacts=f"{us['ours'][at] / us['getContactPoints'][at]:.2g}",

@@ -433,7 +433,7 @@ def stability(
 ) -> None:
     """Put hard cases to this package and to others, and chart who fails where: for a checkout, some minutes."""
     folder = [f"--out={out}"] if out else []
-    _run_benchmark("stability", f"--seed={seed}", f"--count={count}", *folder)
+    raise typer.Exit(_run_benchmark("stability", f"--seed={seed}", f"--count={count}", *folder))
 
 
 @app.command()
@@ -453,19 +453,25 @@ def chart(
     ] = None,
     page: Annotated[bool, typer.Option("--page", help="Only draw, from the results there are.")] = False,
 ) -> None:
-    """Time this package and others on the same pairs and chart error over time: for a checkout, ten minutes.
+    """Time this package and others on the same pairs and chart error over time: for a checkout, twenty minutes.
 
-    Volumes are compared with the exact truth; the exit code is 1 if one of this package is wrong.
+    Then, unless pairs or methods are chosen, chart where the time of a step goes. Volumes are compared with the exact
+    truth, or with single calls; the exit code is 1 if one of this package is wrong.
     """
     chosen = [f"--family={name}" for name in family or ()] + [f"--method={name}" for name in method or ()]
-    _run_benchmark("chart", f"--seconds={seconds}", *chosen, *([f"--out={out}"] if out else []), *["--page"] * page)
+    common = [*([f"--out={out}"] if out else []), *["--page"] * page]
+    code = _run_benchmark("chart", f"--seconds={seconds}", *chosen, *common)
+    if not code and not chosen:
+        code = _run_benchmark("scene_steps", *common)
+    raise typer.Exit(code)
 
 
-def _run_benchmark(name: str, *options: str) -> None:
+def _run_benchmark(name: str, *options: str) -> int:
+    """Returns its exit code."""
     script = Path(__file__).parents[1] / "benchmarks" / f"{name}.py"
     if not script.is_file():
         raise Refused(f"{name} needs a checkout of overlapper, as its cases and peers are not installed")
-    raise typer.Exit(subprocess.run([sys.executable, str(script), *options]).returncode)
+    return subprocess.run([sys.executable, str(script), *options]).returncode
 
 
 def _hulls(source: str, query: str | None) -> Iterator[Hull]:

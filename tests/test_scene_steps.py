@@ -1,9 +1,13 @@
 """The chart of steps: it has all parts, its volumes are those of single calls or the run ends, its page is drawn."""
 
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import typer
+
+from overlapper import cli
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
@@ -39,3 +43,26 @@ def test_a_volume_that_is_not_that_of_a_single_call_ends_the_run(small, tmp_path
     with pytest.raises(ArithmeticError, match="pile of 8: "):
         scene_steps.measure([8], tmp_path / "steps.csv")
     assert "ours" not in scene_steps.read(tmp_path / "steps.csv")
+
+
+@pytest.mark.parametrize(
+    ("asked", "code", "started"),
+    [
+        ({}, 0, ["chart.py", "scene_steps.py"]),
+        ({}, 1, ["chart.py"]),
+        ({"family": ["box deep"]}, 0, ["chart.py"]),
+    ],
+)
+def test_the_charts_of_pairs_and_of_steps_are_made_by_one_command(asked, code, started, monkeypatch, tmp_path):
+    commands = []
+
+    def run(command):
+        commands.append(command)
+        return subprocess.CompletedProcess(command, code)
+
+    monkeypatch.setattr(cli.subprocess, "run", run)
+    with pytest.raises(typer.Exit) as end:
+        cli.chart(**asked, seconds=1.0, out=tmp_path, page=True)
+    assert end.value.exit_code == code
+    assert [Path(command[1]).name for command in commands] == started
+    assert all(command[-2:] == [f"--out={tmp_path}", "--page"] for command in commands)
