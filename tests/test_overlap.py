@@ -736,3 +736,28 @@ def test_thin_wires_side_by_side_share_a_lens_all_along(radius, turn):
     assert abs(found.volume - across) <= found.volume_error + 2 * np.pi * radius**3
     assert found.volume_error <= 0.0125 * across
     assert found.area == pytest.approx(4 * radius * np.arccos(1 / 16), rel=0.01)
+
+
+@pytest.mark.parametrize("tolerance", [0.05, 0.02, 0.01, 0.002, 0.001])
+def test_a_capsule_and_a_cylinder_share_a_sliver_along_both(tolerance):
+    # Where rays leave the capsule near the beginning of an end, a tangent must not be that of its ball's other side.
+    capsule = Placed(
+        Capsule(0.408941156187604, 0.4905299775363593), (-0.35265713922716, 0.7632413550700711, -0.6488068416050803)
+    )
+    cylinder = Placed(
+        Cylinder(0.20263550328296642, 0.5140302035720937),
+        (-0.877223937261219, 0.44882811615307255, -0.6488068416050803),
+    )
+    found = overlap(capsule, cylinder, tolerance=tolerance)
+    depth = found.depth
+    assert depth == pytest.approx(2.6157e-12, rel=1e-4)
+    chord = 2 * np.sqrt(2 * depth / (1 / capsule.shape.radius + 1 / cylinder.shape.radius))
+    assert found.volume == pytest.approx(2 / 3 * depth * chord * capsule.shape.length, rel=3 * tolerance + 1e-2)
+
+
+def test_corners_of_facets_at_small_angles_lie_in_their_planes():
+    points = [[-22, 39, 7], [-5, 41, -13], [-51, -17, 18], [-11, -25, 36], [-31, -6, 39], [-15, -22, 37], [6, -26, -36]]
+    points += [[15, -39, 14], [43, 31, 5], [42, -7, -32], [-1, -36, 24], [41, -16, -29], [-54, 20, -6], [-5, 42, -2]]
+    found = overlap(Box([1, 1, 1]), np.array([*points, [-11, 17, 41]]) / 64)
+    for facet, (*normal, offset) in zip(found.facets, found.halfspaces):
+        assert_allclose(found.vertices[facet] @ normal, -offset, atol=1e-14)

@@ -107,7 +107,11 @@ Plane Capsule::ray_exit(Vec3 origin, Vec3 d) const {
   // Lagrange's identity: seen from afar, the difference of dot(q, d)² and |q|² |d|² would cancel.
   const double discriminant = std::max(0.0, norm2(d) * radius * radius - norm2(cross(q, d)));
   const double t = (std::sqrt(discriminant) - dot(q, d)) / norm2(d);
-  return tangent(q + t * d, end, radius);
+  Vec3 outward = q + t * d;
+  // Where the end begins, rounding may have the ray leave just before it, and there that ball has tangents that cut off
+  // the other end.
+  if (outward.z * end.z < 0) outward.z = 0;
+  return tangent(outward, end, radius);
 }
 
 Plane Capsule::tightest(Vec3 point) const {

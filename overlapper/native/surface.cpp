@@ -1,6 +1,7 @@
 #include "surface.h"
 
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <unordered_map>
 #include <utility>
@@ -103,6 +104,27 @@ std::vector<int> merge_vertices(const Region& region, int& groups) {
   return group;
 }
 
+/// Of each group, the vertex that lies nearest to the planes of all its facets: planes that meet at a small angle place
+/// some of them badly.
+std::vector<int> representatives(const Polytope& p, std::span<const int> group, int groups) {
+  std::vector<std::vector<int>> members(groups), facets_of(groups);
+  for (int v = 0; v < static_cast<int>(group.size()); ++v) members[group[v]].push_back(v);
+  for (int f = 0; f < p.facets(); ++f)
+    for (int v : p.facet(f))
+      if (members[group[v]].size() > 1) facets_of[group[v]].push_back(f);
+  std::vector<int> chosen(groups);
+  for (int g = 0; g < groups; ++g) {
+    double least = std::numeric_limits<double>::infinity();
+    for (int v : members[g]) {
+      double misfit = 0;
+      for (int f : facets_of[g])
+        misfit = std::max(misfit, std::abs(dot(p.dual[f], p.vertices[v]) - 1) / norm(p.dual[f]));
+      if (misfit < least) least = misfit, chosen[g] = v;
+    }
+  }
+  return chosen;
+}
+
 /// The ring with each run of one group written once; empty if fewer than three remain.
 std::vector<int> contracted(std::span<const int> ring, std::span<const int> group) {
   std::vector<int> result;
@@ -121,7 +143,8 @@ Surface surface_of(const Region& region, int bodies) {
   const std::vector<int> group = merge_vertices(region, groups);
   Surface surface;
   surface.vertices.resize(groups);
-  for (int v = 0; v < static_cast<int>(group.size()); ++v) surface.vertices[group[v]] = region.to_world(p.vertices[v]);
+  const std::vector<int> chosen = representatives(p, group, groups);
+  for (int g = 0; g < groups; ++g) surface.vertices[g] = region.to_world(p.vertices[chosen[g]]);
   surface.ring_start.push_back(0);
   for (int f = 0; f < p.facets(); ++f) {
     const std::vector<int> ring = contracted(p.facet(f), group);

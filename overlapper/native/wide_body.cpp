@@ -55,7 +55,9 @@ WidePlane ray_exit(const Capsule& c, const WideVector& origin, const WideVector&
     past = z;
   }
   const WideVector end{{}, {}, {sign(past) * half}};
-  return tangent(leave_cap(origin - end, d, c.radius), end, c.radius, axis(2));
+  WideVector outward = leave_cap(origin - end, d, c.radius);
+  if (outward.z.head * end.z.head < 0) outward.z = {};
+  return tangent(outward, end, c.radius, axis(2));
 }
 
 WidePlane ray_exit(const Cylinder& c, const WideVector& origin, const WideVector& d) {
