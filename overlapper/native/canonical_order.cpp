@@ -54,6 +54,10 @@ std::partial_ordering compare(const Placed& a, const Placed& b) {
 bool comes_before(const Placed& a, const Placed& b) { return compare(a, b) < 0; }
 
 std::vector<int> canonical_order(std::span<const Placed> bodies) {
+  if (bodies.size() == 2) {  // a sort would ask for memory first
+    const int first = comes_before(bodies[1], bodies[0]) ? 1 : 0;
+    return {first, 1 - first};
+  }
   std::vector<int> order(bodies.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int i, int j) { return comes_before(bodies[i], bodies[j]); });

@@ -148,6 +148,7 @@ const Overlap::Arrangement& Overlap::arrangement() const {
   if (kept) return *kept;
   Arrangement arrangement{canonical_order(bodies()), {}, {}};
   arrangement.reference = bodies()[arrangement.order[0]].pose.translation;
+  arrangement.relative.reserve(bodies().size());
   for (int body : arrangement.order) arrangement.relative.push_back(bodies()[body].seen_from(arrangement.reference));
   return kept.emplace(std::move(arrangement));
 }
@@ -426,16 +427,18 @@ const Overlap::Contact& Overlap::contact() const {
   Contact contact;
   const auto& [order, relative, reference] = arrangement();
   const Placed &a = relative[0], &b = relative[1];
-  const double reach = std::max(magnitude(a), magnitude(b));
+  const auto reach = [&] { return std::max(magnitude(a), magnitude(b)); };
   const bool doubtful = method_ == Method::kAuto && !clipped_ && search().wide_ball;
   if (status_ == Status::kOverlapping) {
     Penetration p = penetration(a, b);
-    if (doubtful || p.depth <= doubt(reach)) p = parting({p.normal});
+    // What clipping measures holds a ball beyond doubt.
+    if (doubtful || (!measured_by_clipping_ && p.depth <= doubt(reach()))) p = parting({p.normal});
     contact.depth = p.depth;
     contact.normal = p.normal;
   } else {
     Distance d = overlapper::distance(a, b);
-    if (!(d.gap > doubt(reach)) && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(reach);
+    const double size = reach();
+    if (!(d.gap > doubt(size)) && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(size);
     contact.normal = d.normal;
     // Where the bodies touch, the line between the witness points may be all rounding; the way out is not.
     if (status_ == Status::kTouching && !(d.gap > 0)) contact.normal = parting({penetration(a, b).normal}).normal;
