@@ -90,8 +90,7 @@ void CloseBody::set(const Mesh& mesh, const CloseFrame& frame, bool is_second) {
 }
 
 void CloseBody::place_corner(int vertex) {
-  const Vec3 own = (data().vertices[vertex] - origin_) - rest_;
-  const Vec3 at = turned_ ? turn_ * own : own;
+  const Vec3 at = placed(vertex);
   corners_[vertex] = {at, std::sqrt(norm2(at))};
   corner_placed_[vertex] = now_;
 }

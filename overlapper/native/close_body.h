@@ -73,6 +73,12 @@ class CloseBody {
     return half_edge == data().ring_start[f] ? data().ring_start[f + 1] - 1 : half_edge - 1;
   }
 
+  Vec3 placed(int vertex) const {
+    const Vec3 own = (data().vertices[vertex] - origin_) - rest_;
+    return turned_ ? turn_ * own : own;
+  }
+
+  /// Kept for whoever asks again.
   struct Corner {
     Vec3 at;
     double size;  ///< its distance from the common point

@@ -17,9 +17,8 @@ void Seam::begin(CloseBody& first, CloseBody& second) {
   for (int body : {0, 1}) {
     Marks& m = marks_[body];
     m.farthest = m.slip = 0;
-    const size_t edges = bodies_[body]->data().ring.size(), facets = bodies_[body]->data().planes.size();
+    const size_t edges = bodies_[body]->data().ring.size();
     if (m.entered.size() < edges) m.entered.resize(edges, 0), m.corner.resize(edges);
-    if (m.passed.size() < facets) m.passed.resize(facets, 0);
   }
 }
 
@@ -141,7 +140,6 @@ bool Seam::follow(CrossingFacets start) {
   do {
     for (int body : {0, 1}) {
       const int facet = body == 0 ? at.first : at.second;
-      marks_[body].passed[facet] = now_;
       marks_[body].farthest = std::max(marks_[body].farthest, bodies_[body]->side(facet).farthest);
     }
     if (!step(at, exit) || !certain_) return false;

@@ -48,8 +48,6 @@ class Seam {
     const Marks& m = marks_[body];
     return m.entered[half_edge] == now_ ? m.corner[half_edge] : -1;
   }
-  bool passes(int body, int facet) const { return marks_[body].passed[facet] == now_; }
-
   /// The largest distance of a corner from the common point.
   double reach() const { return reach_; }
 
@@ -68,11 +66,11 @@ class Seam {
   Vec3 meet(int body, int entering, int plane);
   int other_facet(CrossingFacets at, int body) const { return body == 0 ? at.second : at.first; }
 
-  /// Per half-edge and facet of a body: what was found in this run.
+  /// What was found on a body.
   struct Marks {
-    std::vector<int> entered, corner, passed;
-    double farthest = 0;  ///< corner of a facet passed, from the common point
-    double slip = 0;      ///< without what the rounding of those corners moves its planes
+    std::vector<int> entered, corner;  ///< per half-edge: the run in which it was last entered, and where
+    double farthest = 0;               ///< corner of a facet passed, from the common point
+    double slip = 0;                   ///< without what the rounding of those corners moves its planes
   };
 
   std::array<CloseBody*, 2> bodies_{};

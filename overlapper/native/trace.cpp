@@ -66,7 +66,7 @@ class Tracing {
   void clear();
   bool add_whole_line(int body, const Seam::Line& line);
   bool add_cut_facet(int body, int first_corner);
-  bool spread();
+  bool spread(int body);
   bool add_whole_facet(int body, int half_edge);
   bool keep(int body, int half_edge);
   bool keep_vertex(int body, int vertex);
@@ -80,8 +80,8 @@ class Tracing {
 
   /// How far corners of the common polytope may lie off the planes of the body's facets, counted from the middle.
   double slip(int body) const {
-    const double kept = bodies_[body].corner_rounding() * reach_;
-    return std::max(kept, seam_.slip(body)) + 2 * 0x1p-53 * std::max(reach_, seam_.reach()) + bodies_[0].mesh().flat() +
+    const double reach = std::sqrt(reach2_), kept = bodies_[body].corner_rounding() * reach;
+    return std::max(kept, seam_.slip(body)) + 2 * 0x1p-53 * std::max(reach, seam_.reach()) + bodies_[0].mesh().flat() +
            bodies_[1].mesh().flat();
   }
   Vec3 middle() const {
@@ -98,11 +98,15 @@ class Tracing {
   std::optional<Outside> outside_;
   std::optional<std::pair<int, int>> seed_;  ///< body and vertex inside the other, where no seam is known
   bool certain_ = true;
-  double reach_ = 0;  ///< of kept vertices, from the common point
+  double reach2_ = 0;  ///< of kept vertices, the square of their largest distance from the common point
   int now_ = 0;
-  std::array<std::vector<int>, 2> kept_, kept_as_, done_;  ///< per vertex, twice, and per facet
-  std::vector<std::pair<int, int>> fresh_;                 ///< body and vertex, kept but not yet gone around
-  std::vector<Vec3> vertices_;                             ///< those of the seam first
+  struct Kept {
+    int when, as;  ///< the run in which it was kept, and which vertex it is there
+  };
+  std::array<std::vector<Kept>, 2> kept_;  ///< per vertex
+  std::array<std::vector<int>, 2> done_;   ///< per facet: the last run in which it was put in
+  std::array<std::vector<int>, 2> open_;   ///< half-edges between kept vertices, whose facet may not be done
+  std::vector<Vec3> vertices_;             ///< those of the seam first
   std::vector<int> ring_, ring_start_;
   std::vector<OwnedFacet> facets_;
 };
@@ -228,17 +232,17 @@ void Tracing::clear() {
   ring_.clear();
   ring_start_.assign(1, 0);
   facets_.clear();
-  fresh_.clear();
   certain_ = true;
-  reach_ = 0;
+  reach2_ = 0;
   if (++now_ == std::numeric_limits<int>::max()) {
-    for (auto* marks : {&kept_, &done_})
-      for (std::vector<int>& m : *marks) std::fill(m.begin(), m.end(), 0);
+    kept_ = {};
+    done_ = {};
     now_ = 1;
   }
   for (int body : {0, 1}) {
     const size_t vertices = bodies_[body].data().vertices.size(), facets = bodies_[body].data().planes.size();
-    if (kept_[body].size() < vertices) kept_[body].resize(vertices, 0), kept_as_[body].resize(vertices);
+    open_[body].clear();
+    if (kept_[body].size() < vertices) kept_[body].resize(vertices, {0, 0});
     if (done_[body].size() < facets) done_[body].resize(facets, 0);
   }
 }
@@ -255,8 +259,12 @@ bool Tracing::assemble() {
     if (done_[corner.body][body.facet(body.twin(corner.edge))] == now_) continue;
     if (!add_cut_facet(corner.body, i)) return false;
   }
-  if (seam_.corners().empty() && !keep_vertex(seed_->first, seed_->second)) return false;
-  return spread();
+  if (seam_.corners().empty()) {
+    const auto [body, vertex] = *seed_;
+    if (!keep_vertex(body, vertex)) return false;
+    open_[body].push_back(bodies_[body].graph().leaving[vertex]);
+  }
+  return spread(0) && spread(1);
 }
 
 /// A line within one facet, of which it cuts out a piece.
@@ -292,6 +300,7 @@ bool Tracing::add_cut_facet(int body, int first_corner) {
     int h = begin;
     while ((c = seam_.entry(body, self.twin(h))) < 0) {
       if (!keep(body, h)) return false;
+      if (h != begin) open_[body].push_back(self.twin(h));
       h = self.graph().next[h];
       if (h == begin) return false;
     }
@@ -300,19 +309,13 @@ bool Tracing::add_cut_facet(int body, int first_corner) {
   return true;
 }
 
-/// From the vertices that are kept to all facets around them.
-bool Tracing::spread() {
-  while (!fresh_.empty()) {
-    const auto [body, vertex] = fresh_.back();
-    fresh_.pop_back();
-    const CloseBody& self = bodies_[body];
-    const int begin = self.graph().leaving[vertex];
-    int h = begin;
-    do {
-      const int facet = self.facet(h);
-      if (done_[body][facet] != now_ && !seam_.passes(body, facet) && !add_whole_facet(body, h)) return false;
-      h = self.graph().next[self.twin(h)];
-    } while (h != begin);
+/// From facet to facet over edges that are kept.
+bool Tracing::spread(int body) {
+  std::vector<int>& open = open_[body];
+  while (!open.empty()) {
+    const int half_edge = open.back();
+    open.pop_back();
+    if (done_[body][bodies_[body].facet(half_edge)] != now_ && !add_whole_facet(body, half_edge)) return false;
   }
   return true;
 }
@@ -324,6 +327,7 @@ bool Tracing::add_whole_facet(int body, int half_edge) {
   int h = half_edge;
   do {
     if (!keep(body, h)) return false;
+    if (done_[body][self.graph().beside[h]] != now_) open_[body].push_back(self.twin(h));
     h = self.graph().next[h];
   } while (h != half_edge);
   finish_facet(body, facet);
@@ -333,24 +337,23 @@ bool Tracing::add_whole_facet(int body, int half_edge) {
 /// Puts the end of a half-edge into the ring.
 bool Tracing::keep(int body, int half_edge) {
   const int vertex = bodies_[body].end(half_edge);
-  if (kept_[body][vertex] != now_ && !keep_vertex(body, vertex)) {
+  const Kept& kept = kept_[body][vertex];
+  if (kept.when != now_ && !keep_vertex(body, vertex)) {
     if (certain_) outside_ = {body, half_edge};
     return false;
   }
-  ring_.push_back(kept_as_[body][vertex]);
+  ring_.push_back(kept.as);
   return true;
 }
 
 bool Tracing::keep_vertex(int body, int vertex) {
-  const CloseBody::Corner& corner = bodies_[body].corner(vertex);
-  const int inside = bodies_[1 - body].holds(corner.at);
+  const Vec3 at = bodies_[body].placed(vertex);
+  const int inside = bodies_[1 - body].holds(at);
   certain_ &= inside != 0;
   if (inside <= 0) return false;
-  kept_[body][vertex] = now_;
-  kept_as_[body][vertex] = static_cast<int>(vertices_.size());
-  vertices_.push_back(corner.at);
-  reach_ = std::max(reach_, corner.size);
-  fresh_.push_back({body, vertex});
+  kept_[body][vertex] = {now_, static_cast<int>(vertices_.size())};
+  vertices_.push_back(at);
+  reach2_ = std::max(reach2_, norm2(at));
   return true;
 }
 
@@ -386,20 +389,27 @@ std::optional<ClippedPair> Tracing::measures(double least) const {
     most_in_block = std::max(most_in_block, in_block += corners - 2);
     const Vec3 a = vertices_[ring[0]] - origin;
     Vec3 twice_area, b = vertices_[ring[1]] - origin;
+    double cone = 0, spanned = 0;
     for (size_t i = 2; i < corners; ++i) {
       const Vec3 c = vertices_[ring[i]] - origin, ab = b - a, ac = c - a, normal = cross(ab, ac);
       const double tetrahedron = dot(a, normal);
-      block.six_volumes += tetrahedron;
+      cone += tetrahedron;
+      spanned += extent(ab) * extent(ac);
       block.moment += tetrahedron * (a + b + c);
-      block.lost += extent(a) * extent(ab) * extent(ac);
       twice_area += normal;
       b = c;
     }
-    const CloseBody::Side& side = bodies_[facets_[f].body].side(facets_[f].facet);
-    const double area = dot(side.normal, twice_area) / 2;
+    const double area = std::sqrt(norm2(twice_area)) / 2;
     block.area += area;
     block.moved += area * slips[facets_[f].body];
-    least_slack = std::min(least_slack, dot(side.normal, side.through - origin));
+    // The cone's volume tells how far its plane is, at least; only where that might be least is the plane looked at.
+    const double lost = extent(a) * spanned;
+    if (!(cone / 2 - 8 * 0x1p-53 * lost > area * least_slack)) {
+      const CloseBody::Side& side = bodies_[facets_[f].body].side(facets_[f].facet);
+      least_slack = std::min(least_slack, dot(side.normal, side.through - origin));
+    }
+    block.lost += lost;
+    block.six_volumes += cone;
     if (f % BlockSums::kBlock == BlockSums::kBlock - 1) {
       total.add(block);
       block = {};
