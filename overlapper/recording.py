@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from overlapper import Overlap, Placed, Sphere
 from overlapper.labels import ROOT, Bodies, Contact, body_paths, pairs
-from overlapper.look import BODIES, INK, LIGHT, LINE, OVERLAPS, OWNER_COLORS, Array, Look, boxes, to_draw
+from overlapper.look import BODIES, INK, LIGHT, LINE, MANY_FACETS, OVERLAPS, OWNER_COLORS, Array, Look, boxes, to_draw
 from overlapper.stage import Stage, rgb
 
 from meshcat import Visualizer  # isort: skip  # after the stage, which says what to install
@@ -162,8 +162,9 @@ class Recording:
     def _add_overlap(self, stage: Stage, pair: Pair, overlap: Overlap) -> None:
         number = self._pairs.setdefault(pair, len(self._pairs))
         last, polytope = self._drawn.get(pair, (None, -1))
-        if last is None or not _look_alike(last, overlap):
-            polytope = self._polytopes.add(to_draw(overlap, stage.size), stage.center, polytope)
+        slack = 2 if len(overlap.owner) > MANY_FACETS else 1
+        if last is None or not _look_alike(last, overlap, slack):
+            polytope = self._polytopes.add(to_draw(overlap, stage.size), stage.center, polytope, slack)
             self._drawn[pair] = overlap, polytope
             box = np.asarray(overlap.bounds)
             lower, upper = self._seen_in.get(pair, box)
@@ -184,12 +185,17 @@ class _Polytopes:
     owners: list[NDArray[np.integer[Any]]] = field(default_factory=list)
     facets: list[list[NDArray[np.int32]]] = field(default_factory=list)
 
-    def add(self, overlap: Overlap, center: Array, like: int) -> int:
-        """Keep the overlap, about `center`; `like` is the one that the pair had before, or -1. Returns its number."""
+    def add(self, overlap: Overlap, center: Array, like: int, slack: int) -> int:
+        """Keep the overlap, about `center`; `like` is the one that the pair had before, or -1. Returns its number.
+
+        Where there is `slack`, as what is round is drawn within a tenth, vertices are as fine as 1/1000 of the size.
+        """
         lower, upper = np.asarray(overlap.bounds)
         unit = float((upper - lower).max()) / 2
         self.frames.append((*((lower + upper) / 2 - center), unit))
-        grid = np.round((overlap.vertices - (lower + upper) / 2) / unit * 32767).astype(np.int16)
+        grain = 64 if slack > 1 else 1
+        steps = np.round((overlap.vertices - (lower + upper) / 2) / unit * 32767 / grain) * grain
+        grid = np.clip(steps, -32767, 32767).astype(np.int16)
         self.previous.append(like if like >= 0 and self.vertices[like].shape == grid.shape else -1)
         self.vertices.append(grid)
         self.owners.append(overlap.owner)
@@ -215,13 +221,22 @@ class _Polytopes:
 
 
 class _Tape:
-    """In the place of meshcat's window: keeps the commands instead of sending them to a server."""
+    """In the place of meshcat's window: keeps the commands instead of sending them to a server.
+
+    A geometry is kept once; where it is used again, by its uuid alone.
+    """
 
     def __init__(self, commands: list[str]) -> None:
         self.commands = commands
+        self._known: set[str] = set()
 
     def send(self, command: Any) -> None:
-        self.commands.append(json.dumps(command.lower(), default=lambda packed: base64.b64encode(packed.data).decode()))
+        lowered = command.lower()
+        for each in lowered.get("object", {}).get("geometries", ()):
+            if each["uuid"] in self._known:
+                del each["data"]
+            self._known.add(each["uuid"])
+        self.commands.append(json.dumps(lowered, default=lambda packed: base64.b64encode(packed.data).decode()))
 
 
 def _pose(stage: Stage, placed: Placed) -> tuple[float, ...]:
@@ -233,18 +248,20 @@ def _pose(stage: Stage, placed: Placed) -> tuple[float, ...]:
     return (*position.tolist(), *np.round(placed.orientation, 6).tolist())
 
 
-def _look_alike(a: Overlap, b: Overlap) -> bool:
+def _look_alike(a: Overlap, b: Overlap, slack: int) -> bool:
     """True if the one can stand for the other in a picture.
 
     Neither shape has moved by more than 1/200 of the size of what they share, a pixel where that fills a quarter
     of the page, nor has its volume or area changed by more than 3 %, as it does in a thin overlap where that is much.
+    Both are multiplied by `slack`.
     """
     changed = max(abs(b.volume / a.volume - 1), abs(b.area / a.area - 1))
-    if changed >= 0.03:
+    if changed >= 0.03 * slack:
         return False
     size, centroid = float(np.ptp(np.asarray(a.bounds), axis=0).max()), np.asarray(a.centroid)
     return all(
-        _motion(before, after, centroid, size) < size / 200 for before, after in zip(a.shapes, b.shapes, strict=True)
+        _motion(before, after, centroid, size) < slack * size / 200
+        for before, after in zip(a.shapes, b.shapes, strict=True)
     )
 
 

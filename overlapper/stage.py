@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -45,6 +46,7 @@ class Stage:
         self.center = (lower + upper) / 2
         self.size = float(np.linalg.norm(upper - lower))
         self._bodies, self._overlaps = bodies, overlaps
+        self._known: dict[bytes, tuple[bool, _Mesh, geometry.PointsGeometry, geometry.PointsGeometry]] = {}
         fronts = [channels(overlaps.front)] if overlaps.front else [np.array(color) for color in OWNER_COLORS]
         # Mostly of their own light, so that an owner is known from the shaded side, too.
         fade = {"opacity": overlaps.opacity, "depthWrite": overlaps.opacity == 1}
@@ -74,9 +76,8 @@ class Stage:
 
     def body(self, placed: Placed, color: Sequence[float]) -> Group:
         """A shape in its own frame. What is not to be seen is there, too, so that a page can show it."""
-        drawn, look = self.surface(placed), self._bodies
-        flat, endless = drawn.normals is None, isinstance(placed.shape, HalfSpace)
-        mesh = _Mesh(drawn.vertices, drawn.faces, drawn.normals)
+        look, endless = self._bodies, isinstance(placed.shape, HalfSpace)
+        flat, mesh, edges, wires = self._geometries(placed)
         opacity = look.opacity * (0.4 if endless else 1)
         seen = {"opacity": opacity, "depthWrite": opacity == 1, "side": BOTH if endless and not look.back else FRONT}
         front = _skin(rgb(channels(look.front) if look.front else color), flat, **seen)
@@ -86,13 +87,22 @@ class Stage:
         return Group(
             (geometry.Mesh(mesh, front), {"name": "faces", "visible": look.faces}),
             *self._inside(mesh, look),
-            (geometry.LineSegments(_lines(drawn.edges), line), {"name": "edges", "visible": look.edges and look.faces}),
+            (geometry.LineSegments(edges, line), {"name": "edges", "visible": look.edges and look.faces}),
             (
-                geometry.LineSegments(_lines(drawn.wires), wire),
+                geometry.LineSegments(wires, wire),
                 {"name": "wires", "visible": look.edges and not look.faces},
             ),
             (geometry.Points(mesh, dots), {"name": "vertices", "visible": look.vertices}),
         )
+
+    def _geometries(self, placed: Placed) -> tuple[bool, _Mesh, geometry.PointsGeometry, geometry.PointsGeometry]:
+        """Whether faces are flat; faces, edges and wires, which are the same for the same shape."""
+        shape = pickle.dumps(placed.shape)
+        if shape not in self._known or isinstance(placed.shape, HalfSpace):
+            drawn = self.surface(placed)
+            mesh = _Mesh(drawn.vertices, drawn.faces, drawn.normals)
+            self._known[shape] = drawn.normals is None, mesh, _lines(drawn.edges), _lines(drawn.wires)
+        return self._known[shape]
 
     def _inside(self, mesh: _Mesh, look: Look) -> list[tuple[geometry.Object, dict[str, Any]]]:
         if look.back is None:

@@ -409,6 +409,14 @@ def test_bodies_are_sent_once_and_have_poses_only_where_they_move(tmp_path):
     assert frames == {"/overlapper/bodies/arm/hand/0": [0, 2], "/overlapper/bodies/cup/base/0": [0]}
 
 
+def test_a_shape_that_many_bodies_have_is_kept_once(tmp_path):
+    page = recorded([Bodies({CUP: Placed(Sphere(0.1)), HAND: Placed(Sphere(0.1), (1, 0, 0))})], tmp_path / "two.html")
+    first, second = (drawing["geometries"] for drawing in drawings(page).values())
+    assert [each["uuid"] for each in first] == [each["uuid"] for each in second]
+    assert all("data" in each for each in first)
+    assert not any("data" in each for each in second)
+
+
 def test_one_polytope_stands_for_an_overlap_at_rest(tmp_path):
     positions = (0.3, 0.12, 0.12, 0.12 + 1e-5, 0.15, 0.3, 0.15)
     film = Film.of(recorded([hand_at(x) for x in positions], tmp_path / "hand.html"))

@@ -36,9 +36,13 @@ function starts(counts) {
 }
 
 const viewer = new MeshCat.Viewer(byId("meshcat-pane"));
+const known = new Map();  // geometries by uuid: those used again come without their data
 for (const command of JSON.parse(new TextDecoder().decode(await unpacked("commands")))) {
-  for (const {data} of command.object?.geometries ?? []) {
-    for (const attribute of [data.index, ...Object.values(data.attributes)]) {
+  for (const geometry of command.object?.geometries ?? []) {
+    geometry.data ??= known.get(geometry.uuid);
+    if (known.has(geometry.uuid)) continue;
+    known.set(geometry.uuid, geometry.data);
+    for (const attribute of [geometry.data.index, ...Object.values(geometry.data.attributes)]) {
       if (attribute) attribute.array = new globalThis[attribute.type](bytes(attribute.array).buffer);
     }
   }

@@ -42,7 +42,10 @@ function tick(now) {
 
 slider.max = times[last];
 slider.oninput = () => pauseAt(frameAt(+slider.value));
-play.onclick = () => run(!playing);
+play.onclick = () => {
+  play.blur();  // or the space bar would press it once more
+  run(!playing);
+};
 speed.onchange = () => speed.blur();
 const keys = {
   " ": () => run(!playing),
@@ -67,6 +70,8 @@ for (const name of ["faces", "edges", "vertices", "marks"]) {
 }
 document.onkeydown = event => {
   if (event.ctrlKey || event.metaKey || event.altKey || !keys[event.key]) return;
+  // The panel's own controls keep what the keyboard does with them.
+  if (event.target.closest?.("#look") && (event.key === " " || event.key.startsWith("Arrow"))) return;
   event.preventDefault();
   keys[event.key]();
 };
