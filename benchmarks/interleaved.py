@@ -29,7 +29,7 @@ OURS = Fraction(1, 10**12)
 
 # s of the processor: a setting is not asked if the one before took longer for a pair; none may take longer than the
 # second, all pairs together.
-DEAR, TIME_LIMIT = 0.5, 20
+DEAR, TIME_LIMIT = 0.25, 20
 
 # s, after which a process is taken to hang, however busy the machine is.
 PATIENCE = 600.0

@@ -25,7 +25,7 @@ Setting = float | int | str | None
 Asked = Callable[[], Any]
 
 
-MOST_IN_NUMPY = 500  # vertices of either body, for a peer that looks at all of them for every plane of the other
+MOST_IN_NUMPY = 200  # vertices of either body, for a peer that looks at all of them for every plane of the other
 
 
 class Unfit(Exception):
