@@ -4,9 +4,9 @@
     python benchmarks/chart.py --page                only the page and its pictures, from the results there are
     python benchmarks/chart.py --family "box deep"   one family alone
 
-Writes DIR/speed.csv (a line for each family, method and setting), DIR/claims.csv (what the article claims) and what
-benchmarks/speed_page.py makes of them. Every answer is compared with the exact truth: a peer that is wrong is shown as
-wrong; if this package is, the run ends there.
+Writes DIR/speed.csv (a line for each family, method and setting), DIR/claims.csv (what the article claims), what
+benchmarks/scene_steps.py writes of the steps of a simulation, and what benchmarks/speed_page.py makes of them. Every
+answer is compared with the exact truth: a peer that is wrong is shown as wrong; if this package is, the run ends there.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import multiprocessing
 import os
 import platform
 import re
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -115,6 +116,8 @@ def main() -> None:
     parser.add_argument("--page", action="store_true", help="only draw the page, from the results there are")
     chosen = parser.parse_args()
     folder = chosen.out or HERE / "results" / folder_of(machine())
+    if chosen.page and (folder / "steps.csv").exists():
+        about_steps(chosen.out, "--draw")
     if not chosen.page:
         try:
             measure(chosen, folder)
@@ -139,6 +142,14 @@ def measure(chosen: argparse.Namespace, folder: Path) -> None:
     measure_pairs(families, chosen.method or list(METHODS), chosen.seconds, folder / "speed.csv")
     if not (chosen.family or chosen.method):
         measure_claims(chosen.seconds / 8, folder / "claims.csv")
+        if about_steps(chosen.out).returncode:
+            raise Wrong("see above")
+
+
+def about_steps(out: Path | None, *options: str) -> subprocess.CompletedProcess:
+    """The steps of a simulation have a benchmark of their own, which measures and draws them."""
+    folder = [f"--out={out}"] if out else []
+    return subprocess.run([sys.executable, str(HERE / "scene_steps.py"), *folder, *options])
 
 
 if __name__ == "__main__":
