@@ -4,9 +4,9 @@
     python benchmarks/chart.py --page                only the page and its pictures, from the results there are
     python benchmarks/chart.py --family "box deep"   one family alone
 
-Writes DIR/speed.csv (a line for each family, method and setting), DIR/claims.csv (what the article claims), what
-benchmarks/scene_steps.py writes of the steps of a simulation, and what benchmarks/speed_page.py makes of them. Every
-answer is compared with the exact truth: a peer that is wrong is shown as wrong; if this package is, the run ends there.
+Writes DIR/speed.csv (a line for each family, method and setting), DIR/claims.csv (what the article claims) and what
+benchmarks/speed_page.py makes of them. Every answer is compared with the exact truth: a peer that is wrong is shown as
+wrong; if this package is, the run ends there.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import multiprocessing
 import os
 import platform
 import re
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -116,8 +115,6 @@ def main() -> None:
     parser.add_argument("--page", action="store_true", help="only draw the page, from the results there are")
     chosen = parser.parse_args()
     folder = chosen.out or HERE / "results" / folder_of(machine())
-    if chosen.page and (folder / "steps.csv").exists():
-        about_steps(chosen.out, "--draw")
     if not chosen.page:
         try:
             measure(chosen, folder)
@@ -130,10 +127,17 @@ def main() -> None:
         print(f"overlapper: the pictures need {error.name}: pip install 'overlapper[bench]'", file=sys.stderr)
         sys.exit(2)
     named = str(folder.relative_to(ROOT)) if folder.is_relative_to(ROOT) else str(folder)
-    notes, rows = read(folder / "speed.csv", Row)
-    claims = read(folder / "claims.csv", Claim)[1] if (folder / "claims.csv").exists() else []
-    steps = (folder / "steps.csv").exists()
-    print(f"Written: {write_page(Results(named, notes, rows, claims, steps), chosen.out or ROOT / 'docs')}")
+    print(f"Written: {write_page(Results(named, *results_in(folder)), chosen.out or ROOT / 'docs')}")
+
+
+def results_in(folder: Path) -> tuple[list[str], list[Row], list[Claim], bool]:
+    """Comments and rows, claims if they were measured, and whether the steps of a simulation were."""
+    claims = folder / "claims.csv"
+    return (
+        *read(folder / "speed.csv", Row),
+        read(claims, Claim)[1] if claims.exists() else [],
+        (folder / "steps.csv").exists(),
+    )
 
 
 def measure(chosen: argparse.Namespace, folder: Path) -> None:
@@ -142,14 +146,6 @@ def measure(chosen: argparse.Namespace, folder: Path) -> None:
     measure_pairs(families, chosen.method or list(METHODS), chosen.seconds, folder / "speed.csv")
     if not (chosen.family or chosen.method):
         measure_claims(chosen.seconds / 8, folder / "claims.csv")
-        if about_steps(chosen.out).returncode:
-            raise Wrong("see above")
-
-
-def about_steps(out: Path | None, *options: str) -> subprocess.CompletedProcess:
-    """The steps of a simulation have a benchmark of their own, which measures and draws them."""
-    folder = [f"--out={out}"] if out else []
-    return subprocess.run([sys.executable, str(HERE / "scene_steps.py"), *folder, *options])
 
 
 if __name__ == "__main__":

@@ -34,6 +34,8 @@ DEAR, TIME_LIMIT = 0.25, 20
 # s, after which a process is taken to hang, however busy the machine is.
 PATIENCE = 600.0
 
+TRUTHS = ("volume", "volume_of_points", "depth", "depth_of_points")
+
 SAMPLE = 2e-3  # s, the least that is timed at once
 SLOW = 0.2  # s: pairs that take longer together are as many as there need be, and are timed once
 
@@ -87,11 +89,12 @@ class Entry:
 # In the process
 
 
-def measure(
-    pipe: Connection, family: str, pairs: list[workloads.Pair], methods: list[str], ended: dict, seconds: float
-) -> None:
+def measure(pipe: Connection, family: str, truths: list[dict], methods: list[str], ended: dict, seconds: float) -> None:
     """Sends what is about to be asked, and in the end the rows, or in which way this package is wrong."""
     quiet()
+    pairs = workloads.pairs_of(family)
+    for pair, known in zip(pairs, truths):
+        pair.__dict__.update(known)
     try:
         facets = check_ours(family, pairs)
         entries, rows = first_answers(pipe, family, pairs, methods, ended)
@@ -243,11 +246,11 @@ def finish(entry: Entry) -> None:
 
 def rows_of(family: str, pairs: list[workloads.Pair], methods: Iterable[str], seconds: float) -> list[Row]:
     """A row for each method and setting. `seconds` is about what the rounds take. Raises Wrong."""
-    for pair in pairs:  # here, so that no process that is begun again has to find them once more
-        _ = pair.volume, pair.volume_of_points, pair.depth, pair.depth_of_points
+    # Here, so that no process that is begun again has to find them once more.
+    truths = [{name: getattr(pair, name) for name in TRUTHS} for pair in pairs]
     ended: dict[tuple[str, Setting], str] = {}
     while True:
-        outcome = measured(family, pairs, list(methods), ended, seconds)
+        outcome = measured(family, truths, list(methods), ended, seconds)
         if isinstance(outcome, list):
             return outcome
         asked, how = outcome
@@ -262,12 +265,12 @@ def used_by(pid: int) -> float:
 
 
 def measured(
-    family: str, pairs: list, methods: list[str], ended: dict, seconds: float
+    family: str, truths: list[dict], methods: list[str], ended: dict, seconds: float
 ) -> list[Row] | tuple[tuple[str, Setting], str]:
     """The rows; or what was asked last when the process ended, and how it did."""
     context = multiprocessing.get_context("spawn")
     pipe, other = context.Pipe()
-    process = context.Process(target=measure, args=(other, family, pairs, methods, ended, seconds), daemon=True)
+    process = context.Process(target=measure, args=(other, family, truths, methods, ended, seconds), daemon=True)
     process.start()
     other.close()
     asked: tuple[str, Setting] = ("", None)

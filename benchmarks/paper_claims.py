@@ -20,7 +20,7 @@ import truth
 import workloads
 from interleaved import Wrong, error_of
 from strategies import directions
-from timed_peers import clipping, planes
+from timed_peers import MOST_IN_NUMPY, clipping, planes
 
 from overlapper import Hull, Placed, overlap
 
@@ -55,9 +55,10 @@ def pairs(seconds: float) -> list[Claim]:
         ways = {
             "paper": lambda a=a, b=b: overlap(a, b, method="paper").volume,
             "auto": lambda a=a, b=b: overlap(a, b).volume,
-            "cutting": clipping(pair, None),
             "duality": lambda both=both, at=at: by_one_hull([both], at),
         }
+        if size <= MOST_IN_NUMPY:
+            ways["cutting"] = clipping(pair, None)
         found += asked("pair", ways, slow, size, 2, pair.volume, seconds)
     return found
 

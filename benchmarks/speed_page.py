@@ -50,7 +50,7 @@ class Results:
     notes: list[str]
     rows: list[Row]
     claims: list[Claim]
-    steps: bool  # whether there is a chart of the steps of a simulation
+    steps: bool  # whether the steps of a simulation were measured, too
 
 
 def write_page(results: Results, folder: Path) -> Path:
@@ -62,15 +62,20 @@ def write_page(results: Results, folder: Path) -> Path:
     if families:
         accuracy(rows, [name for name in CHOSEN if name in at_hand] or families, 4, folder / "speed.png")
         accuracy(rows, families, 4, folder / "speed_families.png", folder / "speed.html")
-    by_size = [sizes(rows, way) for way in ("deep", "shallow")]
+    by_size, by_claim = panels(results)
     if all(panel.lines for panel in by_size):
         growth(by_size, folder / "speed_sizes.png")
-    by_claim = [of_pairs(results.claims), of_groups(results.claims)]
     if results.claims:
         growth(by_claim, folder / "speed_claims.png")
     page = folder / "speed.md"
-    page.write_text(text(results, by_size, by_claim), encoding="utf-8")
+    page.write_text(text(results), encoding="utf-8")
     return page
+
+
+def panels(results: Results) -> tuple[list[Growth], list[Growth]]:
+    """Of the charts of time over size and of the article's claims."""
+    by_size = [sizes(results.rows, way) for way in ("deep", "shallow")]
+    return by_size, [of_pairs(results.claims), of_groups(results.claims)]
 
 
 def find(rows: Iterable[Row], family: str, method: str, setting: str | None = None) -> Row | None:
@@ -94,7 +99,7 @@ def sizes(rows: list[Row], way: str) -> Growth:
         found = [(size, best(rows, f"i{size} {way}", name)) for size in SIZES]
         lines[name] = [(float(size), float(row.us)) for size, row in found if row]
     lines = {name: points for name, points in lines.items() if points}
-    return Growth(way, "facets of either mesh", lines, powers(lines, 320))
+    return Growth(way, "facets of either mesh", lines, powers_of(lines, 320))
 
 
 def of_pairs(claims: list[Claim]) -> Growth:
@@ -102,7 +107,7 @@ def of_pairs(claims: list[Claim]) -> Growth:
     for claim in claims:
         if claim.claim == "pair":
             lines.setdefault(claim.way, []).append((float(claim.vertices), float(claim.us)))
-    return Growth("a pair", "vertices of either body", lines, powers(lines, 50))
+    return Growth("a pair", "vertices of either body", lines, powers_of(lines, 50))
 
 
 def of_groups(claims: list[Claim]) -> Growth:
@@ -110,10 +115,10 @@ def of_groups(claims: list[Claim]) -> Growth:
     for claim in claims:
         if claim.claim == "bodies":
             lines.setdefault(claim.way, []).append((float(claim.bodies), float(claim.us)))
-    return Growth(f"many bodies of {VERTICES} vertices", "bodies", lines, powers(lines, 8))
+    return Growth(f"many bodies of {VERTICES} vertices", "bodies", lines, powers_of(lines, 8))
 
 
-def powers(lines: dict[str, list[tuple[float, float]]], least: float) -> dict[str, float]:
+def powers_of(lines: dict[str, list[tuple[float, float]]], least: float) -> dict[str, float]:
     """The power of the size with which time grows, fitted from a size on to at least three points."""
     fitted = {}
     for name, points in lines.items():
@@ -127,7 +132,8 @@ def powers(lines: dict[str, list[tuple[float, float]]], least: float) -> dict[st
 # Words
 
 
-def text(results: Results, by_size: list[Growth], by_claim: list[Growth]) -> str:
+def text(results: Results) -> str:
+    by_size, by_claim = panels(results)
     template = (Path(__file__).parent / "speed_page.md").read_text(encoding="utf-8")
     rows = results.rows
     pairs = {row.family: row.pairs for row in rows if row.method == "auto"}
@@ -148,11 +154,9 @@ def text(results: Results, by_size: list[Growth], by_claim: list[Growth]) -> str
     return Template(template).substitute(parts)
 
 
-STEPS = """![Where the time of a step goes, by the number of boxes in a pile, beside pybullet's own](steps.png)
+STEPS = """[Where the time of a step goes](steps.md) is a page of its own: piles of boxes, beside pybullet's own step.
 
-A step of a pile of boxes that come to rest: the poses are read from pybullet, the shapes placed, pairs culled by boxes,
-volume, centroid, normal, depth and gradient computed, and arrays and contacts handed over. The numbers are in
-`steps.csv` beside those of this page."""
+![Time of a step per box, by its parts, and of the whole, over the number of boxes](steps.png)"""
 
 CLAIMS = """![Time over the vertices of a pair and over the number of bodies](speed_claims.png)
 

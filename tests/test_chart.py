@@ -186,6 +186,14 @@ def test_one_hull_and_the_tree_find_what_many_bodies_share():
     assert paper_claims.by_tree(walls, at) == pytest.approx(volume, rel=1e-9)
 
 
+def test_the_page_says_what_the_committed_results_say():
+    (path,) = (ROOT / "benchmarks" / "results").glob("*/speed.csv")
+    results = speed_page.Results(str(path.parent.relative_to(ROOT)), *chart.results_in(path.parent))
+    assert len(results.rows) > 100
+    assert {row.method for row in results.rows} == set(timed_peers.METHODS)
+    assert (ROOT / "docs" / "speed.md").read_text(encoding="utf-8") == speed_page.text(results)
+
+
 def test_the_page_says_what_the_claims_come_to():
     def claim(kind, way, vertices, bodies, us):
         return paper_claims.Claim(kind, way, vertices, bodies, f"{us:g}", "0.00e+00")
