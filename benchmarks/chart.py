@@ -68,7 +68,7 @@ def results_file(path: Path, line: type) -> Iterator[Callable[[list], None]]:
     """A table with a comment on machine and packages; what it yields appends lines."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", newline="", encoding="utf-8") as file:
-        file.write(f"# {machine()}; {time.strftime('%Y-%m-%d')}; {packages()}\n")
+        file.write(f"# {machine()}; {time.strftime('%Y-%m-%d')}; load {os.getloadavg()[0]:.0f}; {packages()}\n")
         writer = csv.DictWriter(file, [field.name for field in fields(line)], lineterminator="\n")
         writer.writeheader()
 

@@ -183,7 +183,7 @@ def growth(panels: list[Growth], path: Path) -> None:
             )  # fmt: skip
         ticks = sorted({x for points in shown.lines.values() for x, _ in points})
         ax.set_xticks(ticks, [f"{t:,.0f}" for t in ticks])
-        ax.set_xlim(min(ticks) / 1.3, max(ticks) * (max(ticks) / min(ticks)) ** 0.4)
+        ax.set_xlim(min(ticks) / 1.3, max(ticks) * (max(ticks) / min(ticks)) ** 0.55)
         ax.minorticks_off()
     times = [us for shown in panels for points in shown.lines.values() for _, us in points]
     decades = 10.0 ** np.arange(np.floor(np.log10(min(times))), np.ceil(np.log10(max(times))) + 1)

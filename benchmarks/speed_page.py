@@ -145,6 +145,7 @@ def text(results: Results) -> str:
         "powers": power_table(by_size),
         "per_facet": per_facet(rows),
         "warm": warm(rows),
+        "depths": depths(rows),
         "missing": missing(rows),
         "results": results.folder,
         "notes": "\n".join(f"    {line}" for line in results.notes),
@@ -249,6 +250,11 @@ def held(peer: Row, ours: Row, aim: float | None) -> str:
     return f"**{said}** ({aim:g})" if ratio >= aim else f"{said} ({aim:g})"
 
 
+def depths(rows: list[Row]) -> str:
+    times = ((family, find(rows, family, "auto, depth")) for family in TARGETS)
+    return ", ".join(f"{family} {duration(float(row.us))}" for family, row in times if row)
+
+
 def warm(rows: list[Row]) -> str:
     lines = []
     for family in [*TARGETS, "boxes apart"]:
@@ -295,10 +301,13 @@ def per_facet(rows: list[Row]) -> str:
 
 
 def missing(rows: list[Row]) -> str:
-    notes: dict[str, list[str]] = {}
+    found: dict[tuple[str, str], tuple[dict[str, None], dict[str, None]]] = {}
     for row in rows:
         if row.note and not row.us:
-            name = " ".join(filter(None, (row.method, row.setting)))
-            notes.setdefault(f"{name}: {row.note}", []).append(row.family)
-    lines = [f"- {note} ({', '.join(families)})" for note, families in sorted(notes.items())]
+            settings, families = found.setdefault((row.method, row.note), ({}, {}))
+            settings[row.setting], families[row.family] = None, None
+    lines = [
+        f"- {method} {', '.join(settings)}: {note} ({', '.join(families)})".replace(" :", ":")
+        for (method, note), (settings, families) in sorted(found.items())
+    ]
     return "\n".join(lines) or "Everybody was asked everything."
