@@ -131,14 +131,27 @@ capsules = st.builds(Capsule, lengths, st.floats(0.0, 2.0))
 cylinders = st.builds(Cylinder, lengths, lengths)
 
 
+# What is drawn is printed as the calls that make it again, which must therefore hold all that there is to know, in short
+# numbers.
+
+
+def short(numbers):
+    """Multiples of 1/64."""
+    return np.round(np.asarray(numbers) * 64) / 64
+
+
 @st.composite
-def hulls(draw, low=4, high=16):
-    """Hulls in general position."""
+def points_of_hulls(draw, low, high):
+    """In general position."""
     rng = np.random.default_rng(draw(seeds))
     while True:
-        points = hull_points(rng, draw(st.integers(low, high)))
+        points = short(hull_points(rng, draw(st.integers(low, high))))
         if np.linalg.svd(points - points.mean(0), compute_uv=False)[2] > 0.05:
-            return Hull(points)
+            return points
+
+
+def hulls(low=4, high=16):
+    return st.builds(Hull, points_of_hulls(low, high))
 
 
 @st.composite
@@ -165,4 +178,5 @@ def in_general_position(draw, shapes, low, high):
     """Bodies of which no two share a plane, so that every facet has one owner."""
     rng = np.random.default_rng(draw(seeds))
     chosen = draw(st.lists(shapes, min_size=low, max_size=high))
-    return [Placed(shape, rng.uniform(-0.5, 0.5, 3), quaternion(rng)) for shape in chosen]
+    poses = [(short(rng.uniform(-0.5, 0.5, 3)), short(quaternion(rng))) for _ in chosen]
+    return [draw(st.builds(Placed, st.just(shape), *map(st.just, pose))) for shape, pose in zip(chosen, poses)]
