@@ -131,8 +131,8 @@ capsules = st.builds(Capsule, lengths, st.floats(0.0, 2.0))
 cylinders = st.builds(Cylinder, lengths, lengths)
 
 
-# What is drawn is printed as the calls that make it again, which must therefore hold all that there is to know, in short
-# numbers.
+# What is drawn is printed as the calls that make it again, which must therefore hold all that there is to know, in
+# short numbers.
 
 
 def short(numbers):

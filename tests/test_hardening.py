@@ -93,6 +93,8 @@ def answers(seed):
     found["candidate_pairs"] = pairs
     found["overlaps"] = overlaps(shapes, positions, orientations, tolerance=TOLERANCE, threads=2)
     found["Batch"] = Batch(shapes).overlaps(positions, orientations, pairs, TOLERANCE)
+    frames = [(body.position, body.orientation) for body in (a, b, c)]
+    found["world_poses"] = _core.world_poses(frames, np.arange(3), positions, orientations)
     found["random_polytope"] = Placed(random_polytope(9, rng=rng))
     return {name: bits(value) for name, value in found.items()}
 
@@ -168,6 +170,23 @@ def test_a_forked_process_goes_on_with_what_it_inherits():
     unasked[:] = [overlap(*bodies, method=method) for method in methods]
     assert in_another_process("fork", bits_of_unasked) == bits([overlap(*bodies, method=method) for method in methods])
     assert in_another_process("fork", answers, 0) == before == answers(0)
+
+
+def test_a_process_forked_while_a_thread_computes_does_not_wait_for_it():
+    bodies = Placed(Capsule(0.5, 1)), Placed(Cylinder(0.5, 1), (0.2, 0.1, 0.3), (0.1, 0.2, 0.3, 0.9))
+    shared = overlap(*bodies, tolerance=5e-5)  # a tenth of a second, when asked
+    begins = threading.Event()
+    context = multiprocessing.get_context("fork")
+    receiving, sending = context.Pipe(duplex=False)
+    child = context.Process(target=lambda: sending.send(shared.volume))
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(lambda: (begins.set(), shared.volume)[1])
+        begins.wait(HANG)
+        child.start()
+        try:
+            assert receiving.poll(HANG) and receiving.recv() == asked.result(HANG)
+        finally:
+            child.kill()
 
 
 def test_a_spawned_process_gives_the_same_bits():

@@ -109,8 +109,9 @@ void Overlap::start() {
     PaperResult result = intersect_as_in_paper(arrangement().relative, tolerance_);
     status_ = result.status;
     if (result.region) {
-      lazy().region = owned_as_given(std::move(*result.region));
-      lazy().region->reference = arrangement().reference;
+      Region region = owned_as_given(std::move(*result.region));
+      region.reference = arrangement().reference;
+      lazy().region.get([&] { return std::move(region); });
     }
     return;
   }
@@ -138,31 +139,50 @@ Overlap::Overlap(Overlap&& other) noexcept
       measured_by_clipping_(other.measured_by_clipping_),
       lazy_(std::move(other.lazy_)) {}
 
-Overlap::Lazy& Overlap::lazy() const {
-  if (!lazy_) lazy_ = std::make_unique<Lazy>();
-  return *lazy_;
+const Overlap::Lazy& Overlap::lazy() const {
+  return lazy_.get([] { return Lazy{}; });
 }
 
 const Overlap::Arrangement& Overlap::arrangement() const {
-  std::optional<Arrangement>& kept = lazy().arrangement;
-  if (kept) return *kept;
+  return lazy().arrangement.get([this] { return arranged(); });
+}
+
+const Overlap::Search& Overlap::search() const {
+  return lazy().search.get([this] { return searched(); });
+}
+
+const Region& Overlap::region() const {
+  return lazy().region.get([this] { return grown(); });
+}
+
+const Quantities& Overlap::quantities() const {
+  return lazy().quantities.get([this] { return measured(); });
+}
+
+const Surface& Overlap::surface() const {
+  return lazy().surface.get([this] { return surface_of(region(), static_cast<int>(bodies().size())); });
+}
+
+const Overlap::Contact& Overlap::contact() const {
+  return lazy().contact.get([this] { return in_contact(); });
+}
+
+Overlap::Arrangement Overlap::arranged() const {
   Arrangement arrangement{canonical_order(bodies()), {}, {}};
   arrangement.reference = bodies()[arrangement.order[0]].pose.translation;
   arrangement.relative.reserve(bodies().size());
   for (int body : arrangement.order) arrangement.relative.push_back(bodies()[body].seen_from(arrangement.reference));
-  return kept.emplace(std::move(arrangement));
+  return arrangement;
 }
 
-const Overlap::Search& Overlap::search() const {
-  std::optional<Search>& kept = lazy().search;
-  if (kept) return *kept;
+Overlap::Search Overlap::searched() const {
   const std::vector<Placed>& relative = arrangement().relative;
   Search search{};
   for (const Placed& body : relative) search.reach.push_back(magnitude(body));
   std::vector<OwnedPlane> hints;
   if (pair() && (bounded(relative[0].shape) || bounded(relative[1].shape))) {
     const Distance d = overlapper::distance(relative[0], relative[1]);
-    if (d.gap > doubt(std::max(search.reach[0], search.reach[1]))) return kept.emplace(std::move(search));
+    if (d.gap > doubt(std::max(search.reach[0], search.reach[1]))) return search;
     hints = facing_planes(relative, d);
   }
   search.planes = gather_planes<Placed>(relative);
@@ -175,7 +195,7 @@ const Overlap::Search& Overlap::search() const {
   }
   if (search.status != Status::kSeparated && !bounds_space(bodies()))
     throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
-  return kept.emplace(std::move(search));
+  return search;
 }
 
 /// How large the numbers are that describe the bodies.
@@ -238,16 +258,12 @@ double Overlap::volume_error() const {
     if (status_ == Status::kSeparated) return 0;
     if (measured_by_clipping_) return clipped_->volume_error;
     if (status_ == Status::kOverlapping) return quantities().volume_error;
-    const std::scoped_lock lock(mutex_);
     return touching_volume(search().ball);
   }
-  const double claimed = volume();
-  const std::scoped_lock lock(mutex_);
-  if (!lazy().error_of_paper) {
+  return lazy().error_of_paper.get([this] {
     const Overlap judge({bodies().begin(), bodies().end()}, tolerance_, Method::kAuto);
-    lazy().error_of_paper = std::abs(claimed - judge.volume()) + judge.volume_error();
-  }
-  return *lazy().error_of_paper;
+    return std::abs(volume() - judge.volume()) + judge.volume_error();
+  });
 }
 
 double Overlap::area() const {
@@ -286,22 +302,20 @@ Region Overlap::owned_as_given(Region region) const {
   return region;
 }
 
-const Region& Overlap::grown() const {
+Region Overlap::grown() const {
   assert(status_ == Status::kOverlapping);
-  std::optional<Region>& kept = lazy().region;
-  if (kept) return *kept;
   if (traced()) {
     const Arrangement& at = arrangement();
     if (auto region = region_of_clipped(bodies()[at.order[0]], bodies()[at.order[1]], at.reference))
-      return kept.emplace(owned_as_given(std::move(*region)));
+      return owned_as_given(std::move(*region));
   }
   const Search& found = search();
   const double reach = largest_reach();
-  if (found.wide_ball) return kept.emplace(grown_about(*found.wide_ball, reach));
+  if (found.wide_ball) return grown_about(*found.wide_ball, reach);
   const Arrangement& about = arrangement();
   const Frame frame = round_frame<Placed>(about.relative, found.planes, found.ball.cuts, found.ball.centre);
-  return kept.emplace(
-      owned_as_given(grow<Placed>(about.relative, found.planes, frame, tolerance_, rounding(reach), about.reference)));
+  return owned_as_given(
+      grow<Placed>(about.relative, found.planes, frame, tolerance_, rounding(reach), about.reference));
 }
 
 Region Overlap::grown_about(const WideBall& ball, double reach) const {
@@ -311,17 +325,15 @@ Region Overlap::grown_about(const WideBall& ball, double reach) const {
   return owned_as_given(grow<WideBody>(bodies, planes, frame, tolerance_, wide_noise(reach), arrangement().reference));
 }
 
-const Quantities& Overlap::measured() const {
-  std::optional<Quantities>& kept = lazy().quantities;
-  if (kept) return *kept;
-  if (method_ == Method::kPaper) return kept.emplace(measure(grown()));
+Quantities Overlap::measured() const {
+  if (method_ == Method::kPaper) return measure(region());
   const Arrangement& at = arrangement();
+  std::optional<Quantities> kept;
   if (!traced()) {
-    const Search& found = search();
-    if (found.wide_ball) {
-      kept = measure(grown());
-      kept->widened = true;
-      return *kept;
+    if (search().wide_ball) {
+      Quantities in_wide_arithmetic = measure(region());
+      in_wide_arithmetic.widened = true;
+      return in_wide_arithmetic;
     }
     if (pair()) {
       kept = closed_form(at.relative[0], at.relative[1], rounding(largest_reach()), at.reference);
@@ -331,7 +343,7 @@ const Quantities& Overlap::measured() const {
         for (Quantities::Pull& pull : kept->pulls) pull.owner = at.order[pull.owner];
     }
   }
-  if (!kept) kept = measure(grown());
+  if (!kept) kept = measure(region());
   const auto keep_better = [&](const Region& region) {
     Quantities again = measure(region);
     again.widened = true;
@@ -340,7 +352,7 @@ const Quantities& Overlap::measured() const {
   const bool polyhedral = std::ranges::none_of(bodies(), smooth_body);
   const auto enough = [&] { return kept->volume_error <= kEnough * kept->volume; };
   if (polyhedral && !enough())
-    if (auto wide = overlapper::widened(at.relative, grown())) keep_better(owned_as_given(std::move(*wide)));
+    if (auto wide = overlapper::widened(at.relative, region())) keep_better(owned_as_given(std::move(*wide)));
   if (polyhedral ? !enough() : rounding(largest_reach()) * kept->area > tolerance_ * kept->volume) {
     // The point about which the region was grown may not be inside after all, or its frame not be round.
     const double noise = wide_noise(largest_reach());
@@ -351,16 +363,6 @@ const Quantities& Overlap::measured() const {
   return *kept;
 }
 
-const Region& Overlap::region() const {
-  const std::scoped_lock lock(mutex_);
-  return grown();
-}
-
-const Quantities& Overlap::quantities() const {
-  const std::scoped_lock lock(mutex_);
-  return measured();
-}
-
 Mat3 Overlap::inertia() const {
   const Quantities& q = quantities();
   if (!q.closed_form) return q.inertia;
@@ -368,12 +370,6 @@ Mat3 Overlap::inertia() const {
   const double share = q.volume / of_polytope.volume;
   const Mat3& i = of_polytope.inertia;
   return {share * i.row0, share * i.row1, share * i.row2};
-}
-
-const Surface& Overlap::surface() const {
-  const std::scoped_lock lock(mutex_);
-  std::optional<Surface>& kept = lazy().surface;
-  return kept ? *kept : kept.emplace(surface_of(grown(), static_cast<int>(bodies().size())));
 }
 
 std::vector<std::array<double, 6>> Overlap::gradient() const {
@@ -419,11 +415,8 @@ Penetration Overlap::parting(std::vector<Vec3> normals) const {
   return least;
 }
 
-const Overlap::Contact& Overlap::contact() const {
+Overlap::Contact Overlap::in_contact() const {
   assert(pair());
-  const std::scoped_lock lock(mutex_);
-  std::optional<Contact>& kept = lazy().contact;
-  if (kept) return *kept;
   Contact contact;
   const auto& [order, relative, reference] = arrangement();
   const Placed &a = relative[0], &b = relative[1];
@@ -456,7 +449,7 @@ const Overlap::Contact& Overlap::contact() const {
     contact.separating = {contact.normal, -contact.separating.offset};
     std::swap(contact.witness_a, contact.witness_b);
   }
-  return kept.emplace(contact);
+  return contact;
 }
 
 }  // namespace overlapper

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "clip.h"
 #include "common_point.h"
 #include "minkowski.h"
+#include "once.h"
 #include "region.h"
 #include "shape.h"
 #include "surface.h"
@@ -20,7 +20,7 @@ namespace overlapper {
 enum class Method { kAuto, kPaper };
 
 /// The common set of two or more placed shapes. Only the status is found on construction; each quantity when first
-/// asked for, then kept. Safe to share between threads.
+/// asked for, then kept. Safe to share between threads, none of which waits for another.
 class Overlap {
  public:
   /// Throws std::invalid_argument if the common set is unbounded. `tolerance` is the fraction by which the polytope may
@@ -89,27 +89,29 @@ class Overlap {
   };
 
   struct Lazy {
-    std::optional<Arrangement> arrangement;
-    std::optional<Search> search;
-    std::optional<Region> region;
-    std::optional<Quantities> quantities;
-    std::optional<Surface> surface;
-    std::optional<Contact> contact;
-    std::optional<double> error_of_paper;
+    Once<Arrangement> arrangement;
+    Once<Search> search;
+    Once<Region> region;
+    Once<Quantities> quantities;
+    Once<Surface> surface;
+    Once<Contact> contact;
+    Once<double> error_of_paper;
   };
 
-  // Those down to measured() want the mutex held.
-  Lazy& lazy() const;
+  const Lazy& lazy() const;
   const Arrangement& arrangement() const;
   const Search& search() const;
+  Arrangement arranged() const;
+  Search searched() const;
   void settle_in_wide_arithmetic(Search& search) const;
   double largest_reach() const;
   std::vector<WideBody> wide_bodies() const;
   Distance wide_distance(double reach) const;
   Penetration parting(std::vector<Vec3> normals) const;
   Region grown_about(const WideBall& ball, double reach) const;
-  const Region& grown() const;
-  const Quantities& measured() const;
+  Region grown() const;
+  Quantities measured() const;
+  Contact in_contact() const;
   double touching_volume(const DeepestBall& ball) const;
   Region owned_as_given(Region region) const;
 
@@ -123,8 +125,7 @@ class Overlap {
   std::optional<ClippedPair> clipped_;  ///< if clipping has decided
   std::vector<Pull> pulls_;             ///< of more than two bodies, if it has
   bool measured_by_clipping_ = false;   ///< and its figures are as good as any
-  mutable std::mutex mutex_;
-  mutable std::unique_ptr<Lazy> lazy_;
+  Once<Lazy> lazy_;
 };
 
 }  // namespace overlapper
