@@ -11,7 +11,6 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 from fractions import Fraction
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -112,8 +111,9 @@ def _overlapping(overlap: Overlap, bodies: list[RationalBody]) -> Overlapping:
         for halfspace, owner in zip(overlap.halfspaces, overlap.owner)
     ]
     surfaces = [_common_polytope] if all(body.flat for body in known) else [_published_surface, _common_polytope]
-    for surface, fine in product(surfaces, BITS):
-        bounding, rings, facet, corners, point = surface(overlap, known, planes)
+    made = (surface(overlap, known, planes) for surface in surfaces)
+    for found, fine in ((surface, fine) for surface in made for fine in BITS):
+        bounding, rings, facet, corners, point = found
         thickness = min(float(p.offset - p.normal @ point) / math.sqrt(p.normal @ p.normal) for p in bounding)
         if thickness > 0.0:
             exponent = math.frexp(thickness)[1] - fine

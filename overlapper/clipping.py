@@ -10,8 +10,9 @@ from fractions import Fraction
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
-from overlapper.rational import Exact, primitive
+from overlapper.rational import DOUBT, UNDERFLOW, Exact, bits, in_doubles, primitive
 
 BORDER = -1
 SIDES = ((0, 2, 6, 4), (1, 5, 7, 3), (0, 4, 5, 1), (2, 3, 7, 6), (0, 1, 3, 2), (4, 6, 7, 5))
@@ -22,39 +23,73 @@ class ClippedPolytope:
 
     def __init__(self, box: Exact) -> None:
         self.points = [primitive([*corner, Fraction(1)]) for corner in product(*box.T)]
-        self.rings: list[list[int]] = [list(side) for side in SIDES]
-        self.labels = [BORDER] * len(SIDES)
+        self._facets: dict[int, tuple[list[int], int]] = {}  # ring and label
+        self._around: dict[int, set[int]] = {}  # the facets of every point in use
+        self._made = 0
+        for side in SIDES:
+            self._add([*side], BORDER)
+
+    @property
+    def rings(self) -> list[list[int]]:
+        return [ring for ring, _ in self._facets.values()]
+
+    @property
+    def labels(self) -> list[int]:
+        return [label for _, label in self._facets.values()]
 
     def used(self) -> list[int]:
-        return sorted({point for ring in self.rings for point in ring})
+        return sorted(self._around)
 
-    def reaches_past(self, planes: Exact) -> Exact:
-        """Which of the planes (k, 4) would remove something."""
+    def reaches_past(self, planes: Exact) -> NDArray[np.bool_]:
+        """Which of the planes (k, 4) would remove something: doubles are sure of most."""
         corners = np.array([self.points[point] for point in self.used()], object)
-        past: Exact = (planes @ corners.T > 0).any(axis=1)
+        a, b = (np.array([in_doubles(row, 1 << bits(row)) for row in rows]) for rows in (planes, corners))
+        value, doubt = a @ b.T, DOUBT * (abs(a) @ abs(b).T) + UNDERFLOW
+        past: NDArray[np.bool_] = (value > doubt).any(axis=1)
+        for plane in np.flatnonzero(~past):
+            near = corners[value[plane] >= -doubt[plane]]
+            past[plane] = len(near) > 0 and bool((near @ planes[plane] > 0).any())
         return past
 
     def cut(self, plane: tuple[int, ...], label: int) -> None:
         """Removes what is beyond the plane. Nothing is left, not even rings, if no point is strictly below it."""
-        side = {p: sum(a * x for a, x in zip(plane, self.points[p])) for p in self.used()}
-        if max(side.values()) <= 0:
+        if not self._around:
+            return
+        used = [*self._around]
+        side = dict(zip(used, np.array([self.points[p] for p in used], object) @ np.array(plane, object)))
+        beyond = [p for p in used if side[p] > 0]
+        if not beyond:
             return
         if min(side.values()) >= 0:
-            self.rings, self.labels = [], []
+            self._facets, self._around = {}, {}
             return
         crossings: dict[tuple[int, int], int] = {}
-        kept, labels, leads = [], [], {}
-        for ring, owner in zip(self.rings, self.labels):
+        leads: dict[int, int] = {}
+        for facet in sorted({facet for p in beyond for facet in self._around[p]}):
+            ring, owner = self._remove(facet)
             clipped, leaves, returns = self._clip(ring, side, crossings)
             if leaves != returns:
                 leads[returns] = leaves
             if len(clipped) > 2:
-                kept.append(clipped)
-                labels.append(owner)
-        facet = [next(iter(leads))]
-        while leads[facet[-1]] != facet[0]:
-            facet.append(leads[facet[-1]])
-        self.rings, self.labels = [*kept, facet], [*labels, label]
+                self._add(clipped, owner)
+        ring = [next(iter(leads))]
+        while leads[ring[-1]] != ring[0]:
+            ring.append(leads[ring[-1]])
+        self._add(ring, label)
+
+    def _add(self, ring: list[int], label: int) -> None:
+        self._facets[self._made] = ring, label
+        for point in ring:
+            self._around.setdefault(point, set()).add(self._made)
+        self._made += 1
+
+    def _remove(self, facet: int) -> tuple[list[int], int]:
+        ring, label = self._facets.pop(facet)
+        for point in ring:
+            self._around[point].discard(facet)
+            if not self._around[point]:
+                del self._around[point]
+        return ring, label
 
     def _clip(
         self, ring: list[int], side: dict[int, int], crossings: dict[tuple[int, int], int]
