@@ -131,13 +131,7 @@ capsules = st.builds(Capsule, lengths, st.floats(0.0, 2.0))
 cylinders = st.builds(Cylinder, lengths, lengths)
 
 
-# What is drawn is printed as the calls that make it again, which must therefore hold all that there is to know, in
-# short numbers.
-
-
-def short(numbers):
-    """Multiples of 1/64."""
-    return np.round(np.asarray(numbers) * 64) / 64
+# What is drawn is printed as the calls that make it again, which must therefore hold all that there is to know.
 
 
 @st.composite
@@ -145,9 +139,9 @@ def points_of_hulls(draw, low, high):
     """In general position."""
     rng = np.random.default_rng(draw(seeds))
     while True:
-        points = short(hull_points(rng, draw(st.integers(low, high))))
+        points = hull_points(rng, draw(st.integers(low, high)))
         if np.linalg.svd(points - points.mean(0), compute_uv=False)[2] > 0.05:
-            return points
+            return points.tolist()
 
 
 def hulls(low=4, high=16):
@@ -178,5 +172,5 @@ def in_general_position(draw, shapes, low, high):
     """Bodies of which no two share a plane, so that every facet has one owner."""
     rng = np.random.default_rng(draw(seeds))
     chosen = draw(st.lists(shapes, min_size=low, max_size=high))
-    poses = [(short(rng.uniform(-0.5, 0.5, 3)), short(quaternion(rng))) for _ in chosen]
+    poses = [(rng.uniform(-0.5, 0.5, 3).tolist(), quaternion(rng).tolist()) for _ in chosen]
     return [draw(st.builds(Placed, st.just(shape), *map(st.just, pose))) for shape, pose in zip(chosen, poses)]
