@@ -22,6 +22,7 @@ from overlapper import (
     Hull,
     Overlap,
     Placed,
+    RoundedHull,
     Sphere,
     _core,
     distance,
@@ -93,6 +94,7 @@ def answers(seed):
     found["candidate_pairs"] = pairs
     found["overlaps"] = overlaps(shapes, positions, orientations, tolerance=TOLERANCE, threads=2)
     found["Batch"] = Batch(shapes).overlaps(positions, orientations, pairs, TOLERANCE)
+    found["RoundedHull"] = overlap(Placed(RoundedHull(points[0], 0.1)), Placed(Box([0.5, 0.5, 0.5])))
     frames = [(body.position, body.orientation) for body in (a, b, c)]
     found["world_poses"] = _core.world_poses(frames, np.arange(3), positions, orientations)
     found["random_polytope"] = Placed(random_polytope(9, rng=rng))
