@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections import Counter
 from collections.abc import Callable, Iterable
 from math import ceil, log10
@@ -18,6 +19,7 @@ from paper_pictures import PICTURES, save, steps_in_thicknesses
 from paper_steps import STEPS
 from peers import PEERS
 from stability import NOT_ASKED, RIGHT, error_of, failed, read
+from stress import TABLE as STRESS
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -243,6 +245,7 @@ def text(notes: list[str], rows: list[Row], shown: dict[str, Row]) -> str:
         "totals": totals(rows),
         "steps": steps(rows, solids, paper),
         "auto": about_auto(rows),
+        "stress": stress_run(),
         "paper_failures": str(sum(paper.values())),
         "shift_failures": str(paper["2 shifts"]),
     }
@@ -283,6 +286,18 @@ def totals(rows: list[Row]) -> str:
         share = f"{percent(failure_share(rows, peer))} %" if cells else "not installed"
         lines.append(f"| {peer} | {len(cells)} | {share} | {counts} | {worst} |")
     return "\n".join(lines)
+
+
+def stress_run() -> str:
+    """What benchmarks/stress.py has recorded, and in which words."""
+    with STRESS.open(encoding="utf-8") as file:
+        seeds = file.readline().strip("# \n")
+        rows = list(csv.DictReader(file))
+    failures = int(rows[-1]["failures"])
+    words = f"{int(rows[-1]['cases']):,} cases, {seeds}: " + (f"{failures} failures." if failures else "no failure.")
+    lines = [f"| {' | '.join(rows[0])} |", "|---|" + "--:|" * (len(rows[0]) - 1)]
+    lines += [f"| {' | '.join(value.replace('_', ' ') for value in row.values())} |" for row in rows]
+    return "\n".join([words, "", *lines])
 
 
 def steps(rows: list[Row], solids: list[Row], paper: Counter[str]) -> str:
