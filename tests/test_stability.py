@@ -137,7 +137,7 @@ def test_planes_beside_the_true_ones_are_found_to_lose_the_overlap():
 
 def test_the_page_says_what_the_committed_results_say():
     notes, rows = stability.read(stability.RESULTS)
-    assert len(rows) > 1000
+    assert len(rows) > 800
     assert set(stability.PEERS) <= set(rows[0])
     page = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
     # Which of the failing cases is drawn depends on their geometry, to the last bit: it is as the page has it.
