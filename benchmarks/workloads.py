@@ -238,7 +238,6 @@ FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Pair], int]] = {
 # For time over size, with icospheres of the families above, and for the time of finding nothing: few peers are asked.
 MORE: dict[str, tuple[Callable[[np.random.Generator], Pair], int]] = {
     "i80 deep": (icospheres(1), 4),
-    "i80 shallow": (icospheres(1, 0.01), 4),
     "i20480 deep": (icospheres(5), 1),
     "i20480 shallow": (icospheres(5, 0.01), 1),
     "boxes apart": (boxes_apart, 16),
