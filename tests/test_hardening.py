@@ -311,3 +311,13 @@ def test_the_surface_of_a_needle_is_closed(bodies, method):
     common = overlap(*bodies, tolerance=0.003125, method=method)
     edges = sum(len(facet) for facet in common.facets) / 2
     assert len(common.vertices) - edges + len(common.facets) == (2 if common else 0)
+
+
+def test_a_pickled_hull_is_as_fast_to_work_with():
+    """Where it is not searched from the neighbours of its facets, far more of them take part."""
+    points = np.random.default_rng(1).normal(size=(800, 3))
+    hull = Hull(points / np.linalg.norm(points, axis=1)[:, None])
+    again = pickle.loads(pickle.dumps(hull))
+    first, second = (overlap(each, Placed(each, (1.9, 0, 0), (0, 0, 1, 1))) for each in (hull, again))
+    assert first.status == "overlapping" and first.facets_touched < 300
+    assert (first.volume, first.facets_touched) == (second.volume, second.facets_touched)

@@ -157,6 +157,7 @@ Hull hull_from_state(nb::tuple state) {
   data->volume = measures.volume;
   data->centroid = measures.centroid;
   complete(*data);
+  data->graph = graph_of(*data);
   return {std::move(data)};
 }
 
