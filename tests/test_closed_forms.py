@@ -109,3 +109,11 @@ def test_solid_inside_the_other_is_whole():
 def test_inertia_of_a_closed_form_is_that_of_the_polytope_scaled_to_its_volume():
     ball = overlap(Sphere(1), HalfSpace([0, 0, 1], 2), tolerance=1e-3)
     assert_allclose(ball.inertia, 8 / 15 * np.pi * np.eye(3), rtol=3e-3, atol=3e-3)
+
+
+def test_a_tolerance_that_no_polytope_reaches_leaves_the_closed_form_in_force():
+    ball, ground = Placed(Sphere(0.5), (0, 0, 0.3)), HalfSpace((0, 0, 1), 0)
+    usual, finest = (overlap(ball, ground, tolerance=tolerance) for tolerance in (1e-3, 1e-14))
+    assert finest.facets_touched == 1
+    assert (finest.volume, finest.volume_error) == (usual.volume, usual.volume_error)
+    assert finest.volume_error > 1e-14 * finest.volume

@@ -34,6 +34,8 @@ double magnitude(const Placed& relative) {
 
 /// The relative error of a volume beyond which it is worth computing again in wider arithmetic.
 constexpr double kEnough = 1e-12;
+/// Of its volume, what as many planes as a region may have leave of a round body at best.
+constexpr double kFinest = 1e-7;
 
 bool smooth_body(const Placed& body) { return smooth(body.shape); }
 bool rounded_hull(const Placed& body) { return std::holds_alternative<RoundedHull>(body.shape); }
@@ -328,6 +330,7 @@ Region Overlap::grown_about(const WideBall& ball, double reach) const {
 Quantities Overlap::measured() const {
   if (method_ == Method::kPaper) return measure(region());
   const Arrangement& at = arrangement();
+  const double finest = std::max(tolerance_, kFinest);
   std::optional<Quantities> kept;
   if (!traced()) {
     if (search().wide_ball) {
@@ -338,7 +341,7 @@ Quantities Overlap::measured() const {
     if (pair()) {
       kept = closed_form(at.relative[0], at.relative[1], rounding(largest_reach()), at.reference);
       // Where its terms nearly cancel, a polytope knows more.
-      if (kept && kept->volume_error > tolerance_ * kept->volume) kept.reset();
+      if (kept && kept->volume_error > finest * kept->volume) kept.reset();
       if (kept)
         for (Quantities::Pull& pull : kept->pulls) pull.owner = at.order[pull.owner];
     }
@@ -353,7 +356,7 @@ Quantities Overlap::measured() const {
   const auto enough = [&] { return kept->volume_error <= kEnough * kept->volume; };
   if (polyhedral && !enough())
     if (auto wide = overlapper::widened(at.relative, region())) keep_better(owned_as_given(std::move(*wide)));
-  if (polyhedral ? !enough() : rounding(largest_reach()) * kept->area > tolerance_ * kept->volume) {
+  if (polyhedral ? !enough() : rounding(largest_reach()) * kept->area > finest * kept->volume) {
     // The point about which the region was grown may not be inside after all, or its frame not be round.
     const double noise = wide_noise(largest_reach());
     const WideBall ball = wide_deepest_ball(wide_bodies(), search().ball.cuts, 4 * noise, largest_reach(), noise);
