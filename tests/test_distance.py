@@ -30,6 +30,7 @@ from overlapper import (
     HalfSpace,
     Hull,
     Placed,
+    RoundedHull,
     Sphere,
     distance,
     iou,
@@ -221,6 +222,51 @@ def test_depth_of_slender_hulls_is_the_exact_one(slenderness):
         p, q = (hull_points(rng, 10) * [1, *slenderness ** rng.random(2)] @ rotation(quaternion(rng)).T for _ in "pq")
         truth = float(exact.depth_squared(exact.hull(p), exact.hull(q))) ** 0.5
         assert penetration_depth(p, q) == pytest.approx(truth, rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_depth_of_hulls_of_grid_points_is_the_exact_one(seed):
+    """Edges of the two are parallel, facets coplanar, and many ways out equally long."""
+    rng = np.random.default_rng(seed)
+    p, q = (np.vstack([CORNERS[[0, 1, 2, 4]], rng.integers(-2, 3, (int(rng.integers(1, 12)), 3)) / 2]) for _ in "pq")
+    q += rng.integers(-1, 2, 3) / 4
+    truth = float(exact.depth_squared(exact.hull(p), exact.hull(q))) ** 0.5
+    assert penetration_depth(p, q) == pytest.approx(truth, rel=1e-14)
+    assert penetration_depth(q, p) == pytest.approx(truth, rel=1e-14)
+
+
+def points_of_small_polytopes(rng):
+    """Tetrahedra, hulls of 20 and 50 points, boxes, prisms, needles and plates, each with its own corners."""
+    kind = rng.integers(6)
+    if kind < 3:
+        return hull_points(rng, (4, 20, 50)[kind])
+    if kind == 3:
+        return CORNERS * 10 ** rng.uniform(-2, 0.3, 3)
+    if kind == 4:
+        angle = np.linspace(0, 2 * np.pi, int(rng.integers(3, 20)), endpoint=False)
+        rim = np.transpose([np.cos(angle), np.sin(angle), np.full_like(angle, rng.uniform(0.05, 1))])
+        return np.vstack([rim, rim * [1, 1, -1]])
+    return hull_points(rng, 10) * [1, *10 ** rng.uniform(-6, 0, 2)]
+
+
+@pytest.mark.parametrize("tilt", [0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 1])
+def test_facets_and_arcs_hold_the_way_out_that_epa_finds(tilt):
+    """Small polytopes part along a facet's normal or an arc between two; grown by next to nothing, they go to EPA."""
+    rng = np.random.default_rng(0)
+    deepest = 0
+    for _ in range(300):
+        p, q = points_of_small_polytopes(rng), points_of_small_polytopes(rng)
+        if rng.random() < 0.2:
+            q = p
+        orientation = quaternion(rng)
+        a = Placed(Hull(p), (0, 0, 0), orientation)
+        b = Placed(Hull(q), rng.normal(size=3) * rng.choice([1e-3, 0.1, 0.4]), orientation + tilt * rng.normal(size=4))
+        depth = penetration_depth(a, b)
+        grown = Placed(RoundedHull(p, 1e-90), a.position, a.orientation)
+        assert depth == pytest.approx(penetration_depth(grown, b), rel=1e-12, abs=64 * EPS)
+        assert penetration_depth(b, a) == depth
+        deepest = max(deepest, depth)
+    assert deepest > 0.5
 
 
 @given(placed(solids), placed(solids))

@@ -194,11 +194,6 @@ std::optional<Clipped> measure(Workspace& w, const Sums& sums, Vec3 middle, doub
   return common;
 }
 
-Pose relative_pose(const Pose& to, const Pose& of) {
-  const Mat3 back = transposed(to.rotation);
-  return {back * of.rotation, back * (of.translation - to.translation)};
-}
-
 /// The body with more facets comes first, whose coordinates are used; then the order does not depend on the caller's.
 bool comes_first(const Placed& a, const Placed& b) {
   const int facets_a = facets(a.shape), facets_b = facets(b.shape);

@@ -5,6 +5,7 @@
 
 #include "box_axes.h"
 #include "expanding_hull.h"
+#include "polytope_axes.h"
 #include "predicates.h"
 
 namespace overlapper {
@@ -296,6 +297,8 @@ Penetration penetration(const Placed& a, const Placed& b) {
   if (box_a && box_b) {
     of_boxes = box_penetration(*box_a, a.pose, *box_b, b.pose, 0);
     if (of_boxes.depth > 0) return of_boxes;
+  } else if (const auto of_polytopes = polytope_penetration(a, b)) {
+    return *of_polytopes;
   }
   const double radius = core_radius(a.shape) + core_radius(b.shape);
   const Separation cores = separate_cores(a, b);

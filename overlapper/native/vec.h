@@ -83,6 +83,12 @@ struct Pose {
 
 inline Vec3 operator*(const Pose& pose, Vec3 point) { return pose.rotation * point + pose.translation; }
 
+/// Maps a point of the one body to the coordinates of the other.
+inline Pose relative_pose(const Pose& to, const Pose& of) {
+  const Mat3 back = transposed(to.rotation);
+  return {back * of.rotation, back * (of.translation - to.translation)};
+}
+
 /// The closed half-space { x : dot(normal, x) <= offset }. `normal` is unit and points out of the solid.
 struct Plane {
   Vec3 normal;

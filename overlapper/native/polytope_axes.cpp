@@ -1,0 +1,175 @@
+#include "polytope_axes.h"
+
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "solid.h"
+#include "wide.h"
+
+namespace overlapper {
+namespace {
+
+/// Beyond so many dot products of normals and vertices, climbing from vertex to vertex is sooner done.
+constexpr size_t kMostProducts = 1 << 14;
+
+/// Vertices that one arc passes on the other body; doubles that stay in doubt would go on.
+constexpr int kMostTurns = 64;
+
+/// Two doubles, which every machine adds and compares at once.
+using Two = double __attribute__((vector_size(16)));
+
+Two two(const std::vector<double>& column, int first) {
+  Two values;
+  std::memcpy(&values, &column[first], sizeof values);
+  return values;
+}
+
+/// A direction and how far the other solid reaches against it.
+struct Way {
+  Vec3 direction;  ///< unit
+  int vertex;      ///< lowest along it
+  double height;   ///< of that vertex
+};
+
+/// Per facet of one solid, the way along its normal into the other.
+void ways_along_normals(const Solid& faces, const Solid& other, std::vector<Way>& ways) {
+  ways.resize(faces.stride);
+  for (int f = 0; f < faces.stride; f += 4) {
+    const Two ax = two(faces.nx, f), ay = two(faces.ny, f), az = two(faces.nz, f);
+    const Two bx = two(faces.nx, f + 2), by = two(faces.ny, f + 2), bz = two(faces.nz, f + 2);
+    Two height_a = Two{} + std::numeric_limits<double>::infinity(), height_b = height_a, lowest_a{}, lowest_b{};
+    for (int v = 0; v < other.vertices; ++v) {
+      const double x = other.x[v], y = other.y[v], z = other.z[v];
+      const Two a = ax * x + ay * y + az * z, b = bx * x + by * y + bz * z, number = Two{} + static_cast<double>(v);
+      lowest_a = a < height_a ? number : lowest_a;
+      height_a = a < height_a ? a : height_a;
+      lowest_b = b < height_b ? number : lowest_b;
+      height_b = b < height_b ? b : height_b;
+    }
+    for (int i = 0; i < 2; ++i) {
+      ways[f + i] = {faces.normal(f + i), static_cast<int>(lowest_a[i]), height_a[i]};
+      ways[f + 2 + i] = {faces.normal(f + 2 + i), static_cast<int>(lowest_b[i]), height_b[i]};
+    }
+  }
+}
+
+/// The least translation that parts two solids in the same coordinates.
+class PartingSearch {
+ public:
+  PartingSearch(const Solid& a, const Solid& b, double noise) : a_(a), b_(b), noise_(noise) {}
+
+  /// False if they may be apart, or if doubles cannot tell.
+  bool run() {
+    thread_local std::vector<Way> of_a, of_b;
+    ways_along_normals(a_, b_, of_a);
+    for (int f = 0; f < a_.facets; ++f) keep(of_a[f].direction, a_.offset[f] - of_a[f].height);
+    if (best_.depth <= 4 * noise_) return false;
+    ways_along_normals(b_, a_, of_b);
+    for (int f = 0; f < b_.facets; ++f) keep(-of_b[f].direction, b_.offset[f] - of_b[f].height);
+    for (const Edge& e : a_.edges) {
+      if (best_.depth <= 4 * noise_) return false;
+      if (!search_arc(e, of_a[e.left], of_a[e.right], kMostTurns)) return false;
+    }
+    return best_.depth > 4 * noise_;
+  }
+
+  const Penetration& best() const { return best_; }
+
+ private:
+  void keep(Vec3 direction, double depth) {
+    if (depth < best_.depth) best_ = {depth, Vec3{} - direction};
+  }
+
+  /// Looks for shorter ways out between two directions in which a reaches farthest with an edge.
+  bool search_arc(const Edge& edge, const Way& left, const Way& right, int turns) {
+    if (left.vertex == right.vertex) return true;
+    const Vec3 from = a_.vertex(edge.from), low_left = b_.vertex(left.vertex), low_right = b_.vertex(right.vertex);
+    const Vec3 step = low_right - low_left;
+    const double rise = dot(left.direction, step), fall = -dot(right.direction, step);
+    if (!(rise > 0 && fall > 0)) return true;
+    // Both vertices of b are equally low here, so that the difference reaches at least so far; between here and either
+    // end, where the vertex there bounds it, it reaches at least as far as at the nearer of the two.
+    const Vec3 crossing = left.direction + rise / (rise + fall) * (right.direction - left.direction);
+    if (dot(crossing, from - low_left) - noise_ >= best_.depth * std::sqrt(norm2(crossing))) return true;
+    if (turns == 0) return false;
+    const Way across = lowest(orthogonal(edge, left.vertex, right.vertex));
+    if (dot(across.direction, from) - across.height < best_.depth - noise_) {
+      const double depth = highest(across.direction) - across.height;
+      // Where a face and two edges agree to rounding, the face is the better witness.
+      if (depth < best_.depth - noise_) keep(across.direction, depth);
+    }
+    if (dot(across.direction, low_left) - across.height <= noise_) return true;
+    return search_arc(edge, left, across, turns - 1) && search_arc(edge, across, right, turns - 1);
+  }
+
+  /// The unit vector of the arc of an edge that is orthogonal also to a segment between two vertices of b.
+  Vec3 orthogonal(const Edge& edge, int left, int right) const {
+    const Vec3 along = a_.vertex(edge.to) - a_.vertex(edge.from), step = b_.vertex(right) - b_.vertex(left);
+    const Vec3 product = cross(along, step);
+    if (16 * norm2(product) > norm2(along) * norm2(step)) return unit(product);
+    // Of nearly parallel edges, the product of doubles would tilt along them.
+    return unit(rounded(wide_cross(wide_difference(a_.vertex(edge.to), a_.vertex(edge.from)),
+                                   wide_difference(b_.vertex(right), b_.vertex(left)))));
+  }
+
+  Way lowest(Vec3 direction) const {
+    Way way{direction, 0, std::numeric_limits<double>::infinity()};
+    for (int v = 0; v < b_.vertices; ++v) {
+      const double height = dot(direction, b_.vertex(v));
+      if (height < way.height) way.height = height, way.vertex = v;
+    }
+    return way;
+  }
+
+  double highest(Vec3 direction) const {
+    double height = -std::numeric_limits<double>::infinity();
+    for (int v = 0; v < a_.vertices; ++v) height = std::max(height, dot(direction, a_.vertex(v)));
+    return height;
+  }
+
+  const Solid &a_, &b_;
+  double noise_;  ///< m: rounding of heights
+  Penetration best_{std::numeric_limits<double>::infinity(), {}};
+};
+
+/// How far vertices may be from the planes of their facets.
+double flatness(const Shape& shape) {
+  const Hull* hull = std::get_if<Hull>(&shape);
+  return hull ? hull->data->flatness : 0;
+}
+
+bool has_edges(const Shape& shape) {
+  const Hull* hull = std::get_if<Hull>(&shape);
+  return hull ? !hull->data->edges.empty() : std::holds_alternative<Box>(shape);
+}
+
+size_t vertices(const Shape& shape) {
+  const Hull* hull = std::get_if<Hull>(&shape);
+  return hull ? hull->data->vertices.size() : 8;
+}
+
+}  // namespace
+
+std::optional<Penetration> polytope_penetration(const Placed& a, const Placed& b) {
+  if (!has_edges(a.shape) || !has_edges(b.shape)) return std::nullopt;
+  const size_t products = facets(a.shape) * vertices(b.shape) + facets(b.shape) * vertices(a.shape);
+  if (products > kMostProducts) return std::nullopt;
+  if (facets(b.shape) < facets(a.shape)) {
+    auto swapped = polytope_penetration(b, a);
+    if (swapped) swapped->normal = Vec3{} - swapped->normal;
+    return swapped;
+  }
+  const Pose pose = relative_pose(a.pose, b.pose);
+  const double reach = radius(a.shape) + radius(b.shape) + norm(pose.translation);
+  const double noise = rounding(reach), flat = flatness(a.shape) + flatness(b.shape);
+  if (flat > 4 * noise) return std::nullopt;
+  thread_local Solid solid_a, solid_b;
+  set_solid(solid_a, a, 0, nullptr, 0);
+  set_solid(solid_b, b, 1, &pose, 0);
+  PartingSearch search(solid_a, solid_b, noise + flat);
+  if (!search.run()) return std::nullopt;
+  return Penetration{search.best().depth, a.pose.rotation * search.best().normal};
+}
+
+}  // namespace overlapper
