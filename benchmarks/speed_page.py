@@ -165,8 +165,8 @@ CLAIMS = """![Time over the vertices of a pair and over the number of bodies](sp
   vertices, where n log n would be $n_log_n: $pair_holds. For $most vertices `auto` takes $auto_pair, the article's
   method $paper_pair.
 - **m bodies take O(m n log n).** The article's method grows with their number to the power of $paper_m, from 8 to
-  $bodies: $groups_hold. `auto`, which grows one dual hull for all, takes the power of $auto_m, and at $bodies bodies
-  $auto_group where the article's method takes $paper_group.
+  $bodies: $groups_hold. `auto`, which cuts what is common by one body after the other, takes the power of $auto_m, and
+  at $bodies bodies $auto_group where the article's method takes $paper_group.
 - **One hull of all m·n duals, or the pairwise tree.** Both by qhull, a point inside given: for $bodies bodies one hull
   takes $one_hull, the tree $tree. The tree makes hulls of what the next level throws away.
 - **The pairs of a level on two cores.** By the clock, the best of many tries, one call bound to one core and to two:
