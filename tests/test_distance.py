@@ -236,10 +236,10 @@ def test_depth_of_hulls_of_grid_points_is_the_exact_one(seed):
 
 
 def points_of_small_polytopes(rng):
-    """Tetrahedra, hulls of 20 and 50 points, boxes, prisms, needles and plates, each with its own corners."""
+    """Tetrahedra, hulls of 20 and 80 points, boxes, prisms, needles and plates, each with its own corners."""
     kind = rng.integers(6)
     if kind < 3:
-        return hull_points(rng, (4, 20, 50)[kind])
+        return hull_points(rng, (4, 20, 80)[kind])
     if kind == 3:
         return CORNERS * 10 ** rng.uniform(-2, 0.3, 3)
     if kind == 4:
@@ -267,6 +267,19 @@ def test_facets_and_arcs_hold_the_way_out_that_epa_finds(tilt):
         assert penetration_depth(b, a) == depth
         deepest = max(deepest, depth)
     assert deepest > 0.5
+
+
+@pytest.mark.parametrize("angle", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_ridges_that_cross_at_a_small_angle_part_upright(angle):
+    """The product of two nearly parallel edges is known across both, and must not tilt along them."""
+    rng = np.random.default_rng(0)
+    roof = np.array([(x, y, -abs(y)) for x in (-1, 1) for y in (-1, 0, 1)], dtype=float)
+    upside_down = roof * [1, 1, -1] @ rotation((0, 0, np.sin(angle / 2), np.cos(angle / 2))).T
+    for _ in range(20):
+        depth = angle * rng.uniform(0.01, 0.3)
+        turned = rotation(quaternion(rng)).T
+        found = penetration_depth(roof @ turned, (upside_down - [0, 0, depth]) @ turned)
+        assert found == pytest.approx(depth, abs=16 * EPS)
 
 
 @given(placed(solids), placed(solids))

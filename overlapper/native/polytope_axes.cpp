@@ -10,11 +10,14 @@
 namespace overlapper {
 namespace {
 
-/// Beyond so many dot products of normals and vertices, climbing from vertex to vertex is sooner done.
-constexpr size_t kMostProducts = 1 << 14;
+/// Of both together: beyond it, EPA is done sooner, which climbs from vertex to vertex.
+constexpr int kMostFacets = 1024;
 
 /// Vertices that one arc passes on the other body; doubles that stay in doubt would go on.
 constexpr int kMostTurns = 64;
+
+/// Vertices looked at before asking whether more are needed.
+constexpr int kGlance = 8;
 
 /// Two doubles, which every machine adds and compares at once.
 using Two = double __attribute__((vector_size(16)));
@@ -32,25 +35,32 @@ struct Way {
   double height;   ///< of that vertex
 };
 
-/// Per facet of one solid, the way along its normal into the other.
-void ways_along_normals(const Solid& faces, const Solid& other, std::vector<Way>& ways) {
+/// Per facet of one solid, the way along its normal into the other. Where the first few vertices already show that a
+/// way is longer than the best one known, it ends at the lowest of these.
+void ways_along_normals(const Solid& faces, const Solid& other, double best, std::vector<Way>& ways) {
   ways.resize(faces.stride);
-  for (int f = 0; f < faces.stride; f += 4) {
-    const Two ax = two(faces.nx, f), ay = two(faces.ny, f), az = two(faces.nz, f);
+  for (int f = 0; f < faces.facets; f += 4) {
+    const Two ax = two(faces.nx, f), ay = two(faces.ny, f), az = two(faces.nz, f), top_a = two(faces.offset, f);
     const Two bx = two(faces.nx, f + 2), by = two(faces.ny, f + 2), bz = two(faces.nz, f + 2);
+    const Two top_b = two(faces.offset, f + 2);
     Two height_a = Two{} + std::numeric_limits<double>::infinity(), height_b = height_a, lowest_a{}, lowest_b{};
-    for (int v = 0; v < other.vertices; ++v) {
-      const double x = other.x[v], y = other.y[v], z = other.z[v];
-      const Two a = ax * x + ay * y + az * z, b = bx * x + by * y + bz * z, number = Two{} + static_cast<double>(v);
-      lowest_a = a < height_a ? number : lowest_a;
-      height_a = a < height_a ? a : height_a;
-      lowest_b = b < height_b ? number : lowest_b;
-      height_b = b < height_b ? b : height_b;
+    for (int v = 0; v < other.vertices;) {
+      for (const int end = std::min(v + kGlance, other.vertices); v < end; ++v) {
+        const double x = other.x[v], y = other.y[v], z = other.z[v];
+        const Two a = ax * x + ay * y + az * z, b = bx * x + by * y + bz * z, number = Two{} + static_cast<double>(v);
+        lowest_a = a < height_a ? number : lowest_a;
+        height_a = a < height_a ? a : height_a;
+        lowest_b = b < height_b ? number : lowest_b;
+        height_b = b < height_b ? b : height_b;
+      }
+      const auto shorter = (top_a - height_a < best) | (top_b - height_b < best);
+      if (!(shorter[0] | shorter[1])) break;
     }
     for (int i = 0; i < 2; ++i) {
       ways[f + i] = {faces.normal(f + i), static_cast<int>(lowest_a[i]), height_a[i]};
       ways[f + 2 + i] = {faces.normal(f + 2 + i), static_cast<int>(lowest_b[i]), height_b[i]};
     }
+    for (int i = f; i < std::min(f + 4, faces.facets); ++i) best = std::min(best, faces.offset[i] - ways[i].height);
   }
 }
 
@@ -62,10 +72,10 @@ class PartingSearch {
   /// False if they may be apart, or if doubles cannot tell.
   bool run() {
     thread_local std::vector<Way> of_a, of_b;
-    ways_along_normals(a_, b_, of_a);
+    ways_along_normals(a_, b_, best_.depth, of_a);
     for (int f = 0; f < a_.facets; ++f) keep(of_a[f].direction, a_.offset[f] - of_a[f].height);
     if (best_.depth <= 4 * noise_) return false;
-    ways_along_normals(b_, a_, of_b);
+    ways_along_normals(b_, a_, best_.depth, of_b);
     for (int f = 0; f < b_.facets; ++f) keep(-of_b[f].direction, b_.offset[f] - of_b[f].height);
     for (const Edge& e : a_.edges) {
       if (best_.depth <= 4 * noise_) return false;
@@ -87,6 +97,8 @@ class PartingSearch {
     const Vec3 from = a_.vertex(edge.from), low_left = b_.vertex(left.vertex), low_right = b_.vertex(right.vertex);
     const Vec3 step = low_right - low_left;
     const double rise = dot(left.direction, step), fall = -dot(right.direction, step);
+    // Of two ways, one was found among all vertices that the other was, so that either vertex may bound the whole arc,
+    // but not each be the lower one at the far end.
     if (!(rise > 0 && fall > 0)) return true;
     // Both vertices of b are equally low here, so that the difference reaches at least so far; between here and either
     // end, where the vertex there bounds it, it reaches at least as far as at the nearer of the two.
@@ -144,17 +156,11 @@ bool has_edges(const Shape& shape) {
   return hull ? !hull->data->edges.empty() : std::holds_alternative<Box>(shape);
 }
 
-size_t vertices(const Shape& shape) {
-  const Hull* hull = std::get_if<Hull>(&shape);
-  return hull ? hull->data->vertices.size() : 8;
-}
-
 }  // namespace
 
 std::optional<Penetration> polytope_penetration(const Placed& a, const Placed& b) {
   if (!has_edges(a.shape) || !has_edges(b.shape)) return std::nullopt;
-  const size_t products = facets(a.shape) * vertices(b.shape) + facets(b.shape) * vertices(a.shape);
-  if (products > kMostProducts) return std::nullopt;
+  if (facets(a.shape) + facets(b.shape) > kMostFacets) return std::nullopt;
   if (facets(b.shape) < facets(a.shape)) {
     auto swapped = polytope_penetration(b, a);
     if (swapped) swapped->normal = Vec3{} - swapped->normal;
@@ -165,8 +171,9 @@ std::optional<Penetration> polytope_penetration(const Placed& a, const Placed& b
   const double noise = rounding(reach), flat = flatness(a.shape) + flatness(b.shape);
   if (flat > 4 * noise) return std::nullopt;
   thread_local Solid solid_a, solid_b;
-  set_solid(solid_a, a, 0, nullptr, 0);
-  set_solid(solid_b, b, 1, &pose, 0);
+  constexpr double beyond = std::numeric_limits<double>::infinity();
+  set_solid(solid_a, a, 0, nullptr, beyond);
+  set_solid(solid_b, b, 1, &pose, beyond);
   PartingSearch search(solid_a, solid_b, noise + flat);
   if (!search.run()) return std::nullopt;
   return Penetration{search.best().depth, a.pose.rotation * search.best().normal};
