@@ -82,9 +82,7 @@ def test_a_scene_that_was_saved_is_listed(tmp_path):
     ],
 )
 def test_what_pybullet_does_not_load_is_told_in_a_sentence(name, sentence, monkeypatch):
-    monkeypatch.setenv(
-        "ASAN_OPTIONS", os.environ.get("ASAN_OPTIONS", "") + ":handle_segv=0"
-    )  # it may die of its signal
+    monkeypatch.setenv("ASAN_OPTIONS", os.environ.get("ASAN_OPTIONS", "") + ":handle_segv=0")
     with pytest.raises(NotRead, match=sentence):
         inventory(DATA / name)
 
