@@ -134,10 +134,14 @@ void print(const Shape& shape) {
     }
     void operator()(const Capsule& c) const { std::fprintf(stderr, "Capsule(%.17g, %.17g)", c.radius, c.length); }
     void operator()(const Cylinder& c) const { std::fprintf(stderr, "Cylinder(%.17g, %.17g)", c.radius, c.length); }
-    void operator()(const Hull& h) const {
-      std::fprintf(stderr, "Hull([");
+    static void print_points(const Hull& h) {
       for (Vec3 v : h.data->vertices) print(v + h.data->origin), std::fprintf(stderr, ", ");
-      std::fprintf(stderr, "])");
+    }
+    void operator()(const Hull& h) const {
+      std::fprintf(stderr, "Hull(["), print_points(h), std::fprintf(stderr, "])");
+    }
+    void operator()(const RoundedHull& h) const {
+      std::fprintf(stderr, "RoundedHull(["), print_points(h.core), std::fprintf(stderr, "], %.17g)", h.radius);
     }
     void operator()(const HalfSpace& h) const {
       std::fprintf(stderr, "HalfSpace("), print(h.plane.normal), std::fprintf(stderr, ", %.17g)", h.plane.offset);
