@@ -109,3 +109,11 @@ def test_a_half_space_far_from_a_tiny_ball_cuts_off_all_or_nothing():
     assert inside.volume == pytest.approx(4 / 3 * np.pi * 8e-36, rel=0.05)
     ridges = sum(map(len, inside.facets)) / 2
     assert len(inside.vertices) - ridges + len(inside.facets) == 2
+
+
+def test_what_it_calls_apart_and_is_not_is_no_distance_away():
+    capsule = Placed(Capsule(1, 1), (0, -(2.0**-32), 0))
+    corners = [(-0.25, -1.1444091796875e-05, 3.0000000000000004), (1, 3, 0.75), (-3, -0.5, -3)]
+    corners += [(3.0000000000000004, 2.9999999999999996, 0.25), (-2.0000000000000004, -2, -0.25)]
+    hull = Placed(corners, (-3.7071067813029619, -3.7071067813029619, -0.75))
+    assert overlap(capsule, hull, tolerance=0.1, method="paper").distance == 0

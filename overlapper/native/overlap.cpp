@@ -438,7 +438,8 @@ Overlap::Contact Overlap::in_contact() const {
     contact.normal = d.normal;
     // Where the bodies touch, the line between the witness points may be all rounding; the way out is not.
     if (status_ == Status::kTouching && !(d.gap > 0)) contact.normal = parting({penetration(a, b).normal}).normal;
-    contact.distance = status_ == Status::kSeparated ? d.distance : 0;
+    // Method "paper" may call apart what is not.
+    contact.distance = status_ == Status::kSeparated ? std::max(0.0, d.distance) : 0;
     contact.witness_a = d.witness_a + reference;
     contact.witness_b = d.witness_b + reference;
     // Half-way between the supports; a half-space reaches to its witness point.
