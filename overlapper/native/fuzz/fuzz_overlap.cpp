@@ -217,10 +217,12 @@ void check_quantities(const Quantities& q) {
   for (Vec3 row : {q.inertia.row0, q.inertia.row1, q.inertia.row2}) require(finite(row), "the inertia is finite");
 }
 
-void check_surface(const Surface& surface, int bodies) {
+void check_surface(const Surface& surface, int bodies, Method method) {
   const int facets = static_cast<int>(surface.planes.size()), vertices = static_cast<int>(surface.vertices.size());
   require(surface.ring.size() % 2 == 0 && surface.owner.size() == surface.planes.size(), "facets are complete");
-  require(vertices - static_cast<int>(surface.ring.size()) / 2 + facets == 2, "Euler's formula for the surface");
+  // The article's second hull joins facets that are coplanar but for rounding, which may be all there is of a body.
+  const bool closed = vertices - static_cast<int>(surface.ring.size()) / 2 + facets == 2;
+  require(closed || method == Method::kPaper, "Euler's formula for the surface");
   for (int v : surface.ring) require(v >= 0 && v < vertices, "facets refer to vertices");
   for (int owner : surface.owner) require(owner >= 0 && owner < bodies, "facets have an owner");
   for (const auto& polygon : surface.patch) {
@@ -264,7 +266,7 @@ void check(const Overlap& overlap) {
     check_region(overlap.region(), overlap.method() == Method::kAuto);
     check_quantities(overlap.quantities());
     check_gradient(overlap);
-    check_surface(overlap.surface(), static_cast<int>(overlap.bodies().size()));
+    check_surface(overlap.surface(), static_cast<int>(overlap.bodies().size()), overlap.method());
   }
   if (overlap.pair()) check_contact(overlap);
 }
