@@ -43,6 +43,22 @@ LIBC = ctypes.CDLL(None)
 
 Step = TypeVar("Step")
 
+# What several commands ask for.
+MethodOption = Annotated[
+    Literal["auto", "paper"], typer.Option(help="How overlaps are computed; `paper` is the article, step for step.")
+]
+SurfaceOption = Annotated[
+    Literal["nominal", "margin"],
+    typer.Option(help="Convex meshes as they are, or with the margin that Bullet lays around them."),
+]
+ConcaveOption = Annotated[
+    Literal["decompose", "enclose", "skip"],
+    typer.Option(help="Concave meshes: as convex parts, open ones too with walls around them, or not at all."),
+]
+ThresholdOption = Annotated[
+    float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
+]
+
 PICTURES_PER_SECOND = 30  # of simulated time: as smooth as a film, and a tenth of the size that every step would take
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -107,25 +123,15 @@ def run(
     check: Annotated[
         Literal["fcl"] | None, typer.Option(help="Ask FCL about every pair, too, and explain what differs.")
     ] = None,
-    method: Annotated[
-        Literal["auto", "paper"], typer.Option(help="How overlaps are computed; `paper` is the article, step for step.")
-    ] = "auto",
+    method: MethodOption = "auto",
     tolerance: Annotated[float, typer.Option(help="Relative accuracy of smooth shapes; polyhedra are exact.")] = 1e-3,
     per: Annotated[
         Literal["shape", "link"],
         typer.Option(help="What the rows of --out are of: two shapes, or two links as a whole."),
     ] = "shape",
-    concave: Annotated[
-        Literal["decompose", "enclose", "skip"],
-        typer.Option(help="Concave meshes: as convex parts, open ones too with walls around them, or not at all."),
-    ] = "decompose",
-    concave_threshold: Annotated[
-        float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
-    ] = 0.05,
-    surface: Annotated[
-        Literal["nominal", "margin"],
-        typer.Option(help="Convex meshes as they are, or with the margin that Bullet lays around them."),
-    ] = "nominal",
+    concave: ConcaveOption = "decompose",
+    concave_threshold: ThresholdOption = 0.05,
+    surface: SurfaceOption = "nominal",
     pairs: Annotated[
         Literal["simulated", "all"] | None,
         typer.Option(help="Pairs that the simulator lets collide, or all of different bodies; by default PAIRS."),
@@ -327,9 +333,7 @@ def intersect(
         str | None, typer.Option(help="SQL that returns id, x, y, z, one row per point, ordered by id.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Mesh of what is common: .obj, .stl, .ply.")] = None,
-    method: Annotated[
-        Literal["auto", "paper"], typer.Option(help="How it is computed; `paper` is the article, step for step.")
-    ] = "auto",
+    method: MethodOption = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the lines.")] = False,
 ) -> None:
     """Measure what convex polytopes have in common, all of them together, without a simulator.
@@ -377,17 +381,9 @@ def shapes(
     file: Annotated[
         Path, typer.Argument(help="A model or a scene: .urdf, .sdf, .xml (MJCF), .bullet.", show_default=False)
     ],
-    surface: Annotated[
-        Literal["nominal", "margin"],
-        typer.Option(help="Convex meshes as they are, or with the margin that Bullet lays around them."),
-    ] = "nominal",
-    concave: Annotated[
-        Literal["decompose", "enclose", "skip"],
-        typer.Option(help="Concave meshes: as convex parts, open ones too with walls around them, or not at all."),
-    ] = "decompose",
-    concave_threshold: Annotated[
-        float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
-    ] = 0.05,
+    surface: SurfaceOption = "nominal",
+    concave: ConcaveOption = "decompose",
+    concave_threshold: ThresholdOption = 0.05,
     self_collision: Annotated[
         bool, typer.Option("--self-collision", help="Load it with pybullet's URDF_USE_SELF_COLLISION.")
     ] = False,

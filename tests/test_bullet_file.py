@@ -14,13 +14,6 @@ SINGLE = 1e-6  # of what the file keeps in single precision
 
 
 @pytest.fixture
-def client():
-    client = p.connect(p.DIRECT)
-    yield client
-    p.disconnect(client)
-
-
-@pytest.fixture
 def saved(client, tmp_path):
     def save():
         p.saveBullet(str(tmp_path / "scene.bullet"), physicsClientId=client)

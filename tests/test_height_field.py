@@ -9,23 +9,10 @@ import pytest
 from overlapper import Placed, Sphere, distance, penetration_depth
 from overlapper.height_field import HeightField
 from overlapper.links import link_contacts
-from overlapper.simulation import Bodies, Recorder, SkippedShapeWarning
+from overlapper.simulation import Bodies, SkippedShapeWarning
 
 PROBE = 1e-6
 TILTED = p.getQuaternionFromEuler([0.2, -0.1, 0.7])
-
-
-@pytest.fixture
-def client():
-    client = p.connect(p.DIRECT)
-    yield client
-    p.disconnect(client)
-
-
-@pytest.fixture
-def recorder(client):
-    with Recorder(client) as recorder:
-        yield recorder
 
 
 def field_shape(client, heights, scale=(1, 1, 1), **options):

@@ -15,13 +15,6 @@ SIDES = [side for i in range(6) for j in [(i + 1) % 6] for side in ([i, j, j + 6
 FACES = [end[::-1] for end in ENDS] + [[k + 6 for k in end] for end in ENDS] + SIDES
 
 
-@pytest.fixture
-def client():
-    client = p.connect(p.DIRECT)
-    yield client
-    p.disconnect(client)
-
-
 @pytest.fixture(autouse=True)
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

@@ -143,13 +143,6 @@ def test_what_a_rounded_hull_is_not_taken_for_is_said():
 # --- Bullet's
 
 
-@pytest.fixture
-def client():
-    client = p.connect(p.DIRECT)
-    yield client
-    p.disconnect(client)
-
-
 def body(client, *shape, position=(0, 0, 0), orientation=(0, 0, 0, 1), mass=1, **figures):
     collision = p.createCollisionShape(*shape, physicsClientId=client, **figures)
     return p.createMultiBody(mass, collision, -1, position, orientation, physicsClientId=client)

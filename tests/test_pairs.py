@@ -19,19 +19,6 @@ JOINT = (
 )
 
 
-@pytest.fixture
-def client():
-    client = p.connect(p.DIRECT)
-    yield client
-    p.disconnect(client)
-
-
-@pytest.fixture
-def recorder(client):
-    with Recorder(client) as recorder:
-        yield recorder
-
-
 def box(client, mass=1, position=(0, 0, 0), **options):
     shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.5] * 3, physicsClientId=client)
     return p.createMultiBody(mass, shape, -1, position, physicsClientId=client, **options)

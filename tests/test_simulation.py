@@ -49,12 +49,9 @@ ROUNDED_CORNER = 1e-3 * (np.sqrt(3) - 1)
 
 
 @pytest.fixture
-def client():
-    client = p.connect(p.DIRECT)
+def client(client):
     p.setAdditionalSearchPath(str(DATA), physicsClientId=client)
-    yield client
-    if p.isConnected(client):
-        p.disconnect(client)
+    return client
 
 
 @pytest.fixture(autouse=True)

@@ -18,7 +18,8 @@ import umsgpack
 from browser import CHROMIUM, Browser
 from numpy.testing import assert_allclose
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, Placed, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap
+from overlapper.contacts import Contact
 from overlapper.look import Look
 from overlapper.viewer import Recording, Viewer
 
@@ -26,17 +27,6 @@ looks = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not to be had h
 
 GROUND, CUP, HAND = (0, -1, 0), (1, -1, 0), (2, 3, 0)
 GREEN = (0.1, 0.8, 0.1, 1.0)
-
-
-@dataclass
-class Contact:
-    bodyA: int
-    linkA: int
-    shapeA: int
-    bodyB: int
-    linkB: int
-    shapeB: int
-    overlap: Overlap
 
 
 class Bodies:
