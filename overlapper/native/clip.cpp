@@ -13,9 +13,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The relative error of a volume beyond which it is worth computing in another way.
-constexpr double kEnough = 1e-12;
-
 struct Workspace : Meeting {
   std::vector<int> apex;          ///< per facet: one of its vertices, or -1
   std::vector<double> cone;       ///< per facet: six times the volume of the cone from the origin
@@ -79,11 +76,10 @@ class Sums {
     moment_ += on_left * (left + sum) + on_right * (right + sum);
   }
 
-  /// The area vector of a patch, and the integral of x × n over it, are integrals along its border (Stokes).
   void add_seam(const Edge& e) {
-    const Vec3 from = w_.vertices[e.from], to = w_.vertices[e.to];
-    pull_ += cross(from, to) / 2;
-    turn_ -= (norm2(from) + dot(from, to) + norm2(to)) / 6 * (to - from);
+    const Pull of_edge = pull_along_border(w_.vertices[e.from], w_.vertices[e.to]);
+    pull_ += of_edge.force;
+    turn_ += of_edge.moment;
   }
 
   Workspace& w_;
@@ -211,12 +207,6 @@ bool worth_tracing(const Placed& a, const Placed& b) {
 /// How large the numbers are that describe a body in the coordinates of another one.
 double reach_from(const Placed& body, double between) { return between + radius(body.shape) + lost_far_away(body); }
 
-/// By how much planes of facets that are not quite flat miss their corners.
-double flatness(const Shape& shape) {
-  const Hull* hull = std::get_if<Hull>(&shape);
-  return hull ? hull->data->flatness : 0;
-}
-
 /// What all signs of a pair are computed from: where the second body is in the first one's own coordinates.
 struct Arrangement {
   Pose pose;
@@ -316,9 +306,8 @@ void add_pulls(const Workspace& w, const Pose& pose, Vec3 centroid, std::vector<
   for (const Edge& e : w.edges) {
     const int left = w.owner(e.left), right = w.owner(e.right);
     if (left == right) continue;
-    const Vec3 from = w.vertices[e.from] - centroid, to = w.vertices[e.to] - centroid;
-    const Vec3 force = pose.rotation * (cross(from, to) / 2);
-    const Vec3 moment = pose.rotation * ((norm2(from) + dot(from, to) + norm2(to)) / 6 * (from - to));
+    const Pull of_edge = pull_along_border(w.vertices[e.from] - centroid, w.vertices[e.to] - centroid);
+    const Vec3 force = pose.rotation * of_edge.force, moment = pose.rotation * of_edge.moment;
     pulls[left].force += force, pulls[right].force -= force;
     pulls[left].moment += moment, pulls[right].moment -= moment;
   }

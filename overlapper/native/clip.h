@@ -28,6 +28,12 @@ struct Pull {
   Vec3 moment;  ///< d volume / d rotation vector about the centroid
 };
 
+/// What an edge adds to the pull of the patch that it borders on its left, about the origin: the area vector of a
+/// patch, and the integral of x × n over it, are integrals along its border (Stokes).
+inline Pull pull_along_border(Vec3 from, Vec3 to) {
+  return {cross(from, to) / 2, (norm2(from) + dot(from, to) + norm2(to)) / 6 * (from - to)};
+}
+
 struct ClippedPair : Clipped {
   Vec3 pull;            ///< the force on the first body; the second has the opposite
   Vec3 moment;          ///< likewise

@@ -8,14 +8,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Two doubles that are added, multiplied and compared at once.
-using Pair = double __attribute__((vector_size(16)));
-
-inline Pair load(const double* p) {
-  Pair v;
-  std::memcpy(&v, p, sizeof v);
-  return v;
-}
 inline void store(double* p, Pair v) { std::memcpy(p, &v, sizeof v); }
 inline Pair both(double x) { return Pair{x, x}; }
 inline Pair larger(Pair a, Pair b) { return a > b ? a : b; }

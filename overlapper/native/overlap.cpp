@@ -10,6 +10,7 @@
 #include "expanding_hull.h"
 #include "paper.h"
 #include "predicates.h"
+#include "solid.h"
 #include "wide_gap.h"
 
 namespace overlapper {
@@ -21,19 +22,10 @@ double magnitude(const Placed& relative) {
     return norm(relative.pose.translation) + std::abs(half->plane.offset);
   const Bounds box = bounds(relative);
   double reach = norm(max(abs(box.lower), abs(box.upper)));
-  // A hull whose points were counted from far away has had that distance rotated and added, and the planes of facets
-  // that are not quite flat miss their corners.
-  if (const HullData* hull = polytope_of(relative.shape)) {
-    const Vec3 origin = hull->origin;
-    const bool turned = relative.orientation.w != 1;
-    if (norm2(origin) > 0 && (turned || norm2(relative.position) > 0)) reach += norm(origin) + norm(relative.position);
-    reach += hull->flatness / rounding(1);
-  }
-  return reach;
+  reach += lost_far_away(relative);
+  return reach + flatness(relative.shape) / rounding(1);
 }
 
-/// The relative error of a volume beyond which it is worth computing again in wider arithmetic.
-constexpr double kEnough = 1e-12;
 /// Of its volume, what as many planes as a region may have leave of a round body at best.
 constexpr double kFinest = 1e-7;
 

@@ -1,6 +1,5 @@
 #include "polytope_axes.h"
 
-#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -19,15 +18,6 @@ constexpr int kMostTurns = 64;
 /// Vertices looked at before asking whether more are needed.
 constexpr int kGlance = 8;
 
-/// Two doubles, which every machine adds and compares at once.
-using Two = double __attribute__((vector_size(16)));
-
-Two two(const std::vector<double>& column, int first) {
-  Two values;
-  std::memcpy(&values, &column[first], sizeof values);
-  return values;
-}
-
 /// A direction and how far the other solid reaches against it.
 struct Way {
   Vec3 direction;  ///< unit
@@ -40,14 +30,15 @@ struct Way {
 void ways_along_normals(const Solid& faces, const Solid& other, double best, std::vector<Way>& ways) {
   ways.resize(faces.stride);
   for (int f = 0; f < faces.facets; f += 4) {
-    const Two ax = two(faces.nx, f), ay = two(faces.ny, f), az = two(faces.nz, f), top_a = two(faces.offset, f);
-    const Two bx = two(faces.nx, f + 2), by = two(faces.ny, f + 2), bz = two(faces.nz, f + 2);
-    const Two top_b = two(faces.offset, f + 2);
-    Two height_a = Two{} + std::numeric_limits<double>::infinity(), height_b = height_a, lowest_a{}, lowest_b{};
+    const Pair ax = load(&faces.nx[f]), ay = load(&faces.ny[f]), az = load(&faces.nz[f]),
+               top_a = load(&faces.offset[f]);
+    const Pair bx = load(&faces.nx[f + 2]), by = load(&faces.ny[f + 2]), bz = load(&faces.nz[f + 2]);
+    const Pair top_b = load(&faces.offset[f + 2]);
+    Pair height_a = Pair{} + std::numeric_limits<double>::infinity(), height_b = height_a, lowest_a{}, lowest_b{};
     for (int v = 0; v < other.vertices;) {
       for (const int end = std::min(v + kGlance, other.vertices); v < end; ++v) {
         const double x = other.x[v], y = other.y[v], z = other.z[v];
-        const Two a = ax * x + ay * y + az * z, b = bx * x + by * y + bz * z, number = Two{} + static_cast<double>(v);
+        const Pair a = ax * x + ay * y + az * z, b = bx * x + by * y + bz * z, number = Pair{} + static_cast<double>(v);
         lowest_a = a < height_a ? number : lowest_a;
         height_a = a < height_a ? a : height_a;
         lowest_b = b < height_b ? number : lowest_b;
@@ -144,12 +135,6 @@ class PartingSearch {
   double noise_;  ///< m: rounding of heights
   Penetration best_{std::numeric_limits<double>::infinity(), {}};
 };
-
-/// How far vertices may be from the planes of their facets.
-double flatness(const Shape& shape) {
-  const Hull* hull = std::get_if<Hull>(&shape);
-  return hull ? hull->data->flatness : 0;
-}
 
 bool has_edges(const Shape& shape) {
   const Hull* hull = std::get_if<Hull>(&shape);

@@ -10,6 +10,9 @@
 
 namespace overlapper {
 
+/// The relative error of a volume beyond which it is worth computing in another way.
+inline constexpr double kEnough = 1e-12;
+
 /// The polytope around the common set, in a frame about a point inside it: world x = reference + frame.origin +
 /// frame.axes y. For polyhedra it is the common set; for smooth shapes it contains it, and shrinks to fit inside vertex
 /// by vertex.

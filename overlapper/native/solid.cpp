@@ -92,10 +92,15 @@ double radius(const Shape& shape) {
 }
 
 double lost_far_away(const Placed& body) {
-  const Hull* hull = std::get_if<Hull>(&body.shape);
-  if (!hull || norm2(hull->data->origin) == 0) return 0;
+  const HullData* hull = polytope_of(body.shape);
+  if (!hull || norm2(hull->origin) == 0) return 0;
   const bool turned = body.orientation.w != 1;
-  return turned || norm2(body.position) > 0 ? norm(hull->data->origin) + norm(body.position) : 0;
+  return turned || norm2(body.position) > 0 ? norm(hull->origin) + norm(body.position) : 0;
+}
+
+double flatness(const Shape& shape) {
+  const HullData* hull = polytope_of(shape);
+  return hull ? hull->flatness : 0;
 }
 
 int facets(const Shape& shape) {

@@ -1,11 +1,21 @@
 #pragma once
 
+#include <cstring>
 #include <span>
 #include <vector>
 
 #include "shape.h"
 
 namespace overlapper {
+
+/// Two doubles of a column, which every machine adds, multiplies and compares at once.
+using Pair = double __attribute__((vector_size(16)));
+
+inline Pair load(const double* p) {
+  Pair v;
+  std::memcpy(&v, p, sizeof v);
+  return v;
+}
 
 /// A convex polytope, or some of its facets with the edges between them, as columns.
 struct Solid {
@@ -52,6 +62,9 @@ double radius(const Shape& shape);
 
 /// What rotating and adding a hull's far origin has cost, as a length.
 double lost_far_away(const Placed& body);
+
+/// m: by how much planes of facets that are not quite flat miss their corners.
+double flatness(const Shape& shape);
 
 int facets(const Shape& shape);
 

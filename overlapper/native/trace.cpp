@@ -10,9 +10,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The relative error of a volume beyond which it is worth computing in another way.
-constexpr double kEnough = 1e-12;
-
 /// The common polytope of two bodies as it is put together.
 class Tracing {
  public:
@@ -55,8 +52,7 @@ class Tracing {
   }
 
   Vec3 middle_of_chord(Vec3 point, Vec3 along, const Pose& pose) const;
-  Exit exit(Vec3 direction) const;
-  Exit exit(Vec3 direction, CrossingFacets near) const;
+  Exit exit(Vec3 direction, std::optional<CrossingFacets> near = {}) const;
   bool find_seam(Vec3 normal);
   CrossingFacets between(Vec3 first, Vec3 second) const;
   bool begin_inside(int body, int facet, Vec3 direction);
@@ -127,27 +123,16 @@ Vec3 Tracing::middle_of_chord(Vec3 point, Vec3 along, const Pose& pose) const {
   return finite(middle) ? middle : point;
 }
 
-Tracing::Exit Tracing::exit(Vec3 direction) const {
+Tracing::Exit Tracing::exit(Vec3 direction, std::optional<CrossingFacets> near) const {
   Exit e{};
-  int* const facet[] = {&e.facets.first, &e.facets.second};
-  double* const rate[] = {&e.rate_first, &e.rate_second};
-  for (int i : {0, 1}) {
+  const auto leave = [&](int i, int from, int& facet, double& rate) {
     const CloseBody& body = bodies_[i];
-    *facet[i] = body.graph().ray_exit(body.data(), body.own_point({}), body.own_direction(direction), *rate[i]);
-  }
-  return e;
-}
-
-Tracing::Exit Tracing::exit(Vec3 direction, CrossingFacets near) const {
-  Exit e{};
-  const int from[] = {near.first, near.second};
-  int* const facet[] = {&e.facets.first, &e.facets.second};
-  double* const rate[] = {&e.rate_first, &e.rate_second};
-  for (int i : {0, 1}) {
-    const CloseBody& body = bodies_[i];
-    *facet[i] =
-        body.graph().ray_exit(body.data(), body.own_point({}), body.own_direction(direction), *rate[i], from[i]);
-  }
+    const Vec3 origin = body.own_point({}), along = body.own_direction(direction);
+    facet = near ? body.graph().ray_exit(body.data(), origin, along, rate, from)
+                 : body.graph().ray_exit(body.data(), origin, along, rate);
+  };
+  leave(0, near ? near->first : 0, e.facets.first, e.rate_first);
+  leave(1, near ? near->second : 0, e.facets.second, e.rate_second);
   return e;
 }
 
@@ -157,21 +142,21 @@ Tracing::Exit Tracing::exit(Vec3 direction, CrossingFacets near) const {
 CrossingFacets Tracing::between(Vec3 first, Vec3 second) const {
   double low = 0, high = 1, at = 0.5;
   bool newton = false;
-  CrossingFacets last{-1, -1};
+  std::optional<CrossingFacets> last;
   for (int round = 0; round < 64; ++round) {
     const Vec3 direction = unit(first + at * (second - first));
-    const Exit e = last.first < 0 ? exit(direction) : exit(direction, last);
-    if (newton && e.facets.first == last.first && e.facets.second == last.second) break;
+    const Exit e = exit(direction, last);
+    if (newton && e.facets.first == last->first && e.facets.second == last->second) break;
     last = e.facets;
     (e.leaves_first() ? low : high) = at;
-    const CloseBody::Side &f = bodies_[0].side(last.first), &g = bodies_[1].side(last.second);
+    const CloseBody::Side &f = bodies_[0].side(e.facets.first), &g = bodies_[1].side(e.facets.second);
     const double slack_f = dot(f.normal, f.through), slack_g = dot(g.normal, g.through);
     const auto excess = [&](Vec3 d) { return dot(f.normal, d) * slack_g - dot(g.normal, d) * slack_f; };
     const double at_first = excess(first), at_second = excess(second), root = at_first / (at_first - at_second);
     newton = root > low && root < high;
     at = newton ? root : (low + high) / 2;
   }
-  return last;
+  return *last;
 }
 
 /// A first line of the seam; or, where one body seems to lie inside the other, one of its vertices that does.
@@ -426,12 +411,11 @@ std::optional<ClippedPair> Tracing::measures(double least) const {
   common.area = total.area;
   const Vec3 centroid = total.moment / (4 * total.six_volumes);
   common.facets_touched = static_cast<int>(facets_.size());
-  // The area vector of a patch, and the integral of x × n over it, are integrals along its border (Stokes).
   Vec3 turn;
   for (const SeamCorner& corner : seam_.corners()) {
-    const Vec3 from = corner.at - origin, to = seam_.corners()[corner.next].at - origin;
-    common.pull += cross(from, to) / 2;
-    turn -= (norm2(from) + dot(from, to) + norm2(to)) / 6 * (to - from);
+    const Pull of_edge = pull_along_border(corner.at - origin, seam_.corners()[corner.next].at - origin);
+    common.pull += of_edge.force;
+    turn += of_edge.moment;
   }
   common.moment = turn - cross(centroid, common.pull);
   common.centroid = frame_.origin + (origin + centroid);
