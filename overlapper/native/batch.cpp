@@ -11,6 +11,7 @@
 #include "candidates.h"
 #include "minkowski.h"
 #include "parallel.h"
+#include "solid.h"
 
 namespace overlapper {
 namespace {
@@ -28,18 +29,19 @@ Overlaps::Row row_of(Overlap overlap) {
   Overlaps::Row row;
   row.status = overlap.status();
   if (row.status == Status::kSeparated) return row;
-  row.normal = overlap.contact().normal;
   row.volume_error = overlap.volume_error();
-  if (row.status == Status::kOverlapping) {
+  if (row.status == Status::kTouching) {
+    row.normal = overlap.contact().normal;
+  } else {
     row.widened = overlap.widened();
     row.facets_touched = overlap.facets_touched();
     row.volume = overlap.volume();
     row.area = overlap.area();
-    row.depth = overlap.contact().depth;
+    const auto [depth, normal] = overlap.penetration();
+    row.depth = depth;
+    row.normal = normal;
     row.centroid = overlap.centroid();
-    const auto gradient = overlap.gradient();
-    std::copy(gradient[0].begin(), gradient[0].end(), row.gradient.begin());
-    std::copy(gradient[1].begin(), gradient[1].end(), row.gradient.begin() + 6);
+    overlap.gradient(row.gradient);
   }
   if (!overlap.clipped()) row.source = std::make_shared<Overlap>(std::move(overlap));
   return row;
@@ -88,6 +90,13 @@ bool apart(const Body& a, const Body& b, Vec3& axis) {
     axis = distance(a.placed.seen_from(reference), b.placed.seen_from(reference)).normal;
   }
   return norm2(axis) > 0 && gap() > margin;
+}
+
+/// False where clipping is sooner done than an axis looked for, which there may not be.
+bool axis_soon_found(const Body& a, const Body& b) {
+  const Shape &p = a.placed.shape, &q = b.placed.shape;
+  const bool hulls = std::holds_alternative<Hull>(p) || std::holds_alternative<Hull>(q);
+  return !(hulls && bounded(p) && bounded(q) && clippable(p) && clippable(q));
 }
 
 /// The reach of a shape, and of the numbers that describe it, from its own origin.
@@ -231,9 +240,9 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
     }
   }
   const Body &a = bodies[pair.pair[0]], &b = bodies[pair.pair[1]];
-  // The article's method has its own way of telling, and clipping is sooner done than an axis looked for in vain.
-  const bool overlapped = before[i] >= 0 && rows[before[i]].status == Status::kOverlapping;
-  const bool separated = by_method == Method::kAuto && !overlapped && apart(a, b, pair.axis);
+  // The article's method has its own way of telling.
+  const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].status == Status::kOverlapping;
+  const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
   next_rows[i] = separated ? Overlaps::Row{} : row_of(Overlap(a.placed, b.placed, with_tolerance, by_method));
   done[i] = true;
   return separated;

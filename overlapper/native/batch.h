@@ -28,7 +28,7 @@ struct Overlaps {
     double volume = 0, volume_error = 0, area = 0, depth = 0;
     Vec3 centroid;  ///< meaningless unless overlapping
     Vec3 normal;    ///< {0, 0, 0} if separated
-    std::array<double, 12> gradient{};
+    std::array<std::array<double, 6>, 2> gradient{};
     std::shared_ptr<Overlap> source;  ///< if it took more than clipping
   };
 
@@ -39,7 +39,7 @@ struct Overlaps {
   std::vector<double> volume, volume_error, area, depth;
   std::vector<Vec3> centroid;  ///< not a number unless overlapping
   std::vector<Vec3> normal;
-  std::vector<std::array<double, 12>> gradient;
+  std::vector<std::array<std::array<double, 6>, 2>> gradient;
 
   /// What a row was taken from, while the batch that has it remembers; none where that is quickly made again.
   std::vector<std::weak_ptr<Overlap>> source;

@@ -369,7 +369,12 @@ Mat3 Overlap::inertia() const {
 
 std::vector<std::array<double, 6>> Overlap::gradient() const {
   std::vector<std::array<double, 6>> rows(bodies().size());
-  if (status_ != Status::kOverlapping) return rows;
+  gradient(rows);
+  return rows;
+}
+
+void Overlap::gradient(std::span<std::array<double, 6>> rows) const {
+  if (status_ != Status::kOverlapping) return;
   const auto pull = [&](int body, Vec3 force, Vec3 moment) {
     for (int i = 0; i < 3; ++i) rows[body][i] += force[i], rows[body][3 + i] += moment[i];
   };
@@ -383,11 +388,10 @@ std::vector<std::array<double, 6>> Overlap::gradient() const {
     }
     for (size_t body = 0; body < pulls_.size(); ++body)
       pull_at_centroid(static_cast<int>(body), pulls_[body].force, pulls_[body].moment);
-    return rows;
+    return;
   }
   for (const Quantities::Pull& facet : quantities().pulls)
     pull(facet.owner, facet.area_vector, cross(facet.centroid - bodies()[facet.owner].position, facet.area_vector));
-  return rows;
 }
 
 Distance Overlap::wide_distance(double reach) const {
@@ -410,17 +414,34 @@ Penetration Overlap::parting(std::vector<Vec3> normals) const {
   return least;
 }
 
+Penetration Overlap::penetration() const {
+  assert(pair() && status_ == Status::kOverlapping);
+  // What clipping measures holds a ball beyond doubt.
+  if (!measured_by_clipping_) return {contact().depth, contact().normal};
+  const bool swapped = comes_before(two_[1], two_[0]);
+  const Placed &first = two_[swapped], &second = two_[!swapped];
+  const Vec3 reference = first.pose.translation;
+  Penetration p = overlapper::penetration(first.seen_from(reference), second.seen_from(reference));
+  if (swapped) p.normal = Vec3{} - p.normal;  // and not -normal, which would make negative zeros
+  return p;
+}
+
 Overlap::Contact Overlap::in_contact() const {
   assert(pair());
   Contact contact;
+  if (measured_by_clipping_) {
+    const auto [depth, normal] = penetration();
+    contact.depth = depth;
+    contact.normal = normal;
+    return contact;
+  }
   const auto& [order, relative, reference] = arrangement();
   const Placed &a = relative[0], &b = relative[1];
   const auto reach = [&] { return std::max(magnitude(a), magnitude(b)); };
   const bool doubtful = method_ == Method::kAuto && !clipped_ && search().wide_ball;
   if (status_ == Status::kOverlapping) {
-    Penetration p = penetration(a, b);
-    // What clipping measures holds a ball beyond doubt.
-    if (doubtful || (!measured_by_clipping_ && p.depth <= doubt(reach()))) p = parting({p.normal});
+    Penetration p = overlapper::penetration(a, b);
+    if (doubtful || p.depth <= doubt(reach())) p = parting({p.normal});
     contact.depth = p.depth;
     contact.normal = p.normal;
   } else {
@@ -429,7 +450,7 @@ Overlap::Contact Overlap::in_contact() const {
     if (!(d.gap > doubt(size)) && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(size);
     contact.normal = d.normal;
     // Where the bodies touch, the line between the witness points may be all rounding; the way out is not.
-    if (status_ == Status::kTouching && !(d.gap > 0)) contact.normal = parting({penetration(a, b).normal}).normal;
+    if (status_ == Status::kTouching && !(d.gap > 0)) contact.normal = parting({overlapper::penetration(a, b).normal}).normal;
     // Method "paper" may call apart what is not.
     contact.distance = status_ == Status::kSeparated ? std::max(0.0, d.distance) : 0;
     contact.witness_a = d.witness_a + reference;

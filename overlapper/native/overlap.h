@@ -58,6 +58,8 @@ class Overlap {
 
   /// Per body: d volume / d translation, then / d rotation vector about the body's position; zeros unless overlapping.
   std::vector<std::array<double, 6>> gradient() const;
+  /// The same into rows that are zero, one per body.
+  void gradient(std::span<std::array<double, 6>> rows) const;
 
   /// Only for pairs.
   struct Contact {
@@ -68,6 +70,8 @@ class Overlap {
     Plane separating;  ///< a where dot(normal, x) >= offset, b on the other side; meaningless if overlapping
   };
   const Contact& contact() const;
+  /// Only for pairs that overlap: the depth and normal of contact(), without the rest of it where clipping has measured.
+  Penetration penetration() const;
 
  private:
   bool traced() const { return clipped_ && clipped_->traced; }
