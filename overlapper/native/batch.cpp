@@ -18,6 +18,9 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+/// Rows that are laid out and filled before Ctrl-C is looked for: to lay out all of some millions takes seconds.
+constexpr size_t kStretch = 1 << 17;
+
 /// What a pair leaves behind for its next call.
 struct Known {
   IndexPair pair;
@@ -178,7 +181,9 @@ struct Batch::Memory {
   double tolerance = 0;
   Method method = Method::kAuto;
 
-  std::vector<int> before;  ///< of the call under way, per pair: its row in the last call, or -1
+  std::vector<int> before;   ///< of the call under way, per pair: its row in the last call, or -1
+  bool both_sorted = false;  ///< the pairs of the last call, and of that under way
+  size_t walked = 0;         ///< of the last call's pairs, if so
 
   explicit Memory(const std::vector<Shape>& shapes) {
     for (const Shape& shape : shapes) bodies.push_back({make_placed(shape, {}, {}), reach_of(shape), 0});
@@ -186,6 +191,7 @@ struct Batch::Memory {
   }
 
   void place(std::span<const double> positions, std::span<const double> orientations);
+  void begin(std::span<const IndexPair> pairs);
   void recall(std::span<const IndexPair> pairs);
   bool answer(size_t i, double with_tolerance, Method by_method);
   void keep(double of_tolerance, Method of_method);
@@ -211,20 +217,25 @@ void Batch::Memory::place(std::span<const double> positions, std::span<const dou
   poses = std::move(now);
 }
 
-/// Finds the pairs in the last call: by a walk along both lists where they are sorted, else at the same place.
+void Batch::Memory::begin(std::span<const IndexPair> pairs) {
+  both_sorted = sorted && std::is_sorted(pairs.begin(), pairs.end());
+  walked = 0;
+  next_known.clear(), next_rows.clear(), before.clear(), done.clear();
+  next_known.reserve(pairs.size()), next_rows.reserve(pairs.size());
+  before.reserve(pairs.size()), done.reserve(pairs.size());
+}
+
+/// Lays out rows for more pairs, and finds these in the last call: by a walk along both lists where they are sorted,
+/// else at the same place.
 void Batch::Memory::recall(std::span<const IndexPair> pairs) {
-  next_known.resize(pairs.size());
-  next_rows.resize(pairs.size());
-  before.assign(pairs.size(), -1);
-  done.assign(pairs.size(), 0);
-  const bool both_sorted = sorted && std::is_sorted(pairs.begin(), pairs.end());
-  size_t at = 0;
-  for (size_t i = 0; i < pairs.size(); ++i) {
-    next_known[i] = {pairs[i], {bodies[pairs[i][0]].version, bodies[pairs[i][1]].version}, {}};
-    while (both_sorted && at < known.size() && known[at].pair < pairs[i]) ++at;
-    if (!both_sorted) at = i;
-    if (at < known.size() && known[at].pair == pairs[i]) before[i] = static_cast<int>(at);
+  for (const IndexPair& pair : pairs) {
+    while (both_sorted && walked < known.size() && known[walked].pair < pair) ++walked;
+    const size_t at = both_sorted ? walked : next_known.size();
+    before.push_back(at < known.size() && known[at].pair == pair ? static_cast<int>(at) : -1);
+    next_known.push_back({pair, {bodies[pair[0]].version, bodies[pair[1]].version}, {}});
   }
+  next_rows.resize(next_known.size());
+  done.resize(next_known.size());
 }
 
 /// Fills row i; false if that took long.
@@ -298,10 +309,6 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   memory->place(positions, orientations);
   if (!given) memory->tree.pairs(memory->enclosures, memory->candidates);
   const std::span<const IndexPair> pairs = given ? *given : std::span<const IndexPair>(memory->candidates);
-  memory->recall(pairs);
-  finished = for_each_in_parallel(
-      pairs.size(), threads, [&](size_t i, int) { return memory->answer(i, tolerance, method); }, go_on);
-
   Overlaps answer;
   answer.tolerance = tolerance;
   answer.method = method;
@@ -310,11 +317,20 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   const auto listed = [&](size_t i) {
     return memory->done[i] && (separated || memory->next_rows[i].status != Status::kSeparated);
   };
-  size_t rows = 0;
-  for (size_t i = 0; i < pairs.size(); ++i) answer.examined += memory->done[i], rows += listed(i);
-  answer.reserve(rows);
-  for (size_t i = 0; i < pairs.size(); ++i)
-    if (listed(i)) answer.append(pairs[i], memory->next_rows[i]);
+  memory->begin(pairs);
+  finished = true;
+  for (size_t first = 0; finished && first < pairs.size(); first += kStretch) {
+    const size_t count = std::min(kStretch, pairs.size() - first);
+    memory->recall(pairs.subspan(first, count));
+    finished = for_each_in_parallel(
+        count, threads, [&](size_t i, int) { return memory->answer(first + i, tolerance, method); }, go_on);
+    size_t rows = 0;
+    for (size_t i = first; i < first + count; ++i) answer.examined += memory->done[i], rows += listed(i);
+    if (first == 0) answer.reserve(separated ? pairs.size() : rows);
+    for (size_t i = first; i < first + count; ++i)
+      if (listed(i)) answer.append(pairs[i], memory->next_rows[i]);
+    finished = finished && (first + count == pairs.size() || go_on());
+  }
   if (finished) memory->keep(tolerance, method);
   return answer;
 }
