@@ -81,6 +81,7 @@ class Decoder {
       case 3: return make_capsule(positive(), positive());
       case 4: return make_cylinder(positive(), positive());
       case 5: return make_half_space(direction(), real());
+      case 6: return make_rounded_hull(points(), positive());
       default: return make_hull(points());
     }
   }
