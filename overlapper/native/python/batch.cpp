@@ -196,10 +196,11 @@ constexpr const char* kOverlapsDoc =
     R"(What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
 gradient as arrays.
 
-`positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs` (p, 2)
-indexes them and has a row each in the answer, or with separated=False only those that overlap or touch; without it there is
-a row for each pair that overlaps or touches, found by a tree of boxes and sorted. `tolerance` and `method` are those of `overlap`, whose answers these are to the last bit. The work is
-spread over `threads`, None being all that there are; their number does not change a bit of the answer.
+`positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs`
+(p, 2) indexes them and has a row each in the answer, or with separated=False only those that overlap or touch; without
+it there is a row for each pair that overlaps or touches, found by a tree of boxes and sorted. `tolerance` and `method`
+are those of `overlap`, whose answers these are to the last bit. The work is spread over `threads`, None being all that
+there are; their number does not change a bit of the answer.
 
 Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
 Raises ValueError naming an argument of the wrong shape, a pose that is not finite, or half-spaces whose common set is
