@@ -19,7 +19,7 @@ from peers import clipped, enclosed_volume, volume_of_halfspaces
 from strategies import rotation
 from workloads import Pair, corners, is_round, vertices
 
-from overlapper import Batch, Box, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap, overlaps, penetration_depth
+from overlapper import Batch, Box, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap, penetration_depth
 
 Setting = float | int | str | None
 Asked = Callable[[], Any]
@@ -62,9 +62,12 @@ def auto(pair: Pair, tolerance: float) -> Asked:
 
 
 def auto_batch(pairs: list[Pair], tolerance: float) -> Asked:
-    """All measures of many pairs in one call, nothing known from before."""
-    scene = in_rows(pairs)
-    return lambda: overlaps(*scene, tolerance=tolerance).volume
+    """All measures of many pairs in one call, the shapes made before and nothing known of the pairs: each call gives
+    them the other way round and quaternions of another length, other pairs and poses that have the same answers."""
+    shapes, positions, orientations, rows = in_rows(pairs)
+    batch = Batch(shapes)
+    turns = cycle([(orientations, rows), (2 * orientations, rows[:, ::-1].copy())])
+    return lambda: batch.overlaps(positions, *next(turns), tolerance=tolerance).volume
 
 
 def auto_warm(pairs: list[Pair], tolerance: float) -> Asked:
