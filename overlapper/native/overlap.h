@@ -70,7 +70,8 @@ class Overlap {
     Plane separating;  ///< a where dot(normal, x) >= offset, b on the other side; meaningless if overlapping
   };
   const Contact& contact() const;
-  /// Only for pairs that overlap: the depth and normal of contact(), without the rest of it where clipping has measured.
+  /// Only for pairs that overlap: the depth and normal of contact(), without the rest of it where clipping has
+  /// measured.
   Penetration penetration() const;
 
  private:
