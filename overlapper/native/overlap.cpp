@@ -450,7 +450,8 @@ Overlap::Contact Overlap::in_contact() const {
     if (!(d.gap > doubt(size)) && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(size);
     contact.normal = d.normal;
     // Where the bodies touch, the line between the witness points may be all rounding; the way out is not.
-    if (status_ == Status::kTouching && !(d.gap > 0)) contact.normal = parting({overlapper::penetration(a, b).normal}).normal;
+    if (status_ == Status::kTouching && !(d.gap > 0))
+      contact.normal = parting({overlapper::penetration(a, b).normal}).normal;
     // Method "paper" may call apart what is not.
     contact.distance = status_ == Status::kSeparated ? std::max(0.0, d.distance) : 0;
     contact.witness_a = d.witness_a + reference;
