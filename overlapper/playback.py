@@ -103,7 +103,14 @@ def _held_against(
     recorded = read_table(path)
     steps = max((int(row["step"] or 0) for row in recorded), default=playback.total)
     playback.total = steps
-    kinds = {"tolerance": float, "method": str, "concave": str, "concave_threshold": float, "pairs": str}
+    kinds = {
+        "tolerance": float,
+        "method": str,
+        "surface": str,
+        "concave": str,
+        "concave_threshold": float,
+        "pairs": str,
+    }
     known = {name: kind(settings[name]) for name, kind in kinds.items() if settings.get(name, "None") != "None"}
     found: list[Row] = []
     for frame in run(scene, steps, **known):

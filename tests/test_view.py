@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from overlapper import Box, HalfSpace, Placed, Sphere, cli, overlap, picture
+from overlapper import Box, HalfSpace, Placed, RoundedHull, Sphere, cli, overlap, picture
 from overlapper.look import Look
 from overlapper.playback import largest, play
 from overlapper.regression import load_scene, record
@@ -88,6 +88,15 @@ def test_what_a_table_has_is_told_from_what_its_scene_has_become(scene_file):
     list((playback := play("press.csv")).views)
     (remark,) = playback.remarks
     assert re.match(r"what is seen is not what press\.csv has, as the simulation has changed: step \d, ", remark)
+
+
+def test_a_table_of_bodies_with_margins_is_played_with_margins(scene_file):
+    points = "vertices=[[x, y, z] for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (-0.05, 0.05)]"
+    scene_file.write_text(PRESS.replace("GEOM_BOX, halfExtents=[0.05] * 3", f"GEOM_MESH, {points}"))
+    overlapper("run", "press.py", "--surface", "margin", "--out", "press.csv")
+    playback = play("press.csv")
+    assert {type(body.shape) for view in playback.views for body in view.bodies.placed} == {RoundedHull}
+    assert playback.remarks == []
 
 
 def test_an_expected_file_is_seen_without_its_scene(scene_file):
