@@ -36,8 +36,10 @@ steps, and for how long.
 - **pairs possible**: pairs of shapes that the simulator lets collide; **examined**: those whose boxes meet;
   **overlapping**: those that share volume.
 - **facets there**: of the boxes, hulls and half-spaces of all examined pairs, which a method would work through that
-  takes the shapes as wholes; round shapes have none. **Touched**: planes that took part in building what is common,
-  tangent planes of round shapes among them.
+  takes the shapes as wholes; round shapes have none. **Asked**: planes that were placed to be held against corners, or
+  that a shape gave as an answer to where a ray leaves it or which plane is tightest about a point; a pair that has not
+  moved asks for none. **Touched**: planes that took part in building what is common. Tangent planes of round shapes
+  count among both.
 - **again**: overlaps that had to be measured again in wider arithmetic, being so thin that doubles would not place
   their volume to 1e-12 of itself.
 - **time**: of `update()` and `overlaps()` at the default tolerance, the median step, on one thread{machine}.
@@ -47,7 +49,12 @@ steps, and for how long.
 """
 
 HEADING = (
-    "scene", "shapes", "pairs possible", "examined", "overlapping", "facets there", "touched", "again", "time",
+    "scene", "shapes", "pairs possible", "examined", "overlapping", "facets there", "asked", "touched", "again", "time",
+)  # fmt: skip
+
+
+COUNTS = (
+    "pairs_possible", "pairs_examined", "pairs_overlapping", "planes_asked", "facets_touched", "pairs_widened",
 )  # fmt: skip
 
 
@@ -66,14 +73,12 @@ class Economy:
     def row(self, name: str) -> list[str]:
         last = self.reports[-1]
         read = "" if last.shapes_read == last.shapes else f", {last.shapes_read:,} of them modelled"
-        counts = [
-            mean(getattr(report, count) for report in self.reports)
-            for count in ("pairs_possible", "pairs_examined", "pairs_overlapping", "facets_touched", "pairs_widened")
-        ]
-        possible, examined, overlapping, touched, widened = map(rounded, counts)
+        possible, examined, overlapping, asked, touched, widened = (
+            rounded(mean(getattr(report, count) for report in self.reports)) for count in COUNTS
+        )
         there = rounded(mean(self.facets_there))
         took = f"{1e3 * median(self.seconds):.2g} ms"
-        return [name, f"{last.shapes:,}{read}", possible, examined, overlapping, there, touched, widened, took]
+        return [name, f"{last.shapes:,}{read}", possible, examined, overlapping, there, asked, touched, widened, took]
 
 
 def rounded(count: float) -> str:

@@ -133,8 +133,9 @@ def _sum(before: Report | None, now: Report) -> Report:
     """Bodies and shapes as they are now, pairs and facets of all steps."""
     if before is None:
         return now
-    counts = ("pairs_possible", "pairs_examined", "pairs_overlapping", "pairs_widened", "facets_touched")
-    return replace(now, **{name: getattr(before, name) + getattr(now, name) for name in counts})
+    of_scene = {"bodies", "shapes", "shapes_read"}
+    counts = {name: count for name, count in asdict(before).items() if name not in of_scene}
+    return replace(now, **{name: count + getattr(now, name) for name, count in counts.items()})
 
 
 def overlaps_table(summary: Summary, limit: int = 20) -> Table:

@@ -629,6 +629,13 @@ class Overlaps:
         """How many pairs were looked at: those given, or those whose boxes meet."""
 
     @property
+    def planes_asked(self) -> int:
+        """
+        How many planes of the shapes were asked for in that call: placed to be held against corners, or given by a shape
+        as an answer to where a ray leaves it or which of its planes is tightest about a point.
+        """
+
+    @property
     def tolerance(self) -> float: ...
 
     @property

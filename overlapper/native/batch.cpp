@@ -11,6 +11,7 @@
 #include "candidates.h"
 #include "minkowski.h"
 #include "parallel.h"
+#include "planes_asked.h"
 #include "solid.h"
 
 namespace overlapper {
@@ -153,6 +154,7 @@ std::shared_ptr<Overlap> Overlaps::overlap(size_t row) const {
 Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
   Overlaps chosen;
   chosen.examined = examined;
+  chosen.planes_asked = planes_asked;
   chosen.tolerance = tolerance;
   chosen.method = method;
   chosen.shapes = shapes;
@@ -177,6 +179,7 @@ struct Batch::Memory {
   std::vector<Known> known, next_known;        ///< of the last call with pairs, and of the one under way
   std::vector<Overlaps::Row> rows, next_rows;  ///< parallel to these
   std::vector<char> done;                      ///< of the call under way
+  std::atomic<size_t> asked{0};                ///< in the call under way: planes
   bool sorted = false;                         ///< `known` is, by pair
   double tolerance = 0;
   Method method = Method::kAuto;
@@ -220,6 +223,7 @@ void Batch::Memory::place(std::span<const double> positions, std::span<const dou
 void Batch::Memory::begin(std::span<const IndexPair> pairs) {
   both_sorted = sorted && std::is_sorted(pairs.begin(), pairs.end());
   walked = 0;
+  asked = 0;
   next_known.clear(), next_rows.clear(), before.clear(), done.clear();
   next_known.reserve(pairs.size()), next_rows.reserve(pairs.size());
   before.reserve(pairs.size()), done.reserve(pairs.size());
@@ -254,7 +258,9 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   // The article's method has its own way of telling.
   const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].status == Status::kOverlapping;
   const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
+  const size_t planes_before = planes_asked;
   next_rows[i] = separated ? Overlaps::Row{} : row_of(Overlap(a.placed, b.placed, with_tolerance, by_method));
+  asked.fetch_add(planes_asked - planes_before, std::memory_order_relaxed);
   done[i] = true;
   return separated;
 }
@@ -331,6 +337,7 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
       if (listed(i)) answer.append(pairs[i], memory->next_rows[i]);
     finished = finished && (first + count == pairs.size() || go_on());
   }
+  answer.planes_asked = memory->asked;
   if (finished) memory->keep(tolerance, method);
   return answer;
 }

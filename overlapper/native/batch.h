@@ -44,7 +44,8 @@ struct Overlaps {
   /// What a row was taken from, while the batch that has it remembers; none where that is quickly made again.
   std::vector<std::weak_ptr<Overlap>> source;
 
-  size_t examined = 0;  ///< pairs that were looked at, with or without a row
+  size_t examined = 0;      ///< pairs that were looked at, with or without a row
+  size_t planes_asked = 0;  ///< of their shapes, those of pairs that have not moved left out
   double tolerance = 0;
   Method method = Method::kAuto;
   std::shared_ptr<const std::vector<Shape>> shapes;

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "planes_asked.h"
+
 namespace overlapper {
 
 bool has_graph(const Shape& shape) {
@@ -96,6 +98,7 @@ void CloseBody::place_corner(int vertex) {
 }
 
 void CloseBody::place_side(int facet) {
+  ++planes_asked;
   const Vec3 normal = data().planes[facet].normal;
   Side side{turned_ ? turn_ * normal : normal, {}, std::numeric_limits<double>::infinity(), 0};
   for (int v : data().facet(facet)) {

@@ -9,6 +9,7 @@
 #include "closed_forms.h"
 #include "expanding_hull.h"
 #include "paper.h"
+#include "planes_asked.h"
 #include "predicates.h"
 #include "solid.h"
 #include "wide_gap.h"
@@ -65,6 +66,7 @@ std::vector<Owned<PlaneOf<Body>>> gather_planes(std::span<const Body> bodies) {
     append_planes(bodies[i], own);
     for (const PlaneOf<Body>& plane : own) planes.push_back({plane, i});
   }
+  planes_asked += planes.size();
   return planes;
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "expanding_hull.h"
+#include "planes_asked.h"
 #include "polytope.h"
 #include "predicates.h"
 #include "wide.h"
@@ -303,12 +304,14 @@ Vec3 Placed::core_support(Vec3 direction) const {
 }
 
 Plane Placed::ray_exit(Vec3 origin, Vec3 direction) const {
+  ++planes_asked;
   const Vec3 from = apply_transposed(pose.rotation, origin - pose.translation);
   const Vec3 along = apply_transposed(pose.rotation, direction);
   return pose * std::visit([&](const auto& s) { return s.ray_exit(from, along); }, shape);
 }
 
 Plane Placed::tightest(Vec3 point) const {
+  ++planes_asked;
   const Vec3 local = apply_transposed(pose.rotation, point - pose.translation);
   return pose * std::visit([&](const auto& s) { return s.tightest(local); }, shape);
 }

@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "planes_asked.h"
 #include "portal.h"
 #include "seam.h"
 
@@ -116,6 +117,7 @@ Vec3 Tracing::middle_of_chord(Vec3 point, Vec3 along, const Pose& pose) const {
     double a, b;
     meshes_[0].graph().ray_exit(meshes_[0].data(), point, sign * along, a);
     meshes_[1].graph().ray_exit(meshes_[1].data(), in_second, sign * along_second, b);
+    planes_asked += 2;
     return 1 / std::max(a, b);
   };
   const double forwards = length(1), backwards = length(-1);

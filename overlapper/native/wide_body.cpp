@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "planes_asked.h"
+
 namespace overlapper {
 namespace {
 
@@ -150,6 +152,7 @@ WidePlane WideBody::tightest_triangle(const WideVector& point) const {
 }
 
 WidePlane WideBody::tightest(const WideVector& point) const {
+  ++planes_asked;
   if (const HalfSpace* half = std::get_if<HalfSpace>(&shape)) {
     const WideVector given = wide(half->given_normal);
     const DoubleDouble length = norm(given);
@@ -172,6 +175,7 @@ WidePlane WideBody::supporting(Vec3 outward) const {
 }
 
 WidePlane WideBody::ray_exit(const WideVector& origin, const WideVector& direction) const {
+  ++planes_asked;
   const WideVector o = local(origin), d = apply_transposed(rotation_, direction);
   if (const RoundedHull* hull = std::get_if<RoundedHull>(&shape))
     return in_world(supporting(hull->ray_exit(rounded(o), rounded(d)).normal));

@@ -166,6 +166,10 @@ unless it took long and its Batch has not been asked since; `overlaps[mask]`, a 
                                      {"OVERLAPPING", Status::kOverlapping}})
     cls.attr(name) = static_cast<int>(status);
   cls.def_ro("examined", &Overlaps::examined, "How many pairs were looked at: those given, or those whose boxes meet.");
+  cls.def_ro(
+      "planes_asked", &Overlaps::planes_asked,
+      R"(How many planes of the shapes were asked for in that call: placed to be held against corners, or given by a shape
+as an answer to where a ray leaves it or which of its planes is tightest about a point.)");
   cls.def_ro("tolerance", &Overlaps::tolerance);
   cls.def_prop_ro(
       "method", [](const Overlaps& o) { return o.method == Method::kAuto ? "auto" : "paper"; },
