@@ -1,7 +1,9 @@
 #include "meeting.h"
 
+#include <bit>
 #include <cstring>
 #include <limits>
+#include <tuple>
 
 namespace overlapper {
 namespace {
@@ -11,8 +13,20 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline void store(double* p, Pair v) { std::memcpy(p, &v, sizeof v); }
 inline Pair both(double x) { return Pair{x, x}; }
 inline Pair larger(Pair a, Pair b) { return a > b ? a : b; }
-inline Pair smaller(Pair a, Pair b) { return a < b ? a : b; }
 inline double larger(Pair a) { return a[0] > a[1] ? a[0] : a[1]; }
+
+/// A bit for each of two planes.
+using PairBits = std::uint64_t __attribute__((vector_size(16)));
+inline PairBits positive(Pair a) { return std::bit_cast<PairBits>(a > both(0)); }
+
+/// Calls `use(plane)`, from the first to the last, for planes whose bit j % 64 is set.
+template <class Use>
+inline void for_each_plane(std::uint64_t marked, int stride, Use use) {
+  for (int first = 0; first < stride; first += 64) {
+    for (std::uint64_t rest = marked; rest != 0; rest &= rest - 1)
+      if (const int j = first + std::countr_zero(rest); j < stride) use(j);
+  }
+}
 
 /// Where an edge meets a plane: at `from + at * (to - from)`.
 struct Crossing {
@@ -20,9 +34,11 @@ struct Crossing {
   double at;
 };
 
-/// One edge against all planes of the other body: the signed distances of its ends.
+/// One edge against all planes of the other body: the signed distances of its ends. The planes that it enters or leaves
+/// through are among the few that an end is outside of.
 struct EdgeSigns {
   const double *from, *to;
+  std::uint64_t from_outside, to_outside;  ///< as in SignTable
   int stride;
   double length, rounding;
 
@@ -31,49 +47,49 @@ struct EdgeSigns {
     return 2 * rounding * (1 + length / std::abs(to[crossing.plane] - from[crossing.plane]));
   }
 
-  /// True if the point where the edge crosses a plane is certainly inside all others.
-  bool certain(Crossing crossing) const {
+  /// True if the point where the edge crosses a plane, with that doubt, is certainly inside all others.
+  bool certain(Crossing crossing, double doubt) const {
     const int g = crossing.plane, pair = g & ~1, partner = g ^ 1;
     const Pair at = both(crossing.at);
     const auto height = [&](int j) { return load(from + j) + at * (load(to + j) - load(from + j)); };
     Pair highest = both(from[partner] + crossing.at * (to[partner] - from[partner]));
     for (int j = 0; j < pair; j += 2) highest = larger(highest, height(j));
     for (int j = pair + 2; j < stride; j += 2) highest = larger(highest, height(j));
-    return larger(highest) < -doubt(crossing);
+    return larger(highest) < -doubt;
   }
 
   Crossing at_plane(int g) const { return {g, from[g] / (from[g] - to[g])}; }
 
   /// The plane through which it leaves from an end that is inside.
-  Crossing exit(bool from_inside, std::vector<double>& ratio) const {
+  Crossing exit(bool from_inside) const {
     const double *inner = from_inside ? from : to, *outer = from_inside ? to : from;
-    Pair steepest = both(0);
-    for (int j = 0; j < stride; j += 2) {
-      const Pair r = load(outer + j) / -load(inner + j);
-      store(&ratio[j], r);
-      steepest = larger(steepest, r);
-    }
-    const double most = larger(steepest);
+    double steepest = 0;
     int g = 0;
-    while (ratio[g] != most) ++g;
+    for_each_plane(from_inside ? to_outside : from_outside, stride, [&](int j) {
+      const double ratio = outer[j] / -inner[j];
+      if (ratio > steepest) steepest = ratio, g = j;
+    });
     return at_plane(g);
   }
 
   /// True if both ends are certainly outside of the same plane.
   bool outside() const {
-    Pair highest = both(-kInfinity);
-    for (int j = 0; j < stride; j += 2) highest = larger(highest, smaller(load(from + j), load(to + j)));
-    return larger(highest) > rounding;
+    bool found = false;
+    for_each_plane(from_outside & to_outside, stride, [&](int j) { found |= std::min(from[j], to[j]) > rounding; });
+    return found;
   }
 
   /// For an edge whose ends are both outside, of different planes: where it enters and leaves.
-  std::array<Crossing, 2> passage() const {
+  std::pair<Crossing, Crossing> passage() const {
     Crossing enter{-1, -kInfinity}, leave{-1, kInfinity};
-    for (int j = 0; j < stride; ++j) {
+    for_each_plane(from_outside, stride, [&](int j) {
       const double at = from[j] / (from[j] - to[j]);
-      if (from[j] > to[j] && from[j] > 0 && at > enter.at) enter = {j, at};
-      if (to[j] > from[j] && to[j] > 0 && at < leave.at) leave = {j, at};
-    }
+      if (from[j] > 0 && from[j] > to[j] && at > enter.at) enter = {j, at};
+    });
+    for_each_plane(to_outside, stride, [&](int j) {
+      const double at = from[j] / (from[j] - to[j]);
+      if (to[j] > 0 && to[j] > from[j] && at < leave.at) leave = {j, at};
+    });
     return {enter, leave};
   }
 
@@ -90,27 +106,50 @@ struct EdgeSigns {
 Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
   stride = by.stride;
   rows.resize(static_cast<size_t>(of.vertices) * stride);
+  outside.resize(of.vertices);
   inside.resize(of.vertices);
-  nearest.assign(stride, kInfinity);
+  // Taken once: for all that a compiler knows, a sign that is stored might move them.
+  const double *nx = by.nx.data(), *ny = by.ny.data(), *nz = by.nz.data(), *offset = by.offset.data();
+  const double *vx = of.x.data(), *vy = of.y.data(), *vz = of.z.data(), *doubt = of.doubt.data();
+  double* signs = rows.data();
+  const ptrdiff_t vertices = of.vertices, planes = stride;
   bool uncertain = false;
   double most_doubt = 0;
-  for (int i = 0; i < of.vertices; ++i) {
-    const Pair x = both(of.x[i]), y = both(of.y[i]), z = both(of.z[i]);
-    double* signs = row(i);
+  for (ptrdiff_t i = 0; i < vertices; ++i, signs += planes) {
+    const Pair x = both(vx[i]), y = both(vy[i]), z = both(vz[i]);
     Pair farthest = both(-kInfinity);
-    for (int j = 0; j < stride; j += 2) {
-      const Pair s = load(&by.nx[j]) * x + load(&by.ny[j]) * y + load(&by.nz[j]) * z - load(&by.offset[j]);
-      store(signs + j, s);
-      farthest = larger(farthest, s);
-      store(&nearest[j], smaller(load(&nearest[j]), s));
+    PairBits marked{};
+    for (ptrdiff_t first = 0; first < planes; first += 64) {
+      PairBits bit{1, 2};
+      const ptrdiff_t end = std::min(first + 64, planes);
+      for (ptrdiff_t j = first; j < end; j += 2, bit <<= 2) {
+        const Pair s = load(nx + j) * x + load(ny + j) * y + load(nz + j) * z - load(offset + j);
+        store(signs + j, s);
+        farthest = larger(farthest, s);
+        marked |= positive(s) & bit;
+      }
     }
     const double s = larger(farthest);
+    outside[i] = marked[0] | marked[1];
     inside[i] = s < 0;
-    uncertain |= std::abs(s) <= rounding + of.doubt[i];
-    most_doubt = std::max(most_doubt, of.doubt[i]);
+    uncertain |= std::abs(s) <= rounding + doubt[i];
+    most_doubt = std::max(most_doubt, doubt[i]);
   }
-  if (of.whole && *std::max_element(nearest.begin(), nearest.end()) > rounding + most_doubt) return Signs::kSeparated;
+  if (of.whole && beyond_a_plane(rounding + most_doubt)) return Signs::kSeparated;
   return uncertain ? Signs::kUncertain : Signs::kCertain;
+}
+
+/// True if all vertices are farther than `margin` outside of the same plane.
+bool SignTable::beyond_a_plane(double margin) const {
+  std::uint64_t shared = ~std::uint64_t{0};
+  for (std::uint64_t marked : outside) shared &= marked;
+  bool found = false;
+  for_each_plane(shared, stride, [&](int j) {
+    double nearest = kInfinity;
+    for (size_t k = j; k < rows.size(); k += stride) nearest = std::min(nearest, rows[k]);
+    found |= nearest > margin;
+  });
+  return found;
 }
 
 /// Finds the common polytope of a meeting whose solids are in place.
@@ -132,7 +171,6 @@ class Tracer {
     w_.seam.clear();
     w_.unpaired = 0;
     w_.open.resize(static_cast<size_t>(w_.first.facets) * w_.second.facets, 0);
-    w_.ratio.resize(std::max(w_.first.stride, w_.second.stride));
     const bool certain = trace(w_.first, w_.first_signs, w_.first_vertex, true) &&
                          trace(w_.second, w_.second_signs, w_.second_vertex, false) && w_.unpaired == 0;
     if (!certain) {
@@ -150,39 +188,44 @@ class Tracer {
     return static_cast<int>(w_.vertices.size()) - 1;
   }
 
-  bool trace(const Solid& body, SignTable& signs, std::vector<int>& common_vertex, bool is_first) {
+  bool trace(const Solid& body, const SignTable& signs, std::vector<int>& common_vertex, bool is_first) {
     common_vertex.assign(body.vertices, -1);
     for (int i = 0; i < body.vertices; ++i)
       if (signs.inside[i]) common_vertex[i] = add_vertex(body.vertex(i), body.doubt[i], {is_first ? 0 : 1, i, {}});
     const int offset = is_first ? 0 : w_.first.facets;
     for (const Edge& e : body.edges) {
-      const bool from_inside = signs.inside[e.from], to_inside = signs.inside[e.to];
       Edge common{common_vertex[e.from], common_vertex[e.to], e.left + offset, e.right + offset};
+      const bool from_inside = common.from >= 0, to_inside = common.to >= 0;
       if (!(from_inside && to_inside)) {
         const Vec3 from = body.vertex(e.from), along = body.vertex(e.to) - from;
-        const EdgeSigns edge{signs.row(e.from), signs.row(e.to), signs.stride,
+        const EdgeSigns edge{signs.row(e.from),
+                             signs.row(e.to),
+                             signs.outside[e.from],
+                             signs.outside[e.to],
+                             signs.stride,
                              std::abs(along.x) + std::abs(along.y) + std::abs(along.z),
                              rounding_ + std::max(body.doubt[e.from], body.doubt[e.to])};
-        const auto cross = [&](Crossing crossing, bool enters) {
-          const int facet = crossing.plane + (is_first ? w_.first.facets : 0);
-          const int v = add_vertex(from + crossing.at * along, edge.doubt(crossing),
-                                   {-1, -1, {common.left, common.right, facet}});
-          meet(e, crossing.plane, v, enters, is_first);
-          return v;
-        };
-        if (from_inside || to_inside) {
-          const Crossing exit = edge.exit(from_inside, w_.ratio);
-          if (!edge.certain(exit)) return false;
-          (from_inside ? common.to : common.from) = cross(exit, to_inside);
+        Crossing enter, leave;
+        if (from_inside) {
+          leave = edge.exit(true);
+        } else if (to_inside) {
+          enter = edge.exit(false);
         } else {
           if (edge.outside()) continue;
-          const auto [enter, leave] = edge.passage();
+          std::tie(enter, leave) = edge.passage();
           if (enter.plane < 0 || leave.plane < 0) return false;
           if (edge.misses(enter.plane, leave.plane)) continue;
-          if (!edge.certain(enter) || !edge.certain(leave)) return false;
-          common.from = cross(enter, true);
-          common.to = cross(leave, false);
         }
+        const auto cross = [&](Crossing crossing, bool enters, int& vertex) {
+          const double doubt = edge.doubt(crossing);
+          if (!edge.certain(crossing, doubt)) return false;
+          const int facet = crossing.plane + (is_first ? w_.first.facets : 0);
+          vertex = add_vertex(from + crossing.at * along, doubt, {-1, -1, {common.left, common.right, facet}});
+          meet(e, crossing.plane, vertex, enters, is_first);
+          return true;
+        };
+        if (!from_inside && !cross(enter, true, common.from)) return false;
+        if (!to_inside && !cross(leave, false, common.to)) return false;
       }
       w_.edges.push_back(common);
     }

@@ -13,13 +13,16 @@ enum class Signs { kCertain, kUncertain, kSeparated };
 /// Signed distances of the vertices of one body from the planes of the other.
 struct SignTable {
   int stride = 0;
-  std::vector<double> rows;         ///< by vertex
-  std::vector<double> nearest;      ///< per plane: the least of all vertices
-  std::vector<std::int8_t> inside;  ///< per vertex
+  std::vector<double> rows;            ///< by vertex
+  std::vector<std::uint64_t> outside;  ///< per vertex: bit j % 64 is set if it is outside of plane j
+  std::vector<std::int8_t> inside;     ///< per vertex
 
-  double* row(int vertex) { return rows.data() + static_cast<ptrdiff_t>(vertex) * stride; }
+  const double* row(int vertex) const { return rows.data() + static_cast<ptrdiff_t>(vertex) * stride; }
 
   Signs fill(const Solid& of, const Solid& by, double rounding);
+
+ private:
+  bool beyond_a_plane(double margin) const;
 };
 
 /// Two solids and what they have in common, whose facets are numbered as the first one's and then the second one's.
@@ -45,7 +48,6 @@ struct Meeting {
   friend class Tracer;
 
   SignTable first_signs, second_signs;
-  std::vector<double> ratio;
   std::vector<int> first_vertex, second_vertex;  ///< which common vertex a body's vertex is, or -1
   /// Per pair of facets: 1 + the vertex at which their common edge begins, minus that if it ends there.
   std::vector<int> open;
