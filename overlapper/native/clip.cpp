@@ -36,6 +36,31 @@ Vec3 centre(std::vector<Vec3>& vertices) {
   return middle;
 }
 
+/// Two vectors, the coordinates of both side by side.
+struct VecPair {
+  Pair x, y, z;
+};
+inline VecPair beside(Vec3 a, Vec3 b) { return {Pair{a.x, b.x}, Pair{a.y, b.y}, Pair{a.z, b.z}}; }
+inline VecPair operator+(const VecPair& a, const VecPair& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline VecPair operator-(const VecPair& a, const VecPair& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline VecPair operator/(const VecPair& a, double s) { return {a.x / s, a.y / s, a.z / s}; }
+inline VecPair operator*(Pair s, const VecPair& a) { return {s * a.x, s * a.y, s * a.z}; }
+inline Pair dot(const VecPair& a, const VecPair& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline VecPair cross(const VecPair& a, const VecPair& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline Pair norm2(const VecPair& a) { return dot(a, a); }
+inline Vec3 lane(const VecPair& a, int k) { return {a.x[k], a.y[k], a.z[k]}; }
+
+/// Calls `use(e, f, two)` for edges two by two; of an odd number the last one is alone, and `f` is the same.
+template <class Use>
+void for_each_two(std::span<const Edge> edges, Use use) {
+  for (size_t i = 0; i < edges.size(); i += 2) {
+    const bool two = i + 1 < edges.size();
+    use(edges[i], edges[two ? i + 1 : i], two);
+  }
+}
+
 /// Sums over the common polytope that a tracer has left, its vertices counted from a point inside.
 class Sums {
  public:
@@ -44,13 +69,12 @@ class Sums {
     const Vec3 per_size{1 / size.x, 1 / size.y, 1 / size.z};
     w_.apex.assign(w_.first.facets + w_.second.facets, -1);
     w_.cone.assign(w_.first.facets + w_.second.facets, 0);
-    w_.extent.clear();
-    for (Vec3 v : w_.vertices) w_.extent.push_back(dot(abs(v), per_size));
+    w_.extent.resize(w_.vertices.size());
+    std::ranges::transform(w_.vertices, w_.extent.begin(), [&](Vec3 v) { return dot(abs(v), per_size); });
     for (const auto* list : {&w_.edges, &w_.seam})
       for (const Edge& e : *list) w_.apex[e.left] = w_.apex[e.right] = e.from;
-    for (const auto* list : {&w_.edges, &w_.seam})
-      for (const Edge& e : *list) add(e);
-    for (const Edge& e : w_.seam) add_seam(e);
+    for (const auto* list : {&w_.edges, &w_.seam}) add(*list);
+    add_pulls(w_.seam);
     // Each product of three coordinates is rounded less than eight times, and then comes the sum of the tetrahedra, of
     // which none is negative.
     const double terms = 2 * static_cast<double>(w_.edges.size() + w_.seam.size());
@@ -64,23 +88,49 @@ class Sums {
   Vec3 moment() const { return turn_ - cross(centroid(), pull_); }
 
  private:
-  void add(const Edge& e) {
-    const Vec3 from = w_.vertices[e.from], to = w_.vertices[e.to], sum = from + to;
-    const int left_apex = w_.apex[e.left], right_apex = w_.apex[e.right];
-    const Vec3 area = cross(from, to), left = w_.vertices[left_apex], right = w_.vertices[right_apex];
-    // Tetrahedra from the origin over the edge and a corner of either facet; none is negative.
-    const double on_left = dot(left, area), on_right = -dot(right, area);
-    lost_ += (w_.extent[left_apex] + w_.extent[right_apex]) * w_.extent[e.from] * w_.extent[e.to];
-    w_.cone[e.left] += on_left;
-    w_.cone[e.right] += on_right;
-    six_volumes_ += on_left + on_right;
-    moment_ += on_left * (left + sum) + on_right * (right + sum);
+  /// Tetrahedra from the origin over each edge and a corner of either facet; none is negative. What two edges add is
+  /// computed at once, and added in their order.
+  void add(std::span<const Edge> edges) {
+    const Vec3* vertices = w_.vertices.data();
+    const double* extent = w_.extent.data();
+    const int* apex = w_.apex.data();
+    double* cone = w_.cone.data();
+    Vec3 moment = moment_;
+    double six_volumes = six_volumes_, lost = lost_;
+    for_each_two(edges, [&](const Edge& e, const Edge& f, bool two) {
+      const int left_e = apex[e.left], left_f = apex[f.left], right_e = apex[e.right], right_f = apex[f.right];
+      const VecPair from = beside(vertices[e.from], vertices[f.from]), to = beside(vertices[e.to], vertices[f.to]);
+      const VecPair left = beside(vertices[left_e], vertices[left_f]), sum = from + to, area = cross(from, to);
+      const VecPair right = beside(vertices[right_e], vertices[right_f]);
+      const Pair on_left = dot(left, area), on_right = -dot(right, area), on_both = on_left + on_right;
+      const Pair products = (Pair{extent[left_e], extent[left_f]} + Pair{extent[right_e], extent[right_f]}) *
+                            Pair{extent[e.from], extent[f.from]} * Pair{extent[e.to], extent[f.to]};
+      const VecPair moments = on_left * (left + sum) + on_right * (right + sum);
+      const auto add_lane = [&](const Edge& edge, int k) {
+        cone[edge.left] += on_left[k];
+        cone[edge.right] += on_right[k];
+        lost += products[k];
+        six_volumes += on_both[k];
+        moment += lane(moments, k);
+      };
+      add_lane(e, 0);
+      if (two) add_lane(f, 1);
+    });
+    moment_ = moment, six_volumes_ = six_volumes, lost_ = lost;
   }
 
-  void add_seam(const Edge& e) {
-    const Pull of_edge = pull_along_border(w_.vertices[e.from], w_.vertices[e.to]);
-    pull_ += of_edge.force;
-    turn_ += of_edge.moment;
+  void add_pulls(std::span<const Edge> seam) {
+    const Vec3* vertices = w_.vertices.data();
+    for_each_two(seam, [&](const Edge& e, const Edge& f, bool two) {
+      const PullOf<VecPair> pulls =
+          pull_along_border(beside(vertices[e.from], vertices[f.from]), beside(vertices[e.to], vertices[f.to]));
+      const auto add_lane = [&](int k) {
+        pull_ += lane(pulls.force, k);
+        turn_ += lane(pulls.moment, k);
+      };
+      add_lane(0);
+      if (two) add_lane(1);
+    });
   }
 
   Workspace& w_;

@@ -23,15 +23,18 @@ struct Clipped {
 };
 
 /// What the common volume changes by as a body moves.
-struct Pull {
-  Vec3 force;   ///< d volume / d translation: the area vector of the facets that the body owns
-  Vec3 moment;  ///< d volume / d rotation vector about the centroid
+template <class Vector>
+struct PullOf {
+  Vector force;   ///< d volume / d translation: the area vector of the facets that the body owns
+  Vector moment;  ///< d volume / d rotation vector about the centroid
 };
+using Pull = PullOf<Vec3>;
 
 /// What an edge adds to the pull of the patch that it borders on its left, about the origin: the area vector of a
 /// patch, and the integral of x × n over it, are integrals along its border (Stokes).
-inline Pull pull_along_border(Vec3 from, Vec3 to) {
-  return {cross(from, to) / 2, (norm2(from) + dot(from, to) + norm2(to)) / 6 * (from - to)};
+template <class Vector>
+inline PullOf<Vector> pull_along_border(const Vector& from, const Vector& to) {
+  return {cross(from, to) / 2.0, (norm2(from) + dot(from, to) + norm2(to)) / 6.0 * (from - to)};
 }
 
 struct ClippedPair : Clipped {
