@@ -19,7 +19,7 @@ struct Workspace : Meeting {
   std::vector<double> cone;       ///< per facet: six times the volume of the cone from the origin
   std::vector<double> extent;     ///< per vertex: the sum of its coordinates over their size
   std::vector<Vec3> area_vector;  ///< per facet: twice its
-  WideCorners wide;
+  std::vector<WideLanes> wide_planes;
 };
 
 Workspace& workspace() {
@@ -200,17 +200,15 @@ double area_by_corners(Workspace& w) {
 void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reach, double least_slack, Vec3 middle,
                      ClippedPair& common) {
   const Mat3 axes = thin_axes(w, middle);
-  w.wide.begin(a, b, w.first.facets, static_cast<int>(w.apex.size()), middle, reach);
-  for (int f = 0; f < static_cast<int>(w.apex.size()); ++f)
-    if (w.apex[f] >= 0 && !w.wide.add_plane(f)) return;
-  w.wide.place(w.corners, axes, w.vertices);
+  const std::optional<double> noise =
+      place_in_wide({a, b, w.first.facets, w.apex, w.corners, middle, reach}, axes, w.vertices, w.wide_planes);
+  if (!noise) return;
   Vec3 size;
   for (Vec3 v : w.vertices) size = max(size, abs(v));
   Sums sums(w, size);
   const double area = area_by_corners(w);
   // The axes are at right angles and of length 1 but for a few roundings.
-  const double error =
-      moved_volume(area, w.wide.noise(), least_slack) + sums.volume_rounding() + 16 * 0x1p-53 * sums.volume();
+  const double error = moved_volume(area, *noise, least_slack) + sums.volume_rounding() + 16 * 0x1p-53 * sums.volume();
   if (!(error <= kEnough * sums.volume())) return;
   common.measured = common.widened = true;
   common.volume = sums.volume();

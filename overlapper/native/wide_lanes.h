@@ -4,8 +4,9 @@
 
 namespace overlapper {
 
-/// Four doubles that are added and multiplied at once, by whatever the machine has.
-using Quad = double __attribute__((vector_size(32)));
+/// Four doubles that are added and multiplied at once, by whatever the machine has. Aligned as the widest of machines
+/// want it: functions compiled for those meet data of others.
+using Quad = double __attribute__((vector_size(32), aligned(32)));
 
 /// Four numbers in double-double.
 struct WideLanes {
@@ -27,21 +28,76 @@ struct Halves {
   T high, low;
 };
 
-/// Dekker's: without a fused multiply-add, which not every machine has.
-template <class T>
+/// By fused multiply-adds, or Dekker's way for machines that have none; the same bits, unless something underflows.
+template <bool fused, class T>
 WideLanes two_product(const Quad& a, const T& b) {
   const Quad product = a * b;
-  const Halves<Quad> p(a);
-  const Halves<T> q(b);
-  return {product, ((p.high * q.high - product) + p.high * q.low + p.low * q.high) + p.low * q.low};
+  if constexpr (fused) {
+    const Quad factor = b - Quad{};
+    Quad error{};
+    for (int i = 0; i < 4; ++i) error[i] = std::fma(a[i], factor[i], -product[i]);
+    return {product, error};
+  } else {
+    const Halves p(a);
+    const Halves q(b);
+    return {product, ((p.high * q.high - product) + p.high * q.low + p.low * q.high) + p.low * q.low};
+  }
+}
+
+inline WideLanes normalised(const Quad& head, const Quad& tail) {
+  const Quad sum = head + tail;
+  return {sum, tail - (sum - head)};
+}
+inline WideLanes operator+(const WideLanes& a, const WideLanes& b) {
+  const WideLanes high = two_sum(a.head, b.head), low = two_sum(a.tail, b.tail);
+  const WideLanes partial = normalised(high.head, high.tail + low.head);
+  return normalised(partial.head, partial.tail + low.tail);
+}
+inline WideLanes operator-(const WideLanes& a) { return {-a.head, -a.tail}; }
+inline WideLanes operator-(const WideLanes& a, const WideLanes& b) { return a + (-b); }
+template <bool fused>
+WideLanes product(const WideLanes& a, DoubleDouble b) {
+  const WideLanes product = two_product<fused>(a.head, b.head);
+  return normalised(product.head, product.tail + (a.head * b.tail + a.tail * b.head));
 }
 
 inline DoubleDouble lane(const WideLanes& v, int i) { return {v.head[i], v.tail[i]}; }
 inline WideVector vector(const WideLanes& v) { return {lane(v, 0), lane(v, 1), lane(v, 2)}; }
+inline WideLanes in_lanes(Vec3 v) { return {Quad{v.x, v.y, v.z}, Quad{}}; }
+inline WideLanes in_lanes(const WideVector& v, DoubleDouble last = {}) {
+  return {Quad{v.x.head, v.y.head, v.z.head, last.head}, Quad{v.x.tail, v.y.tail, v.z.tail, last.tail}};
+}
+
+/// Four vectors side by side, a coordinate of each in a lane, or the columns of a matrix.
+using WideColumns = std::array<WideLanes, 4>;
+
+inline WideColumns transposed(const WideLanes& a, const WideLanes& b, const WideLanes& c, const WideLanes& d = {}) {
+  const auto column = [&](int i) {
+    return WideLanes{Quad{a.head[i], b.head[i], c.head[i], d.head[i]},
+                     Quad{a.tail[i], b.tail[i], c.tail[i], d.tail[i]}};
+  };
+  return {column(0), column(1), column(2), column(3)};
+}
+
+inline const Quad& rounded(const Quad& a) { return a; }
+inline const Quad& rounded(const WideLanes& a) { return a.head; }
 
 /// A sum of products right to a few 2^-104 of the largest of them (Ogita, Rump and Oishi 2005, Dot2).
+template <bool fused>
 struct WideSum {
-  Quad head{}, tail{};
+  Quad head, tail;
+
+  explicit WideSum(const WideLanes& a) : head(a.head), tail(a.tail) {}
+  template <class A, class B>
+  WideSum(const A& a, B b) : WideSum(two_product<fused>(overlapper::rounded(a), overlapper::rounded(b))) {
+    add_tails(a, b);
+  }
+  /// x * column[0] + y * column[1] + z * column[2]
+  template <class Vector>
+  WideSum(const WideColumns& columns, const Vector& v) : WideSum(columns[0], v.x) {
+    add_product(columns[1], v.y);
+    add_product(columns[2], v.z);
+  }
 
   void add(const Quad& a) {
     const WideLanes sum = two_sum(head, a);
@@ -52,40 +108,22 @@ struct WideSum {
     add(a.head);
     tail += a.tail;
   }
-  void add_product(const Quad& a, double b) {
-    const WideLanes product = two_product(a, b);
-    add(product.head);
-    tail += product.tail;
-  }
-  void add_product(const WideLanes& a, double b) {
-    add_product(a.head, b);
-    tail += a.tail * b;
-  }
-  void add_product(const WideLanes& a, DoubleDouble b) {
-    add_product(a.head, b.head);
-    tail += a.tail * b.head + a.head * b.tail;
+  template <class A, class B>
+  void add_product(const A& a, B b) {
+    add(two_product<fused>(overlapper::rounded(a), overlapper::rounded(b)));
+    add_tails(a, b);
   }
 
   Vec3 rounded() const {
     const Quad sum = head + tail;
     return {sum[0], sum[1], sum[2]};
   }
-  WideLanes lanes() const {
-    const Quad sum = head + tail;
-    return {sum, tail - (sum - head)};
-  }
+  WideLanes lanes() const { return normalised(head, tail); }
+
+ private:
+  void add_tails(const Quad&, double) {}
+  void add_tails(const WideLanes& a, double b) { tail += a.tail * b; }
+  void add_tails(const WideLanes& a, DoubleDouble b) { tail += a.tail * b.head + a.head * b.tail; }
 };
-
-/// Three or four vectors side by side, a coordinate of each in a lane: x * column[0] + y * column[1] + z * column[2].
-using WideColumns = std::array<WideLanes, 3>;
-
-template <class Vector>
-WideLanes operator*(const WideColumns& m, const Vector& v) {
-  WideSum sum;
-  sum.add_product(m[0], v.x);
-  sum.add_product(m[1], v.y);
-  sum.add_product(m[2], v.z);
-  return sum.lanes();
-}
 
 }  // namespace overlapper
