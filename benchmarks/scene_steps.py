@@ -31,7 +31,7 @@ import numpy as np
 import pybullet as p
 import pybullet_data
 
-from overlapper import overlap
+from overlapper import Batch, overlap
 from overlapper.simulation import Bodies
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -87,6 +87,7 @@ class Steps:
         for _ in range(SETTLING):
             p.stepSimulation(self.client)
         self.bodies = Bodies(self.client)
+        self.batches = {kind: Batch(self.bodies.shapes) for kind in ("overlaps", "does not")}
         self.us: dict[str, list[float]] = {}
         self.counts: dict[str, int] = {}
 
@@ -119,12 +120,26 @@ class Steps:
         }
         for part, value in derived.items():
             self.us.setdefault(part, []).append(value)
+        self.take_kinds(pairs, found.pairs)
         self.counts = {
             "pairs examined": len(pairs),
             "pairs overlapping": int((found.volume > 0).sum()),
             "pairs widened": int(found.widened.sum()),
             "contact points": len(points),
         }
+
+    def take_kinds(self, pairs: np.ndarray, overlapping: np.ndarray) -> None:
+        """The geometry of a pair that overlaps, and of one that does not, the shapes being placed before."""
+        placed, number = self.bodies.placed, np.array([len(self.bodies.placed), 1])
+        poses = np.array([body.position for body in placed]), np.array([body.orientation for body in placed])
+        apart = pairs[~np.isin(pairs @ number, overlapping @ number)]
+        for kind, those in (("overlaps", overlapping), ("does not", apart)):
+            batch = self.batches[kind]
+            batch.candidate_pairs(*poses)
+            begin = time.process_time()
+            batch.overlaps(*poses, those)
+            if len(those):
+                self.us.setdefault(f"a pair that {kind}", []).append(1e6 * (time.process_time() - begin) / len(those))
 
     def check(self) -> None:
         """Raises ArithmeticError if a volume is not that of a call for its pair alone."""
@@ -269,6 +284,11 @@ def write_page(path: Path, folder: Path) -> Path:
         piles=f"{piles[0]:,} to {piles[-1]:,}",
         table="\n".join(lines),
         widened=f"{100 * us['pairs widened'][at] / us['pairs overlapping'][at]:.0f}",
+        overlapping=f"{us['pairs overlapping'][at]:,.0f}",
+        apart=f"{us['pairs examined'][at] - us['pairs overlapping'][at]:,.0f}",
+        a_pair=f"{us['a pair that overlaps'][at]:.2g} µs",
+        a_pair_apart=f"{us['a pair that does not'][at]:.2g} µs",
+        poses=f"{us['reading'][at] / us['getContactPoints'][at]:.2g}",
         against_contacts=f"{us['ours'][at] / us['getContactPoints'][at]:.2g}",
         against_step=f"{us['ours'][at] / us['stepSimulation'][at]:.2g}",
     )
