@@ -12,7 +12,6 @@
 #include "minkowski.h"
 #include "parallel.h"
 #include "planes_asked.h"
-#include "solid.h"
 
 namespace overlapper {
 namespace {
@@ -100,7 +99,7 @@ bool apart(const Body& a, const Body& b, Vec3& axis) {
 bool axis_soon_found(const Body& a, const Body& b) {
   const Shape &p = a.placed.shape, &q = b.placed.shape;
   const bool hulls = std::holds_alternative<Hull>(p) || std::holds_alternative<Hull>(q);
-  return !(hulls && bounded(p) && bounded(q) && clippable(p) && clippable(q));
+  return !hulls || !bounded(p) || !bounded(q) || smooth(p) || smooth(q);
 }
 
 /// The reach of a shape, and of the numbers that describe it, from its own origin.
