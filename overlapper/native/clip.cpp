@@ -28,7 +28,7 @@ Workspace& workspace() {
 }
 
 /// Counts coordinates from the middle of the vertices, which it returns.
-Vec3 centre(std::vector<Vec3>& vertices) {
+Vec3 centre(std::span<Vec3> vertices) {
   Vec3 middle;
   for (Vec3 v : vertices) middle += v;
   middle = middle / static_cast<double>(vertices.size());

@@ -40,10 +40,11 @@ struct EdgeSigns {
   const double *from, *to;
   std::uint64_t from_outside, to_outside;  ///< as in SignTable
   int stride;
-  double length, rounding;
+  double rounding;
 
-  /// How far off the point may be where the edge crosses a plane: the rounding of two signs as seen along the edge.
-  double doubt(Crossing crossing) const {
+  /// How far off the point may be where an edge of that length crosses a plane: the rounding of two signs as seen along
+  /// the edge.
+  double doubt(Crossing crossing, double length) const {
     return 2 * rounding * (1 + length / std::abs(to[crossing.plane] - from[crossing.plane]));
   }
 
@@ -164,11 +165,13 @@ class Tracer {
     if (other == Signs::kSeparated) return other;
     if (one == Signs::kUncertain || other == Signs::kUncertain) return Signs::kUncertain;
 
-    w_.vertices.clear();
-    w_.corners.clear();
-    w_.doubt.clear();
-    w_.edges.clear();
-    w_.seam.clear();
+    const size_t most_edges = w_.first.edges.size() + w_.second.edges.size();
+    const size_t most_vertices = w_.first.vertices + w_.second.vertices + 2 * most_edges;
+    w_.vertices.begin_with_room(most_vertices);
+    w_.corners.begin_with_room(most_vertices);
+    w_.doubt.begin_with_room(most_vertices);
+    w_.edges.begin_with_room(most_edges);
+    w_.seam.begin_with_room(2 * most_edges);
     w_.unpaired = 0;
     w_.open.resize(static_cast<size_t>(w_.first.facets) * w_.second.facets, 0);
     const bool certain = trace(w_.first, w_.first_signs, w_.first_vertex, true) &&
@@ -192,19 +195,18 @@ class Tracer {
     common_vertex.assign(body.vertices, -1);
     for (int i = 0; i < body.vertices; ++i)
       if (signs.inside[i]) common_vertex[i] = add_vertex(body.vertex(i), body.doubt[i], {is_first ? 0 : 1, i, {}});
-    const int offset = is_first ? 0 : w_.first.facets;
+    const int offset = is_first ? 0 : w_.first.facets, other_offset = w_.first.facets - offset;
+    const double* rows = signs.rows.data();
+    const std::uint64_t* outside = signs.outside.data();
+    const double* doubts = body.doubt.data();
+    const ptrdiff_t stride = signs.stride;
     for (const Edge& e : body.edges) {
       Edge common{common_vertex[e.from], common_vertex[e.to], e.left + offset, e.right + offset};
       const bool from_inside = common.from >= 0, to_inside = common.to >= 0;
       if (!(from_inside && to_inside)) {
-        const Vec3 from = body.vertex(e.from), along = body.vertex(e.to) - from;
-        const EdgeSigns edge{signs.row(e.from),
-                             signs.row(e.to),
-                             signs.outside[e.from],
-                             signs.outside[e.to],
-                             signs.stride,
-                             std::abs(along.x) + std::abs(along.y) + std::abs(along.z),
-                             rounding_ + std::max(body.doubt[e.from], body.doubt[e.to])};
+        const EdgeSigns edge{rows + e.from * stride, rows + e.to * stride,
+                             outside[e.from],        outside[e.to],
+                             signs.stride,           rounding_ + std::max(doubts[e.from], doubts[e.to])};
         Crossing enter, leave;
         if (from_inside) {
           leave = edge.exit(true);
@@ -216,11 +218,13 @@ class Tracer {
           if (enter.plane < 0 || leave.plane < 0) return false;
           if (edge.misses(enter.plane, leave.plane)) continue;
         }
+        const Vec3 from = body.vertex(e.from), along = body.vertex(e.to) - from;
+        const double length = std::abs(along.x) + std::abs(along.y) + std::abs(along.z);
         const auto cross = [&](Crossing crossing, bool enters, int& vertex) {
-          const double doubt = edge.doubt(crossing);
+          const double doubt = edge.doubt(crossing, length);
           if (!edge.certain(crossing, doubt)) return false;
-          const int facet = crossing.plane + (is_first ? w_.first.facets : 0);
-          vertex = add_vertex(from + crossing.at * along, doubt, {-1, -1, {common.left, common.right, facet}});
+          vertex = add_vertex(from + crossing.at * along, doubt,
+                              {-1, -1, {common.left, common.right, crossing.plane + other_offset}});
           meet(e, crossing.plane, vertex, enters, is_first);
           return true;
         };
@@ -275,7 +279,7 @@ void Meeting::take_common(double beyond) {
     for (const Edge& e : *list) next.own_edges.push_back({e.from, e.to, number(e.left), number(e.right)});
   next.resize(static_cast<int>(vertices.size()), kept, beyond);
   for (int i = 0; i < next.vertices; ++i) next.set_vertex(i, vertices[i]);
-  next.doubt = doubt;
+  next.doubt.assign(doubt.begin(), doubt.end());
   for (int f = 0; f < first.facets + second.facets; ++f) {
     const int n = facet_number[f];
     if (n < 0) continue;
@@ -290,10 +294,11 @@ void Meeting::take_common(double beyond) {
 }
 
 void Meeting::show_first() {
-  vertices.clear();
+  vertices.begin_with_room(first.vertices);
   for (int i = 0; i < first.vertices; ++i) vertices.push_back(first.vertex(i));
-  edges.assign(first.edges.begin(), first.edges.end());
-  seam.clear();
+  edges.begin_with_room(first.edges.size());
+  for (const Edge& e : first.edges) edges.push_back(e);
+  seam.begin_with_room(0);
   second.facets = 0;
 }
 

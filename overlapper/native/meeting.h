@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cassert>
 #include <cstdint>
 #include <vector>
 
@@ -25,14 +26,45 @@ struct SignTable {
   bool beyond_a_plane(double margin) const;
 };
 
+/// A list that is begun with room for all that may come: adding to it calls nothing, for which the numbers that a loop
+/// works with would have to leave their registers.
+template <class T>
+class RoomyList {
+ public:
+  RoomyList() = default;
+  RoomyList(const RoomyList&) = delete;
+
+  void begin_with_room(size_t most) {
+    if (places_.size() < most) places_.resize(most);
+    end_ = places_.data();
+  }
+  void push_back(const T& value) {
+    assert(size() < places_.size());
+    *end_++ = value;
+  }
+
+  size_t size() const { return end_ - places_.data(); }
+  bool empty() const { return size() == 0; }
+  T* data() { return places_.data(); }
+  T* begin() { return places_.data(); }
+  T* end() { return end_; }
+  const T* begin() const { return places_.data(); }
+  const T* end() const { return end_; }
+  const T& operator[](size_t i) const { return places_[i]; }
+
+ private:
+  std::vector<T> places_;
+  T* end_ = nullptr;
+};
+
 /// Two solids and what they have in common, whose facets are numbered as the first one's and then the second one's.
 struct Meeting {
   Solid first, second;
-  std::vector<Vec3> vertices;   ///< of the common polytope
-  std::vector<Corner> corners;  ///< parallel to them
-  std::vector<double> doubt;    ///< parallel to them: see Solid
-  std::vector<Edge> edges;      ///< of the common polytope
-  std::vector<Edge> seam;       ///< its edges between the first body's facets, on the left, and the second's
+  RoomyList<Vec3> vertices;   ///< of the common polytope
+  RoomyList<Corner> corners;  ///< parallel to them
+  RoomyList<double> doubt;    ///< parallel to them: see Solid
+  RoomyList<Edge> edges;      ///< of the common polytope
+  RoomyList<Edge> seam;       ///< its edges between the first body's facets, on the left, and the second's
 
   /// Finds the common polytope; what is not certain or separated has none.
   Signs trace(double rounding);
