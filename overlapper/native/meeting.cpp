@@ -10,14 +10,17 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-inline void store(double* p, Pair v) { std::memcpy(p, &v, sizeof v); }
-inline Pair both(double x) { return Pair{x, x}; }
-inline Pair larger(Pair a, Pair b) { return a > b ? a : b; }
-inline double larger(Pair a) { return a[0] > a[1] ? a[0] : a[1]; }
-
-/// A bit for each of two planes.
-using PairBits = std::uint64_t __attribute__((vector_size(16)));
-inline PairBits positive(Pair a) { return std::bit_cast<PairBits>(a > both(0)); }
+/// Two or four planes are worked on at once, by whatever the machine has.
+template <class Lanes>
+constexpr int kLanes = sizeof(Lanes) / sizeof(double);
+template <class Lanes>
+inline void load(const double* p, Lanes& v) {
+  std::memcpy(&v, p, sizeof v);
+}
+template <class Lanes>
+inline void store(double* p, const Lanes& v) {
+  std::memcpy(p, &v, sizeof v);
+}
 
 /// Calls `use(plane)`, from the first to the last, for planes whose bit j % 64 is set.
 template <class Use>
@@ -49,14 +52,18 @@ struct EdgeSigns {
   }
 
   /// True if the point where the edge crosses a plane, with that doubt, is certainly inside all others.
+  template <class Lanes>
   bool certain(Crossing crossing, double doubt) const {
-    const int g = crossing.plane, pair = g & ~1, partner = g ^ 1;
-    const Pair at = both(crossing.at);
-    const auto height = [&](int j) { return load(from + j) + at * (load(to + j) - load(from + j)); };
-    Pair highest = both(from[partner] + crossing.at * (to[partner] - from[partner]));
-    for (int j = 0; j < pair; j += 2) highest = larger(highest, height(j));
-    for (int j = pair + 2; j < stride; j += 2) highest = larger(highest, height(j));
-    return larger(highest) < -doubt;
+    decltype(Lanes{} > Lanes{}) hidden{};  // per lane, how many planes it may be outside of
+    for (int j = 0; j < stride; j += kLanes<Lanes>) {
+      Lanes begin, end;
+      load(from + j, begin);
+      load(to + j, end);
+      hidden -= begin + crossing.at * (end - begin) >= -doubt;
+    }
+    auto planes = hidden[0];
+    for (int k = 1; k < kLanes<Lanes>; ++k) planes += hidden[k];
+    return planes == 1;  // The crossed one is among them: rounding alone has moved the point off that.
   }
 
   Crossing at_plane(int g) const { return {g, from[g] / (from[g] - to[g])}; }
@@ -104,6 +111,7 @@ struct EdgeSigns {
 
 }  // namespace
 
+template <class Lanes>
 Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
   stride = by.stride;
   rows.resize(static_cast<size_t>(of.vertices) * stride);
@@ -117,21 +125,31 @@ Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
   bool uncertain = false;
   double most_doubt = 0;
   for (ptrdiff_t i = 0; i < vertices; ++i, signs += planes) {
-    const Pair x = both(vx[i]), y = both(vy[i]), z = both(vz[i]);
-    Pair farthest = both(-kInfinity);
-    PairBits marked{};
+    const Lanes x = vx[i] - Lanes{}, y = vy[i] - Lanes{}, z = vz[i] - Lanes{};
+    Lanes farthest = -kInfinity - Lanes{};
+    decltype(x > y) marked{};
     for (ptrdiff_t first = 0; first < planes; first += 64) {
-      PairBits bit{1, 2};
+      decltype(x > y) bit{};
+      for (int k = 0; k < kLanes<Lanes>; ++k) bit[k] = 1 << k;
       const ptrdiff_t end = std::min(first + 64, planes);
-      for (ptrdiff_t j = first; j < end; j += 2, bit <<= 2) {
-        const Pair s = load(nx + j) * x + load(ny + j) * y + load(nz + j) * z - load(offset + j);
+      for (ptrdiff_t j = first; j < end; j += kLanes<Lanes>, bit <<= kLanes<Lanes>) {
+        Lanes normal_x, normal_y, normal_z, height;
+        load(nx + j, normal_x);
+        load(ny + j, normal_y);
+        load(nz + j, normal_z);
+        load(offset + j, height);
+        const Lanes s = normal_x * x + normal_y * y + normal_z * z - height;
         store(signs + j, s);
-        farthest = larger(farthest, s);
-        marked |= positive(s) & bit;
+        farthest = farthest > s ? farthest : s;
+        marked |= (s > 0.0) & bit;
       }
     }
-    const double s = larger(farthest);
-    outside[i] = marked[0] | marked[1];
+    double s = farthest[0];
+    outside[i] = static_cast<std::uint64_t>(marked[0]);
+    for (int k = 1; k < kLanes<Lanes>; ++k) {
+      s = std::max(s, farthest[k]);
+      outside[i] |= static_cast<std::uint64_t>(marked[k]);
+    }
     inside[i] = s < 0;
     uncertain |= std::abs(s) <= rounding + doubt[i];
     most_doubt = std::max(most_doubt, doubt[i]);
@@ -154,14 +172,15 @@ bool SignTable::beyond_a_plane(double margin) const {
 }
 
 /// Finds the common polytope of a meeting whose solids are in place.
+template <class Lanes>
 class Tracer {
  public:
   Tracer(Meeting& meeting, double rounding) : w_(meeting), rounding_(rounding) {}
 
   Signs trace() {
-    const Signs one = w_.first_signs.fill(w_.first, w_.second, rounding_);
+    const Signs one = w_.first_signs.template fill<Lanes>(w_.first, w_.second, rounding_);
     if (one == Signs::kSeparated) return one;
-    const Signs other = w_.second_signs.fill(w_.second, w_.first, rounding_);
+    const Signs other = w_.second_signs.template fill<Lanes>(w_.second, w_.first, rounding_);
     if (other == Signs::kSeparated) return other;
     if (one == Signs::kUncertain || other == Signs::kUncertain) return Signs::kUncertain;
 
@@ -222,7 +241,7 @@ class Tracer {
         const double length = std::abs(along.x) + std::abs(along.y) + std::abs(along.z);
         const auto cross = [&](Crossing crossing, bool enters, int& vertex) {
           const double doubt = edge.doubt(crossing, length);
-          if (!edge.certain(crossing, doubt)) return false;
+          if (!edge.template certain<Lanes>(crossing, doubt)) return false;
           vertex = add_vertex(from + crossing.at * along, doubt,
                               {-1, -1, {common.left, common.right, crossing.plane + other_offset}});
           meet(e, crossing.plane, vertex, enters, is_first);
@@ -266,7 +285,33 @@ class Tracer {
   double rounding_;
 };
 
-Signs Meeting::trace(double rounding) { return Tracer(*this, rounding).trace(); }
+namespace {
+
+using Way = Signs(Meeting&, double rounding);
+
+template <class Lanes>
+Signs trace_by(Meeting& meeting, double rounding) {
+  return Tracer<Lanes>(meeting, rounding).trace();
+}
+
+#if defined(__AVX2__)
+Way* fastest_way() { return trace_by<Quad>; }
+#elif defined(__x86_64__)
+/// With all that it calls, for machines that have more than the rest is compiled for.
+__attribute__((target("avx2"), flatten)) Signs trace_by_avx2(Meeting& meeting, double rounding) {
+  return trace_by<Quad>(meeting, rounding);
+}
+Way* fastest_way() { return __builtin_cpu_supports("avx2") ? trace_by_avx2 : trace_by<Pair>; }
+#else
+Way* fastest_way() { return trace_by<Pair>; }
+#endif
+
+}  // namespace
+
+Signs Meeting::trace(double rounding) {
+  static Way* const way = fastest_way();
+  return way(*this, rounding);
+}
 
 void Meeting::take_common(double beyond) {
   facet_number.assign(first.facets + second.facets, -1);

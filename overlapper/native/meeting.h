@@ -20,6 +20,7 @@ struct SignTable {
 
   const double* row(int vertex) const { return rows.data() + static_cast<ptrdiff_t>(vertex) * stride; }
 
+  template <class Lanes>
   Signs fill(const Solid& of, const Solid& by, double rounding);
 
  private:
@@ -77,6 +78,7 @@ struct Meeting {
   void show_first();
 
  private:
+  template <class Lanes>
   friend class Tracer;
 
   SignTable first_signs, second_signs;
