@@ -117,3 +117,11 @@ def test_what_it_calls_apart_and_is_not_is_no_distance_away():
     corners += [(3.0000000000000004, 2.9999999999999996, 0.25), (-2.0000000000000004, -2, -0.25)]
     hull = Placed(corners, (-3.7071067813029619, -3.7071067813029619, -0.75))
     assert overlap(capsule, hull, tolerance=0.1, method="paper").distance == 0
+
+
+def test_what_it_calls_apart_and_touches_has_a_normal():
+    cylinder = Placed(Cylinder(0.020492852902879832, 0.5), (0.5, 0.5, 0.5), (0.5, 0.5, 0.5, 0.5))
+    box = Placed(Box([0.5, 0.5, 0.5]), (0.5, 0.5, 1.0204928529028798))
+    answer = overlap(cylinder, box, tolerance=0.0125, method="paper")
+    assert answer.status == "separated" and overlap(cylinder, box).status == "touching"
+    assert answer.normal == pytest.approx([0, 0, -1], abs=1e-9)

@@ -451,8 +451,9 @@ Overlap::Contact Overlap::in_contact() const {
     const double size = reach();
     if (!(d.gap > doubt(size)) && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(size);
     contact.normal = d.normal;
-    // Where the bodies touch, the line between the witness points may be all rounding; the way out is not.
-    if (status_ == Status::kTouching && !(d.gap > 0))
+    // Where the bodies touch, which method "paper" may call apart, the line between the witness points may be all
+    // rounding; the way out is not.
+    if ((status_ == Status::kTouching || method_ == Method::kPaper) && !(d.gap > 0))
       contact.normal = parting({overlapper::penetration(a, b).normal}).normal;
     // Method "paper" may call apart what is not.
     contact.distance = status_ == Status::kSeparated ? std::max(0.0, d.distance) : 0;
