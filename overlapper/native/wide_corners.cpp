@@ -40,6 +40,12 @@ WideColumns rotation_columns(Quaternion q) {
           column(lane(plus, 2), lane(minus, 1), lane(diagonal, 1))};
 }
 
+/// The first three lanes moved on by one and by two.
+struct Turned {
+  explicit Turned(const Quad& a) : yzx{a[1], a[2], a[0], a[3]}, zxy{a[2], a[0], a[1], a[3]} {}
+  Quad yzx, zxy;
+};
+
 /// The arithmetic of one pair, with fused multiply-adds or without.
 template <bool fused>
 class WideCorners {
@@ -82,11 +88,11 @@ class WideCorners {
     for (size_t i = 0; i < vertices.size(); ++i) {
       const Corner& c = common_.corners[i];
       const Vec3 vertex = vertices[i];
-      const Vec3 beside = c.vertex < 0 ? beside_planes(c.facets, vertex) : beside_vertex(c, vertex);
+      const WideLanes way = c.vertex < 0 ? beside_planes(c.facets, vertex) : beside_vertex(c, vertex);
       WideSum<fused> along(x, vertex.x);
       along.add_product(y, vertex.y);
       along.add_product(z, vertex.z);
-      along.tail += x * beside.x + y * beside.y + z * beside.z;
+      along.tail += x * way.head[0] + y * way.head[1] + z * way.head[2];
       vertices[i] = along.rounded();
     }
   }
@@ -139,36 +145,37 @@ class WideCorners {
   }
 
   /// From a vertex that doubles have placed to where the three planes meet.
-  Vec3 beside_planes(const std::array<int, 3>& facets, Vec3 vertex) {
+  WideLanes beside_planes(const std::array<int, 3>& facets, Vec3 vertex) {
     const WideLanes &p = planes_[facets[0]], &q = planes_[facets[1]], &r = planes_[facets[2]];
     const WideColumns planes = transposed(p, q, r);
     WideSum<fused> heights(planes, vertex);
     heights.add(planes[3]);
     const Vec3 height = heights.rounded();
-    const auto normal = [](const WideLanes& plane) { return Vec3{plane.head[0], plane.head[1], plane.head[2]}; };
-    const Vec3 normal_p = normal(p), normal_q = normal(q), normal_r = normal(r);
-    const Vec3 qr = cross(normal_q, normal_r), rp = cross(normal_r, normal_p), pq = cross(normal_p, normal_q);
-    const double volume = dot(normal_p, qr);
+    const Turned next_p(p.head), next_q(q.head), next_r(r.head);
+    const Quad qr = next_q.yzx * next_r.zxy - next_q.zxy * next_r.yzx;
+    const Quad rp = next_r.yzx * next_p.zxy - next_r.zxy * next_p.yzx;
+    const Quad pq = next_p.yzx * next_q.zxy - next_p.zxy * next_q.yzx;
+    const Quad products = p.head * qr;
+    const double volume = products[0] + products[1] + products[2];
     // The sum is off by what the heights are and by the roundings of its own terms.
     const double largest = max_component(abs(height));
     noise_ = std::max(noise_, 4 * (lost_ + 0x1p-50 * largest / std::abs(volume)) / std::abs(volume));
-    return (height.x * qr + height.y * rp + height.z * pq) / -volume;
+    return {(height.x * qr + height.y * rp + height.z * pq) / -volume, Quad{}};
   }
 
   /// From a vertex that doubles have placed to the body's own.
-  Vec3 beside_vertex(const Corner& corner, Vec3 vertex) const {
+  WideLanes beside_vertex(const Corner& corner, Vec3 vertex) const {
     const Shape& shape = corner.body == 0 ? common_.a.shape : common_.b.shape;
     const Box* box = std::get_if<Box>(&shape);
     const Vec3 local =
         box ? overlapper::corner(*box, corner.vertex) : std::get<Hull>(shape).data->vertices[corner.vertex];
-    if (corner.body == 0) {
-      const WideVector exactly = wide_difference(local, common_.origin);
-      return rounded(exactly - wide(vertex));
-    }
+    const Vec3 origin = common_.origin;
+    if (corner.body == 0)
+      return two_sum(Quad{local.x, local.y, local.z}, Quad{-origin.x, -origin.y, -origin.z}) - in_lanes(vertex);
     WideSum<fused> sum(columns_, local);
     sum.add(translation_);
     sum.add(Quad{-vertex.x, -vertex.y, -vertex.z});
-    return sum.rounded();
+    return sum.lanes();
   }
 
   const CommonCorners& common_;

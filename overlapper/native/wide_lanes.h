@@ -1,5 +1,9 @@
 #pragma once
 
+#ifdef __x86_64__
+#include <immintrin.h>
+#endif
+
 #include "wide.h"
 
 namespace overlapper {
@@ -8,9 +12,19 @@ namespace overlapper {
 /// want it: functions compiled for those meet data of others.
 using Quad = double __attribute__((vector_size(32), aligned(32)));
 
-/// Four numbers in double-double.
+/// Four numbers in double-double. Copied quad by quad: left to itself, the compiler copies smaller pieces, and the quad
+/// that is loaded next waits for all of them.
 struct WideLanes {
-  Quad head{}, tail{};
+  constexpr WideLanes() : head{}, tail{} {}
+  constexpr WideLanes(const Quad& heads, const Quad& tails) : head(heads), tail(tails) {}
+  constexpr WideLanes(const WideLanes& other) : head(other.head), tail(other.tail) {}
+  WideLanes& operator=(const WideLanes& other) {
+    head = other.head;
+    tail = other.tail;
+    return *this;
+  }
+
+  Quad head, tail;
 };
 
 inline WideLanes two_sum(const Quad& a, const Quad& b) {
@@ -28,16 +42,27 @@ struct Halves {
   T high, low;
 };
 
+#ifdef __x86_64__
+__attribute__((target("avx2,fma"))) inline WideLanes fused_product(const Quad& a, const Quad& b) {
+  const Quad product = a * b;
+  return {product, _mm256_fmsub_pd(a, b, product)};
+}
+#else
+inline WideLanes fused_product(const Quad& a, const Quad& b) {
+  WideLanes product{a * b};
+  for (int i = 0; i < 4; ++i) product.tail[i] = std::fma(a[i], b[i], -product.head[i]);
+  return product;
+}
+#endif
+
 /// By fused multiply-adds, or Dekker's way for machines that have none; the same bits, unless something underflows.
 template <bool fused, class T>
 WideLanes two_product(const Quad& a, const T& b) {
-  const Quad product = a * b;
   if constexpr (fused) {
     const Quad factor = b - Quad{};
-    Quad error{};
-    for (int i = 0; i < 4; ++i) error[i] = std::fma(a[i], factor[i], -product[i]);
-    return {product, error};
+    return fused_product(a, factor);
   } else {
+    const Quad product = a * b;
     const Halves p(a);
     const Halves q(b);
     return {product, ((p.high * q.high - product) + p.high * q.low + p.low * q.high) + p.low * q.low};
@@ -71,12 +96,20 @@ inline WideLanes in_lanes(const WideVector& v, DoubleDouble last = {}) {
 /// Four vectors side by side, a coordinate of each in a lane, or the columns of a matrix.
 using WideColumns = std::array<WideLanes, 4>;
 
+/// Of a 4 × 4 matrix, in two steps that are an instruction or two each.
+inline void transpose(Quad& a, Quad& b, Quad& c, Quad& d) {
+  const Quad ab02{a[0], b[0], a[2], b[2]}, ab13{a[1], b[1], a[3], b[3]};
+  const Quad cd02{c[0], d[0], c[2], d[2]}, cd13{c[1], d[1], c[3], d[3]};
+  a = Quad{ab02[0], ab02[1], cd02[0], cd02[1]};
+  b = Quad{ab13[0], ab13[1], cd13[0], cd13[1]};
+  c = Quad{ab02[2], ab02[3], cd02[2], cd02[3]};
+  d = Quad{ab13[2], ab13[3], cd13[2], cd13[3]};
+}
 inline WideColumns transposed(const WideLanes& a, const WideLanes& b, const WideLanes& c, const WideLanes& d = {}) {
-  const auto column = [&](int i) {
-    return WideLanes{Quad{a.head[i], b.head[i], c.head[i], d.head[i]},
-                     Quad{a.tail[i], b.tail[i], c.tail[i], d.tail[i]}};
-  };
-  return {column(0), column(1), column(2), column(3)};
+  WideColumns m{a, b, c, d};
+  transpose(m[0].head, m[1].head, m[2].head, m[3].head);
+  transpose(m[0].tail, m[1].tail, m[2].tail, m[3].tail);
+  return m;
 }
 
 inline const Quad& rounded(const Quad& a) { return a; }
