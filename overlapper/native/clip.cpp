@@ -74,7 +74,6 @@ class Sums {
     for (const auto* list : {&w_.edges, &w_.seam})
       for (const Edge& e : *list) w_.apex[e.left] = w_.apex[e.right] = e.from;
     for (const auto* list : {&w_.edges, &w_.seam}) add(*list);
-    add_pulls(w_.seam);
     // Each product of three coordinates is rounded less than eight times, and then comes the sum of the tetrahedra, of
     // which none is negative.
     const double terms = 2 * static_cast<double>(w_.edges.size() + w_.seam.size());
@@ -84,8 +83,23 @@ class Sums {
   double volume() const { return six_volumes_ / 6; }
   double volume_rounding() const { return rounding_; }
   Vec3 centroid() const { return moment_ / (4 * six_volumes_); }
-  Vec3 pull() const { return pull_; }
-  Vec3 moment() const { return turn_ - cross(centroid(), pull_); }
+
+  /// On the first body, from the seam.
+  Pull pull() const {
+    const Vec3* vertices = w_.vertices.data();
+    Pull pull{};
+    for_each_two(w_.seam, [&](const Edge& e, const Edge& f, bool two) {
+      const PullOf<VecPair> pulls =
+          pull_along_border(beside(vertices[e.from], vertices[f.from]), beside(vertices[e.to], vertices[f.to]));
+      const auto add_lane = [&](int k) {
+        pull.force += lane(pulls.force, k);
+        pull.moment += lane(pulls.moment, k);
+      };
+      add_lane(0);
+      if (two) add_lane(1);
+    });
+    return {pull.force, pull.moment - cross(centroid(), pull.force)};
+  }
 
  private:
   /// Tetrahedra from the origin over each edge and a corner of either facet; none is negative. What two edges add is
@@ -119,22 +133,8 @@ class Sums {
     moment_ = moment, six_volumes_ = six_volumes, lost_ = lost;
   }
 
-  void add_pulls(std::span<const Edge> seam) {
-    const Vec3* vertices = w_.vertices.data();
-    for_each_two(seam, [&](const Edge& e, const Edge& f, bool two) {
-      const PullOf<VecPair> pulls =
-          pull_along_border(beside(vertices[e.from], vertices[f.from]), beside(vertices[e.to], vertices[f.to]));
-      const auto add_lane = [&](int k) {
-        pull_ += lane(pulls.force, k);
-        turn_ += lane(pulls.moment, k);
-      };
-      add_lane(0);
-      if (two) add_lane(1);
-    });
-  }
-
   Workspace& w_;
-  Vec3 moment_, pull_, turn_;
+  Vec3 moment_;
   double six_volumes_ = 0;
   double lost_ = 0;  ///< the products that the volume is summed from, were none of their terms to cancel
   double rounding_ = 0;
@@ -215,8 +215,9 @@ void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reac
   common.volume_error = error;
   common.area = area;
   common.centroid = middle + apply_transposed(axes, sums.centroid());
-  common.pull = apply_transposed(axes, sums.pull());
-  common.moment = apply_transposed(axes, sums.moment());
+  const Pull pull = sums.pull();
+  common.pull = apply_transposed(axes, pull.force);
+  common.moment = apply_transposed(axes, pull.moment);
 }
 
 /// What sums in doubles say, about `middle`. Nothing if a plane passes that nearer than `least_slack`, which becomes
@@ -288,8 +289,13 @@ std::optional<ClippedPair> clip_by_table(const Placed& a, const Placed& b) {
   double least_slack = 4 * sign_rounding;  // rounding might hide what is thinner
   const std::optional<Clipped> measures = measure(w, sums, middle, rounding(reach) + flat, least_slack);
   if (!measures) return std::nullopt;
-  ClippedPair common{*measures, sums.pull(), sums.moment()};
-  if (!common.measured) measure_widened(w, a, b, reach, least_slack, middle, common);
+  ClippedPair common{*measures, {}, {}};
+  if (common.measured) {
+    const Pull pull = sums.pull();
+    common.pull = pull.force, common.moment = pull.moment;
+  } else {
+    measure_widened(w, a, b, reach, least_slack, middle, common);
+  }
   return common;
 }
 
