@@ -17,10 +17,6 @@ template <class Lanes>
 inline void load(const double* p, Lanes& v) {
   std::memcpy(&v, p, sizeof v);
 }
-template <class Lanes>
-inline void store(double* p, const Lanes& v) {
-  std::memcpy(p, &v, sizeof v);
-}
 
 /// Calls `use(plane)`, from the first to the last, for planes whose bit j % 64 is set.
 template <class Use>
@@ -116,12 +112,13 @@ Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
   stride = by.stride;
   rows.resize(static_cast<size_t>(of.vertices) * stride);
   outside.resize(of.vertices);
-  inside.resize(of.vertices);
   // Taken once: for all that a compiler knows, a sign that is stored might move them.
   const double *nx = by.nx.data(), *ny = by.ny.data(), *nz = by.nz.data(), *offset = by.offset.data();
   const double *vx = of.x.data(), *vy = of.y.data(), *vz = of.z.data(), *doubt = of.doubt.data();
   double* signs = rows.data();
   const ptrdiff_t vertices = of.vertices, planes = stride;
+  decltype(Lanes{} > Lanes{}) first_bits{};
+  for (int k = 0; k < kLanes<Lanes>; ++k) first_bits[k] = 1 << k;
   bool uncertain = false;
   double most_doubt = 0;
   for (ptrdiff_t i = 0; i < vertices; ++i, signs += planes) {
@@ -129,8 +126,7 @@ Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
     Lanes farthest = -kInfinity - Lanes{};
     decltype(x > y) marked{};
     for (ptrdiff_t first = 0; first < planes; first += 64) {
-      decltype(x > y) bit{};
-      for (int k = 0; k < kLanes<Lanes>; ++k) bit[k] = 1 << k;
+      auto bit = first_bits;
       const ptrdiff_t end = std::min(first + 64, planes);
       for (ptrdiff_t j = first; j < end; j += kLanes<Lanes>, bit <<= kLanes<Lanes>) {
         Lanes normal_x, normal_y, normal_z, height;
@@ -150,7 +146,6 @@ Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
       s = std::max(s, farthest[k]);
       outside[i] |= static_cast<std::uint64_t>(marked[k]);
     }
-    inside[i] = s < 0;
     uncertain |= std::abs(s) <= rounding + doubt[i];
     most_doubt = std::max(most_doubt, doubt[i]);
   }
@@ -213,7 +208,8 @@ class Tracer {
   bool trace(const Solid& body, const SignTable& signs, std::vector<int>& common_vertex, bool is_first) {
     common_vertex.assign(body.vertices, -1);
     for (int i = 0; i < body.vertices; ++i)
-      if (signs.inside[i]) common_vertex[i] = add_vertex(body.vertex(i), body.doubt[i], {is_first ? 0 : 1, i, {}});
+      if (signs.outside[i] == 0)
+        common_vertex[i] = add_vertex(body.vertex(i), body.doubt[i], {is_first ? 0 : 1, i, {}});
     const int offset = is_first ? 0 : w_.first.facets, other_offset = w_.first.facets - offset;
     const double* rows = signs.rows.data();
     const std::uint64_t* outside = signs.outside.data();

@@ -16,7 +16,6 @@ struct SignTable {
   int stride = 0;
   std::vector<double> rows;            ///< by vertex
   std::vector<std::uint64_t> outside;  ///< per vertex: bit j % 64 is set if it is outside of plane j
-  std::vector<std::int8_t> inside;     ///< per vertex
 
   const double* row(int vertex) const { return rows.data() + static_cast<ptrdiff_t>(vertex) * stride; }
 

@@ -22,6 +22,39 @@ constexpr std::array<Edge, 12> box_edges() {
 /// By the numbers of corner() and side().
 constexpr std::array<Edge, 12> kBoxEdges = box_edges();
 
+/// One coordinate of a box's corners and normals, from that row of its rotation. Both go by the numbers of corner() and
+/// side(), and have the bits that placing each alone would give it.
+void place_box_coordinate(Vec3 row, Vec3 half, double origin, double* corners, double* normals) {
+  constexpr Pair sign{-1, 1};
+  const Pair x = sign * (row.x * half.x);
+  const double y = row.y * half.y, z = row.z * half.z;
+  store(corners, x - y - z + origin);
+  store(corners + 2, x + y - z + origin);
+  store(corners + 4, x - y + z + origin);
+  store(corners + 6, x + y + z + origin);
+  const Vec3 zero = 0 * row;  // or minus that
+  store(normals, sign * row.x + zero.y + zero.z);
+  store(normals + 2, zero.x + sign * row.y + zero.z);
+  store(normals + 4, zero.x + zero.y + sign * row.z);
+}
+
+void place_box(Solid& solid, Vec3 half, const Pose& pose) {
+  const auto& [row0, row1, row2] = pose.rotation;
+  const auto& [x, y, z] = pose.translation;
+  place_box_coordinate(row0, half, x, solid.x.data(), solid.nx.data());
+  place_box_coordinate(row1, half, y, solid.y.data(), solid.ny.data());
+  place_box_coordinate(row2, half, z, solid.z.data(), solid.nz.data());
+  for (int k = 0; k < 3; ++k) {
+    const int f = 2 * k;
+    store(&solid.offset[f], half[k] + (load(&solid.nx[f]) * x + load(&solid.ny[f]) * y + load(&solid.nz[f]) * z));
+  }
+}
+
+void set_box(Solid& solid, const Box& box) {
+  for (int i = 0; i < 8; ++i) solid.set_vertex(i, corner(box, i));
+  for (int f = 0; f < 6; ++f) solid.set_plane(f, side(box, f).normal, side(box, f).offset);
+}
+
 /// Beyond it, asking every vertex of one body against every plane of the other takes longer than the dual hull.
 constexpr size_t kMostFacets = 1024;
 
@@ -36,8 +69,8 @@ void set_solid(Solid& solid, const Placed& body, int owner, const Pose* pose, do
   };
   if (const Box* box = std::get_if<Box>(&shape)) {
     solid.resize(8, 6, beyond);
-    for (int i = 0; i < 8; ++i) solid.set_vertex(i, place(corner(*box, i)));
-    for (int f = 0; f < 6; ++f) turn(f, side(*box, f));
+    if (pose) place_box(solid, box->half_extents, *pose);
+    else set_box(solid, *box);
     solid.edges = kBoxEdges;
   } else if (const Hull* hull = std::get_if<Hull>(&shape)) {
     const HullData& data = *hull->data;

@@ -17,6 +17,11 @@ inline Pair load(const double* p) {
   return v;
 }
 
+template <class Lanes>
+inline void store(double* p, const Lanes& v) {
+  std::memcpy(p, &v, sizeof v);
+}
+
 /// A convex polytope, or some of its facets with the edges between them, as columns.
 struct Solid {
   bool whole = false;
@@ -34,10 +39,11 @@ struct Solid {
 
   void resize(int vertex_count, int facet_count, double beyond) {
     vertices = vertex_count, facets = facet_count, stride = (facet_count + 3) / 4 * 4;
-    for (std::vector<double>* column : {&x, &y, &z}) column->resize(vertices);
+    const auto resize_each = [](int size, auto&... columns) { (columns.resize(size), ...); };
+    resize_each(vertices, x, y, z);
     doubt.assign(vertices, 0);
     owner.resize(facets);
-    for (std::vector<double>* column : {&nx, &ny, &nz, &offset}) column->resize(stride);
+    resize_each(stride, nx, ny, nz, offset);
     for (int f = facets; f < stride; ++f) set_plane(f, {}, beyond);
   }
   void set_vertex(int i, Vec3 v) { x[i] = v.x, y[i] = v.y, z[i] = v.z; }
