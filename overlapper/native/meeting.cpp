@@ -33,6 +33,9 @@ struct Crossing {
   double at;
 };
 
+/// How much of an edge is inside the other body.
+enum class Inside { kNothing, kPart, kUncertain };
+
 /// One edge against all planes of the other body: the signed distances of its ends. The planes that it enters or leaves
 /// through are among the few that an end is outside of.
 struct EdgeSigns {
@@ -102,6 +105,21 @@ struct EdgeSigns {
     const double slope_g = to[g] - from[g], slope_h = to[h] - from[h];
     const double level = std::clamp((from[h] - from[g]) / (slope_g - slope_h), 0.0, 1.0);
     return std::max(from[g] + level * slope_g, from[h] + level * slope_h) > 2 * rounding;
+  }
+
+  /// Where an edge enters and leaves, of which not both ends are inside.
+  Inside cut(bool from_inside, bool to_inside, Crossing& enter, Crossing& leave) const {
+    if (from_inside) {
+      leave = exit(true);
+    } else if (to_inside) {
+      enter = exit(false);
+    } else {
+      if (outside()) return Inside::kNothing;
+      std::tie(enter, leave) = passage();
+      if (enter.plane < 0 || leave.plane < 0) return Inside::kUncertain;
+      if (misses(enter.plane, leave.plane)) return Inside::kNothing;
+    }
+    return Inside::kPart;
   }
 };
 
@@ -222,17 +240,10 @@ class Tracer {
         const EdgeSigns edge{rows + e.from * stride, rows + e.to * stride,
                              outside[e.from],        outside[e.to],
                              signs.stride,           rounding_ + std::max(doubts[e.from], doubts[e.to])};
-        Crossing enter, leave;
-        if (from_inside) {
-          leave = edge.exit(true);
-        } else if (to_inside) {
-          enter = edge.exit(false);
-        } else {
-          if (edge.outside()) continue;
-          std::tie(enter, leave) = edge.passage();
-          if (enter.plane < 0 || leave.plane < 0) return false;
-          if (edge.misses(enter.plane, leave.plane)) continue;
-        }
+        Crossing enter{-1, 0}, leave{-1, 0};
+        const Inside inside = edge.cut(from_inside, to_inside, enter, leave);
+        if (inside == Inside::kNothing) continue;
+        if (inside == Inside::kUncertain) return false;
         const Vec3 from = body.vertex(e.from), along = body.vertex(e.to) - from;
         const double length = std::abs(along.x) + std::abs(along.y) + std::abs(along.z);
         const auto cross = [&](Crossing crossing, bool enters, int& vertex) {
