@@ -40,11 +40,18 @@ WideColumns rotation_columns(Quaternion q) {
           column(lane(plus, 2), lane(minus, 1), lane(diagonal, 1))};
 }
 
-/// The first three lanes moved on by one and by two.
-struct Turned {
-  explicit Turned(const Quad& a) : yzx{a[1], a[2], a[0], a[3]}, zxy{a[2], a[0], a[1], a[3]} {}
-  Quad yzx, zxy;
+/// Four vectors, one in each lane.
+struct QuadVector {
+  QuadVector(const Quad& xs, const Quad& ys, const Quad& zs) : x(xs), y(ys), z(zs) {}
+  QuadVector(Vec3 a, Vec3 b, Vec3 c, Vec3 d)
+      : QuadVector(Quad{a.x, b.x, c.x, d.x}, Quad{a.y, b.y, c.y, d.y}, Quad{a.z, b.z, c.z, d.z}) {}
+  Quad x, y, z;
 };
+
+QuadVector cross(const WideColumns& a, const WideColumns& b) {
+  const Quad &ax = a[0].head, &ay = a[1].head, &az = a[2].head, &bx = b[0].head, &by = b[1].head, &bz = b[2].head;
+  return {ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx};
+}
 
 /// The arithmetic of one pair, with fused multiply-adds or without.
 template <bool fused>
@@ -83,17 +90,9 @@ class WideCorners {
   }
 
   void place(const Mat3& axes, std::span<Vec3> vertices) {
-    const auto& [first, second, third] = axes;
-    const Quad x{first.x, second.x, third.x}, y{first.y, second.y, third.y}, z{first.z, second.z, third.z};
-    for (size_t i = 0; i < vertices.size(); ++i) {
-      const Corner& c = common_.corners[i];
-      const Vec3 vertex = vertices[i];
-      const WideLanes way = c.vertex < 0 ? beside_planes(c.facets, vertex) : beside_vertex(c, vertex);
-      WideSum<fused> along(x, vertex.x);
-      along.add_product(y, vertex.y);
-      along.add_product(z, vertex.z);
-      along.tail += x * way.head[0] + y * way.head[1] + z * way.head[2];
-      vertices[i] = along.rounded();
+    for (size_t i = 0; i < vertices.size(); i += 4) {
+      const size_t last = vertices.size() - 1;
+      place_four(axes, vertices, {i, std::min(i + 1, last), std::min(i + 2, last), std::min(i + 3, last)});
     }
   }
 
@@ -144,38 +143,72 @@ class WideCorners {
     return true;
   }
 
-  /// From a vertex that doubles have placed to where the three planes meet.
-  WideLanes beside_planes(const std::array<int, 3>& facets, Vec3 vertex) {
-    const WideLanes &p = planes_[facets[0]], &q = planes_[facets[1]], &r = planes_[facets[2]];
-    const WideColumns planes = transposed(p, q, r);
-    WideSum<fused> heights(planes, vertex);
-    heights.add(planes[3]);
-    const Vec3 height = heights.rounded();
-    const Turned next_p(p.head), next_q(q.head), next_r(r.head);
-    const Quad qr = next_q.yzx * next_r.zxy - next_q.zxy * next_r.yzx;
-    const Quad rp = next_r.yzx * next_p.zxy - next_r.zxy * next_p.yzx;
-    const Quad pq = next_p.yzx * next_q.zxy - next_p.zxy * next_q.yzx;
-    const Quad products = p.head * qr;
-    const double volume = products[0] + products[1] + products[2];
+  /// A corner in each lane.
+  void place_four(const Mat3& axes, std::span<Vec3> vertices, const std::array<size_t, 4>& at) {
+    const QuadVector vertex(vertices[at[0]], vertices[at[1]], vertices[at[2]], vertices[at[3]]);
+    QuadVector way{Vec3{}, Vec3{}, Vec3{}, Vec3{}};
+    const std::span<const Corner> corners = common_.corners;
+    if (std::ranges::any_of(at, [&](size_t i) { return corners[i].vertex < 0; })) beside_planes(at, vertex, way);
+    for (int n = 0; n < 4; ++n) {
+      if (corners[at[n]].vertex < 0) continue;
+      const Vec3 beside = beside_vertex(corners[at[n]], vertices[at[n]]);
+      way.x[n] = beside.x, way.y[n] = beside.y, way.z[n] = beside.z;
+    }
+    const auto along = [&](Vec3 axis) {
+      WideSum<fused> sum(vertex.x, axis.x);
+      sum.add_product(vertex.y, axis.y);
+      sum.add_product(vertex.z, axis.z);
+      sum.tail += way.x * axis.x + way.y * axis.y + way.z * axis.z;
+      return sum.lanes();
+    };
+    const WideLanes x = along(axes.row0), y = along(axes.row1), z = along(axes.row2);
+    for (int n = 0; n < 4; ++n) vertices[at[n]] = {x.head[n], y.head[n], z.head[n]};
+  }
+
+  /// From vertices that doubles have placed to where three planes meet; of other corners, nothing that means anything.
+  void beside_planes(const std::array<size_t, 4>& at, const QuadVector& vertex, QuadVector& way) {
+    const auto planes = [&](int n) {
+      const auto plane = [&](size_t i) -> const WideLanes& { return planes_[common_.corners[i].facets[n]]; };
+      return transposed(plane(at[0]), plane(at[1]), plane(at[2]), plane(at[3]));
+    };
+    const WideColumns p = planes(0), q = planes(1), r = planes(2);
+    const auto height = [&](const WideColumns& normal) {
+      WideSum<fused> sum(normal, vertex);
+      sum.add(normal[3]);
+      return sum.lanes();
+    };
+    const WideLanes height_p = height(p), height_q = height(q), height_r = height(r);
+    const QuadVector qr = cross(q, r), rp = cross(r, p), pq = cross(p, q);
+    const Quad volume = p[0].head * qr.x + p[1].head * qr.y + p[2].head * qr.z;
+    const Quad& a = height_p.head;
+    const Quad& b = height_q.head;
+    const Quad& c = height_r.head;
+    way = {(a * qr.x + b * rp.x + c * pq.x) / -volume, (a * qr.y + b * rp.y + c * pq.y) / -volume,
+           (a * qr.z + b * rp.z + c * pq.z) / -volume};
     // The sum is off by what the heights are and by the roundings of its own terms.
-    const double largest = max_component(abs(height));
-    noise_ = std::max(noise_, 4 * (lost_ + 0x1p-50 * largest / std::abs(volume)) / std::abs(volume));
-    return {(height.x * qr + height.y * rp + height.z * pq) / -volume, Quad{}};
+    const Quad size = volume < 0 ? -volume : volume;
+    const Quad high_a = a < 0 ? -a : a, high_b = b < 0 ? -b : b, high_c = c < 0 ? -c : c;
+    const Quad high = high_a < high_b ? high_b : high_a, highest = high < high_c ? high_c : high;
+    const Quad noise = 4 * (lost_ + 0x1p-50 * highest / size) / size;
+    for (int n = 0; n < 4; ++n)
+      if (common_.corners[at[n]].vertex < 0) noise_ = std::max(noise_, noise[n]);
   }
 
   /// From a vertex that doubles have placed to the body's own.
-  WideLanes beside_vertex(const Corner& corner, Vec3 vertex) const {
+  Vec3 beside_vertex(const Corner& corner, Vec3 vertex) const {
     const Shape& shape = corner.body == 0 ? common_.a.shape : common_.b.shape;
     const Box* box = std::get_if<Box>(&shape);
     const Vec3 local =
         box ? overlapper::corner(*box, corner.vertex) : std::get<Hull>(shape).data->vertices[corner.vertex];
     const Vec3 origin = common_.origin;
-    if (corner.body == 0)
-      return two_sum(Quad{local.x, local.y, local.z}, Quad{-origin.x, -origin.y, -origin.z}) - in_lanes(vertex);
+    if (corner.body == 0) {
+      const WideLanes exactly = two_sum(Quad{local.x, local.y, local.z}, Quad{-origin.x, -origin.y, -origin.z});
+      return rounded(vector(exactly - in_lanes(vertex)));
+    }
     WideSum<fused> sum(columns_, local);
     sum.add(translation_);
     sum.add(Quad{-vertex.x, -vertex.y, -vertex.z});
-    return sum.lanes();
+    return rounded(vector(sum.lanes()));
   }
 
   const CommonCorners& common_;

@@ -122,7 +122,7 @@ struct WideSum {
 
   explicit WideSum(const WideLanes& a) : head(a.head), tail(a.tail) {}
   template <class A, class B>
-  WideSum(const A& a, B b) : WideSum(two_product<fused>(overlapper::rounded(a), overlapper::rounded(b))) {
+  WideSum(const A& a, const B& b) : WideSum(two_product<fused>(overlapper::rounded(a), overlapper::rounded(b))) {
     add_tails(a, b);
   }
   /// x * column[0] + y * column[1] + z * column[2]
@@ -142,7 +142,7 @@ struct WideSum {
     tail += a.tail;
   }
   template <class A, class B>
-  void add_product(const A& a, B b) {
+  void add_product(const A& a, const B& b) {
     add(two_product<fused>(overlapper::rounded(a), overlapper::rounded(b)));
     add_tails(a, b);
   }
@@ -156,6 +156,7 @@ struct WideSum {
  private:
   void add_tails(const Quad&, double) {}
   void add_tails(const WideLanes& a, double b) { tail += a.tail * b; }
+  void add_tails(const WideLanes& a, const Quad& b) { tail += a.tail * b; }
   void add_tails(const WideLanes& a, DoubleDouble b) { tail += a.tail * b.head + a.head * b.tail; }
 };
 
