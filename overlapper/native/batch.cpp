@@ -28,26 +28,47 @@ struct Known {
   Vec3 axis;  ///< unit, from b to a: the bodies were apart along it; {0, 0, 0} if they were not
 };
 
+/// Of a pair that clipping has measured.
+Overlaps::Row row_of(const ClippedPair& clipped, const Placed& a, const Placed& b) {
+  const auto [depth, normal] = penetration_of_clipped(a, b);
+  return {.status = clipped.status,
+          .widened = clipped.widened,
+          .facets_touched = clipped.facets_touched,
+          .volume = clipped.volume,
+          .volume_error = clipped.volume_error,
+          .area = clipped.area,
+          .depth = depth,
+          .centroid = clipped.centroid,
+          .normal = normal,
+          .gradient = gradient_of_clipped(clipped, a.position, b.position),
+          .source = {}};
+}
+
 Overlaps::Row row_of(Overlap overlap) {
   Overlaps::Row row;
   row.status = overlap.status();
   if (row.status == Status::kSeparated) return row;
   row.volume_error = overlap.volume_error();
-  if (row.status == Status::kTouching) {
-    row.normal = overlap.contact().normal;
-  } else {
+  row.depth = overlap.contact().depth;
+  row.normal = overlap.contact().normal;
+  if (row.status == Status::kOverlapping) {
     row.widened = overlap.widened();
     row.facets_touched = overlap.facets_touched();
     row.volume = overlap.volume();
     row.area = overlap.area();
-    const auto [depth, normal] = overlap.penetration();
-    row.depth = depth;
-    row.normal = normal;
     row.centroid = overlap.centroid();
-    overlap.gradient(row.gradient);
+    std::ranges::copy(overlap.gradient(), row.gradient.begin());
   }
-  if (!overlap.clipped()) row.source = std::make_shared<Overlap>(std::move(overlap));
+  row.source = std::make_shared<Overlap>(std::move(overlap));
   return row;
+}
+
+Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method method) {
+  if (method == Method::kPaper) return row_of(Overlap(a, b, tolerance, method));
+  const std::optional<ClippedPair> clipped = clip(a, b);
+  if (clipped && clipped->status == Status::kSeparated) return {};
+  if (clipped && clipped->measured) return row_of(*clipped, a, b);
+  return row_of(Overlap(a, b, tolerance, clipped));
 }
 
 /// A shape where it is now, and what does not change as it moves.
@@ -97,9 +118,10 @@ bool apart(const Body& a, const Body& b, Vec3& axis) {
 
 /// False where clipping is sooner done than an axis looked for, which there may not be.
 bool axis_soon_found(const Body& a, const Body& b) {
-  const Shape &p = a.placed.shape, &q = b.placed.shape;
-  const bool hulls = std::holds_alternative<Hull>(p) || std::holds_alternative<Hull>(q);
-  return !hulls || !bounded(p) || !bounded(q) || smooth(p) || smooth(q);
+  const auto polytope = [](const Shape& shape) {
+    return std::holds_alternative<Box>(shape) || std::holds_alternative<Hull>(shape);
+  };
+  return !polytope(a.placed.shape) || !polytope(b.placed.shape);
 }
 
 /// The reach of a shape, and of the numbers that describe it, from its own origin.
@@ -258,10 +280,10 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].status == Status::kOverlapping;
   const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
   const size_t planes_before = planes_asked;
-  next_rows[i] = separated ? Overlaps::Row{} : row_of(Overlap(a.placed, b.placed, with_tolerance, by_method));
+  next_rows[i] = separated ? Overlaps::Row{} : row_of(a.placed, b.placed, with_tolerance, by_method);
   asked.fetch_add(planes_asked - planes_before, std::memory_order_relaxed);
   done[i] = true;
-  return separated;
+  return !next_rows[i].source;
 }
 
 void Batch::Memory::keep(double of_tolerance, Method of_method) {

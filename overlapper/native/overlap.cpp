@@ -98,6 +98,11 @@ Overlap::Overlap(const Placed& a, const Placed& b, double tolerance, Method meth
   start();
 }
 
+Overlap::Overlap(const Placed& a, const Placed& b, double tolerance, const std::optional<ClippedPair>& clipped)
+    : two_{a, b}, tolerance_(tolerance), method_(Method::kAuto), clipped_(clipped) {
+  settle();
+}
+
 void Overlap::start() {
   if (!(tolerance_ > 0 && tolerance_ < 1))
     throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
@@ -117,6 +122,11 @@ void Overlap::start() {
     clipped_ = ClippedPair{*group, {}, {}};
     pulls_ = std::move(group->pulls);
   }
+  settle();
+}
+
+/// What clipping has left open.
+void Overlap::settle() {
   // What is too thin for clipping to measure may be too thin to be more than touching.
   if (clipped_ && clipped_->status == Status::kOverlapping && !clipped_->measured && !clipped_->traced)
     clipped_.reset();
@@ -369,31 +379,38 @@ Mat3 Overlap::inertia() const {
   return {share * i.row0, share * i.row1, share * i.row2};
 }
 
-std::vector<std::array<double, 6>> Overlap::gradient() const {
-  std::vector<std::array<double, 6>> rows(bodies().size());
-  gradient(rows);
+namespace {
+
+void add_pull(std::array<double, 6>& row, Vec3 force, Vec3 moment) {
+  for (int i = 0; i < 3; ++i) row[i] += force[i], row[3 + i] += moment[i];
+}
+
+void add_pull_at(Vec3 centroid, std::array<double, 6>& row, Vec3 force, Vec3 moment, Vec3 position) {
+  add_pull(row, force, moment + cross(centroid - position, force));
+}
+
+}  // namespace
+
+std::array<std::array<double, 6>, 2> gradient_of_clipped(const ClippedPair& clipped, Vec3 position_a, Vec3 position_b) {
+  std::array<std::array<double, 6>, 2> rows{};
+  add_pull_at(clipped.centroid, rows[0], clipped.pull, clipped.moment, position_a);
+  add_pull_at(clipped.centroid, rows[1], -clipped.pull, -clipped.moment, position_b);
   return rows;
 }
 
-void Overlap::gradient(std::span<std::array<double, 6>> rows) const {
-  if (status_ != Status::kOverlapping) return;
-  const auto pull = [&](int body, Vec3 force, Vec3 moment) {
-    for (int i = 0; i < 3; ++i) rows[body][i] += force[i], rows[body][3 + i] += moment[i];
-  };
-  if (measured_by_clipping_) {
-    const auto pull_at_centroid = [&](int body, Vec3 force, Vec3 moment) {
-      pull(body, force, moment + cross(clipped_->centroid - bodies()[body].position, force));
-    };
-    if (pair()) {
-      pull_at_centroid(0, clipped_->pull, clipped_->moment);
-      pull_at_centroid(1, -clipped_->pull, -clipped_->moment);
-    }
-    for (size_t body = 0; body < pulls_.size(); ++body)
-      pull_at_centroid(static_cast<int>(body), pulls_[body].force, pulls_[body].moment);
-    return;
+std::vector<std::array<double, 6>> Overlap::gradient() const {
+  std::vector<std::array<double, 6>> rows(bodies().size());
+  if (status_ != Status::kOverlapping) return rows;
+  if (measured_by_clipping_ && pair()) {
+    std::ranges::copy(gradient_of_clipped(*clipped_, two_[0].position, two_[1].position), rows.begin());
+  } else if (measured_by_clipping_) {
+    for (size_t i = 0; i < rows.size(); ++i)
+      add_pull_at(clipped_->centroid, rows[i], pulls_[i].force, pulls_[i].moment, bodies_[i].position);
+  } else {
+    for (const auto& [owner, area_vector, centroid] : quantities().pulls)
+      add_pull(rows[owner], area_vector, cross(centroid - bodies()[owner].position, area_vector));
   }
-  for (const Quantities::Pull& facet : quantities().pulls)
-    pull(facet.owner, facet.area_vector, cross(facet.centroid - bodies()[facet.owner].position, facet.area_vector));
+  return rows;
 }
 
 Distance Overlap::wide_distance(double reach) const {
@@ -416,14 +433,11 @@ Penetration Overlap::parting(std::vector<Vec3> normals) const {
   return least;
 }
 
-Penetration Overlap::penetration() const {
-  assert(pair() && status_ == Status::kOverlapping);
-  // What clipping measures holds a ball beyond doubt.
-  if (!measured_by_clipping_) return {contact().depth, contact().normal};
-  const bool swapped = comes_before(two_[1], two_[0]);
-  const Placed &first = two_[swapped], &second = two_[!swapped];
+Penetration penetration_of_clipped(const Placed& a, const Placed& b) {
+  const bool swapped = comes_before(b, a);
+  const Placed &first = swapped ? b : a, &second = swapped ? a : b;
   const Vec3 reference = first.pose.translation;
-  Penetration p = overlapper::penetration(first.seen_from(reference), second.seen_from(reference));
+  Penetration p = penetration(first.seen_from(reference), second.seen_from(reference));
   if (swapped) p.normal = Vec3{} - p.normal;  // and not -normal, which would make negative zeros
   return p;
 }
@@ -432,7 +446,7 @@ Overlap::Contact Overlap::in_contact() const {
   assert(pair());
   Contact contact;
   if (measured_by_clipping_) {
-    const auto [depth, normal] = penetration();
+    const auto [depth, normal] = penetration_of_clipped(two_[0], two_[1]);
     contact.depth = depth;
     contact.normal = normal;
     return contact;
@@ -442,7 +456,7 @@ Overlap::Contact Overlap::in_contact() const {
   const auto reach = [&] { return std::max(magnitude(a), magnitude(b)); };
   const bool doubtful = method_ == Method::kAuto && !clipped_ && search().wide_ball;
   if (status_ == Status::kOverlapping) {
-    Penetration p = overlapper::penetration(a, b);
+    Penetration p = penetration(a, b);
     if (doubtful || p.depth <= doubt(reach())) p = parting({p.normal});
     contact.depth = p.depth;
     contact.normal = p.normal;
@@ -454,7 +468,7 @@ Overlap::Contact Overlap::in_contact() const {
     // Where the bodies touch, which method "paper" may call apart, the line between the witness points may be all
     // rounding; the way out is not.
     if ((status_ == Status::kTouching || method_ == Method::kPaper) && !(d.gap > 0))
-      contact.normal = parting({overlapper::penetration(a, b).normal}).normal;
+      contact.normal = parting({penetration(a, b).normal}).normal;
     // Method "paper" may call apart what is not.
     contact.distance = status_ == Status::kSeparated ? std::max(0.0, d.distance) : 0;
     contact.witness_a = d.witness_a + reference;

@@ -19,6 +19,12 @@ namespace overlapper {
 
 enum class Method { kAuto, kPaper };
 
+/// The contact() of a pair that overlaps beyond doubt, of which clip() has found a measure.
+Penetration penetration_of_clipped(const Placed& a, const Placed& b);
+
+/// The gradient() of such a pair.
+std::array<std::array<double, 6>, 2> gradient_of_clipped(const ClippedPair& clipped, Vec3 position_a, Vec3 position_b);
+
 /// The common set of two or more placed shapes. Only the status is found on construction; each quantity when first
 /// asked for, then kept. Safe to share between threads, none of which waits for another.
 class Overlap {
@@ -27,6 +33,8 @@ class Overlap {
   /// have to shrink, about its inner point, to fit into smooth shapes; polyhedra are exact whatever it is.
   Overlap(std::vector<Placed> bodies, double tolerance, Method method);
   Overlap(const Placed& a, const Placed& b, double tolerance, Method method);
+  /// By kAuto, for whoever has asked clip() already; the tolerance is as it must be.
+  Overlap(const Placed& a, const Placed& b, double tolerance, const std::optional<ClippedPair>& clipped);
   Overlap(Overlap&& other) noexcept;
 
   std::span<const Placed> bodies() const { return bodies_.empty() ? std::span<const Placed>(two_) : bodies_; }
@@ -58,8 +66,6 @@ class Overlap {
 
   /// Per body: d volume / d translation, then / d rotation vector about the body's position; zeros unless overlapping.
   std::vector<std::array<double, 6>> gradient() const;
-  /// The same into rows that are zero, one per body.
-  void gradient(std::span<std::array<double, 6>> rows) const;
 
   /// Only for pairs.
   struct Contact {
@@ -70,9 +76,6 @@ class Overlap {
     Plane separating;  ///< a where dot(normal, x) >= offset, b on the other side; meaningless if overlapping
   };
   const Contact& contact() const;
-  /// Only for pairs that overlap: the depth and normal of contact(), without the rest of it where clipping has
-  /// measured.
-  Penetration penetration() const;
 
  private:
   bool traced() const { return clipped_ && clipped_->traced; }
@@ -121,6 +124,7 @@ class Overlap {
   Region owned_as_given(Region region) const;
 
   void start();
+  void settle();
 
   std::array<Placed, 2> two_;
   std::vector<Placed> bodies_;  ///< if there are more than two
