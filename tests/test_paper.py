@@ -125,3 +125,17 @@ def test_what_it_calls_apart_and_touches_has_a_normal():
     answer = overlap(cylinder, box, tolerance=0.0125, method="paper")
     assert answer.status == "separated" and overlap(cylinder, box).status == "touching"
     assert answer.normal == pytest.approx([0, 0, -1], abs=1e-9)
+
+
+def test_what_rounding_has_turned_inside_out_is_not_a_solid():
+    thick_and_thin = (
+        Placed(Capsule(3, 0.5), (-2, 0.25, -0.75)),
+        Placed(
+            Capsule(2.3283064365386963e-10, 0.25),
+            (0, 0.75, -4.4703483581542969e-08),
+            (0.23076923076923078, 0.30769230769230771, -0.92307692307692313, 0),
+        ),
+    )
+    answer = overlap(*thick_and_thin, tolerance=0.1, method="paper")
+    assert (answer.status, answer.volume) == ("touching", 0)
+    assert overlap(*thick_and_thin).status == "overlapping"

@@ -239,10 +239,11 @@ PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double toleran
   }
   Intersection common = intersect_tree(std::move(parts));
   PaperResult result{common.status, std::nullopt};
-  if (common.status == Status::kOverlapping) {
-    result.region = region_of(common.part);
-    result.region->facets_touched = planes;
-  }
+  if (common.status != Status::kOverlapping) return result;
+  result.region = region_of(common.part);
+  result.region->facets_touched = planes;
+  // So thin that rounding has turned it inside out: there is no solid to speak of.
+  if (!(measure(*result.region).volume > 0)) return {Status::kTouching, std::nullopt};
   return result;
 }
 
