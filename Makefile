@@ -22,7 +22,7 @@ fuzz: build/fuzz/fuzz_overlap
 build/fuzz/fuzz_overlap: $(NATIVE)
 	@cmake -S overlapper/native -B build/fuzz -DCMAKE_CXX_COMPILER=clang++ -DOVERLAPPER_FUZZ=ON \
 	  -DOVERLAPPER_WERROR=ON --log-level=WARNING
-	@cmake --build build/fuzz
+	@cmake --build build/fuzz --parallel $$(getconf _NPROCESSORS_ONLN)
 
 lint: $(VENV)/dev
 	@$(VENV)/bin/ruff check
