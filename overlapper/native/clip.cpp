@@ -6,7 +6,6 @@
 #include "canonical_order.h"
 #include "meeting.h"
 #include "minkowski.h"
-#include "planes_asked.h"
 #include "trace.h"
 
 namespace overlapper {
@@ -280,7 +279,6 @@ std::optional<ClippedPair> clip_by_table(const Placed& a, const Placed& b) {
   Workspace& w = workspace();
   set_solid(w.first, a, 0, nullptr, 4 * reach);
   set_solid(w.second, b, 1, &pose, 4 * reach);
-  planes_asked += w.first.facets + w.second.facets;
   const Signs signs = w.trace(sign_rounding);
   if (signs == Signs::kSeparated) return ClippedPair{};
   if (signs == Signs::kUncertain) return std::nullopt;

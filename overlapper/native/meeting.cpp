@@ -5,6 +5,8 @@
 #include <limits>
 #include <tuple>
 
+#include "planes_asked.h"
+
 namespace overlapper {
 namespace {
 
@@ -317,6 +319,7 @@ Way* fastest_way() { return trace_by<Pair>; }
 
 Signs Meeting::trace(double rounding) {
   static Way* const way = fastest_way();
+  planes_asked += first.facets + second.facets;
   return way(*this, rounding);
 }
 

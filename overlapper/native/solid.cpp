@@ -1,7 +1,5 @@
 #include "solid.h"
 
-#include "planes_asked.h"
-
 namespace overlapper {
 namespace {
 
@@ -91,7 +89,6 @@ bool set_part(Solid& solid, const Placed& body, int owner, const Pose& pose, con
   thread_local Solid whole;
   thread_local std::vector<int> facet_number, vertex_number, chosen;
   set_solid(whole, body, owner, &pose, beyond);
-  planes_asked += whole.facets;
   facet_number.assign(whole.facets, -1);
   vertex_number.assign(whole.vertices, -1);
   chosen.clear();
