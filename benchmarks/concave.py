@@ -13,7 +13,7 @@ import pybullet_data
 import trimesh
 
 from overlapper import Placed
-from overlapper.decomposition import decompose
+from overlapper.polytopes.decomposition import decompose
 from overlapper.union import union_overlap, union_volume
 
 SHIFT, QUARTER_TURN = np.array([0.06, 0.0, 0.0]), [0.5**0.5, 0.0, 0.0, 0.5**0.5]

@@ -1,8 +1,9 @@
 """The article's method replayed step by step, to find the first step that loses what two bodies have in common.
 
 The replay does in doubles what the method does in doubles, and everything after the step under trial without rounding:
-if the answer is wrong by then, no care in later steps could have saved it. It follows `overlapper/native/paper.cpp`,
-which a failing case may still leave by another way; that is reported as "not reproduced".
+if the answer is wrong by then, no care in later steps could have saved it. It follows
+`overlapper/native/methods/paper.cpp`, which a failing case may still leave by another way; that is reported as "not
+reproduced".
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ import pybullet as p
 from overlapper.simulation import Bodies
 from overlapper.viewer import Recording
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from browser import Browser
 
 BODIES, STEPS = 100, 1000

@@ -4,7 +4,7 @@
     python benchmarks/stability.py --page            only the page and its pictures, from the results there are
 
 Writes DIR/results/stability.csv (a case a line) and what benchmarks/stability_page.py makes of it. The cases are those
-of tests/families.py made of vertices alone, so that every peer can be given them. The truth is exact: rational
+of tests/support/families.py made of vertices alone, so that every peer can be given them. The truth is exact: rational
 arithmetic on the doubles that the peers get.
 """
 
@@ -25,7 +25,7 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-sys.path[:0] = [str(HERE), str(ROOT / "tests")]
+sys.path[:0] = [str(HERE), str(ROOT / "tests" / "support")]
 
 try:
     import exact

@@ -1,4 +1,4 @@
-"""The rules of tests/rules.py on as many hard cases as wanted, and memory over a million of them.
+"""The rules of tests/support/rules.py on as many hard cases as wanted, and memory over a million of them.
 
     python benchmarks/stress.py --count 20000                   the families in turn, from seed 0 on
     python benchmarks/stress.py --first 500 --family slivers    other seeds, one family
@@ -26,7 +26,7 @@ from typing import Any, TextIO
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-sys.path[:0] = [str(HERE), str(ROOT / "tests")]
+sys.path[:0] = [str(HERE), str(ROOT / "tests" / "support")]
 
 try:
     import exact
@@ -200,7 +200,7 @@ def resident() -> int:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="The rules of tests/rules.py on as many hard cases as wanted.")
+    parser = argparse.ArgumentParser(description="The rules of tests/support/rules.py on as many hard cases as wanted.")
     parser.add_argument("--first", type=int, default=0, help="the seed to begin with")
     parser.add_argument("--count", type=int, default=1000, help="so many cases")
     parser.add_argument("--family", action="append", choices=list(families.FAMILIES), help="only this one; repeatable")

@@ -1,4 +1,4 @@
-"""Exact volumes and depths of large polytopes, by tests/exact.py on parts that are small.
+"""Exact volumes and depths of large polytopes, by tests/support/exact.py on parts that are small.
 
 What is common to two polytopes is the sum of what is common in either half of space. Halved along an axis until few
 facets are left, meshes of thousands of facets take seconds.

@@ -1,8 +1,8 @@
 """On what speed is measured: families of pairs of placed shapes, deep and shallow, with their exact truth.
 
 A family is one function of a numpy generator that makes one pair; to add one, write it and name it in FAMILIES with the
-number of pairs that are made of it. Each pair has an exact truth: rational arithmetic (tests/exact.py) for polyhedra, a
-closed form for round shapes.
+number of pairs that are made of it. Each pair has an exact truth: rational arithmetic (tests/support/exact.py) for
+polyhedra, a closed form for round shapes.
 """
 
 from __future__ import annotations

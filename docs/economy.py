@@ -18,7 +18,7 @@ import numpy as np
 import pybullet
 
 from overlapper import Box, HalfSpace, Hull, Shape
-from overlapper.scene import Scene, load_scene, scenes_in
+from overlapper.scenes.scene import Scene, load_scene, scenes_in
 from overlapper.simulation import Bodies, Recorder, Report, SkippedShapeWarning
 
 HERE = Path(__file__).resolve().parent

@@ -17,7 +17,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from overlapper import HalfSpace
 from overlapper.simulation import Bodies
-from overlapper.surface import surface
+from overlapper.viewer.outline import surface
 
 MODELS = {
     "r2d2.urdf": (25, -60),

@@ -6,8 +6,9 @@ python docs/polytopes.py
 import tempfile
 from pathlib import Path
 
-from overlapper import Placed, overlap, picture, random_polytope, read_polytopes, write_polytopes
-from overlapper.contacts import Contact
+from overlapper import Placed, overlap, random_polytope, read_polytopes, write_polytopes
+from overlapper.simulation.contacts import Contact
+from overlapper.viewer import picture
 
 HERE = Path(__file__).parent
 GREY = (0.62, 0.66, 0.72, 1.0)

@@ -4,8 +4,7 @@ import pybullet as p
 import pybullet_data
 
 from overlapper import Hull, Placed, overlap
-from overlapper.links import link_contacts
-from overlapper.simulation import Bodies
+from overlapper.simulation import Bodies, link_contacts
 from overlapper.viewer import Recording
 
 p.connect(p.DIRECT)

@@ -1,6 +1,5 @@
 """The volume that convex bodies share, with an error bound, centroid, normal, depth, patch and gradient."""
 
-from importlib import import_module as _import_module
 from importlib.metadata import version as _version
 from typing import TYPE_CHECKING
 
@@ -22,13 +21,14 @@ from overlapper._core import (
     overlaps,
     penetration_depth,
 )
+from overlapper.face import lazily as _lazily
 
 if TYPE_CHECKING:
-    from overlapper.database import read_polytopes as read_polytopes
-    from overlapper.database import write_polytopes as write_polytopes
-    from overlapper.mesh_file import read_hull as read_hull
-    from overlapper.mesh_file import write_mesh as write_mesh
-    from overlapper.sampling import random_polytope
+    from overlapper.polytopes.database import read_polytopes as read_polytopes
+    from overlapper.polytopes.database import write_polytopes as write_polytopes
+    from overlapper.polytopes.mesh_file import read_hull as read_hull
+    from overlapper.polytopes.mesh_file import write_mesh as write_mesh
+    from overlapper.polytopes.random import random_polytope
 
 Shape = Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace
 
@@ -56,16 +56,11 @@ __all__ = [
 
 # Imported when asked for. What needs more than numpy is not imported by *, either; what needs numpy would make every
 # start of pytest wait for it, as the plugin is a module of this package.
-_LAZY = {
-    "random_polytope": "sampling",
-    "read_polytopes": "database",
-    "write_polytopes": "database",
-    "read_hull": "mesh_file",
-    "write_mesh": "mesh_file",
-}
-
-
-def __getattr__(name: str) -> object:
-    if name not in _LAZY:
-        raise AttributeError(f"module 'overlapper' has no attribute {name!r}")
-    return getattr(_import_module(f"overlapper.{_LAZY[name]}"), name)
+__getattr__ = _lazily(
+    __name__,
+    {
+        "polytopes.database": ("read_polytopes", "write_polytopes"),
+        "polytopes.mesh_file": ("read_hull", "write_mesh"),
+        "polytopes.random": ("random_polytope",),
+    },
+)

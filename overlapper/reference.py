@@ -26,7 +26,7 @@ from typing import IO, Any, Literal
 import numpy as np
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, RoundedHull, Shape, Sphere
-from overlapper.arbiter import signed_distance_bounds
+from overlapper.proof.signed_distance import signed_distance_bounds
 
 try:
     import fcl

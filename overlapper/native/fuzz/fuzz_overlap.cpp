@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <stdexcept>
 
-#include "overlap.h"
+#include "overlap/overlap.h"
 
 namespace overlapper {
 namespace {

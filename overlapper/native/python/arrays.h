@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "overlap.h"
-#include "shape.h"
+#include "overlap/overlap.h"
+#include "shapes/shape.h"
 
 /// numpy and the core, both ways.
 namespace overlapper::python {

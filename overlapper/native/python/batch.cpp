@@ -1,4 +1,4 @@
-#include "batch.h"
+#include "batch/batch.h"
 
 #include <nanobind/stl/shared_ptr.h>
 

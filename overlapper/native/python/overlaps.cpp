@@ -1,7 +1,7 @@
-#include "canonical_order.h"
-#include "minkowski.h"
-#include "overlap.h"
+#include "distance/minkowski.h"
+#include "overlap/overlap.h"
 #include "python/arrays.h"
+#include "shapes/canonical_order.h"
 
 namespace overlapper::python {
 namespace {
@@ -242,9 +242,9 @@ polytope contains the common set and could shrink into it by the fraction `toler
   cls.def("__repr__", [](const Overlap& o) { return repr(o); });
   cls.def(
       "certificate",
-      [](nb::handle self) { return nb::module_::import_("overlapper.certificate").attr("certificate")(self); },
+      [](nb::handle self) { return nb::module_::import_("overlapper.proof.certificate").attr("certificate")(self); },
       nb::sig("def certificate(self) -> typing.Any"),
-      R"(What proves the status, and bounds of the volume, to somebody who does not trust us: an overlapper.claims.Certificate.
+      R"(What proves the status, and bounds of the volume, to somebody who does not trust us: an overlapper.proof.claims.Certificate.
 
 `verify()` of it checks everything in rational arithmetic without the core, and returns (lower, upper) bounds of the common
 volume in m³. Raises CertificateError where there is none.)");

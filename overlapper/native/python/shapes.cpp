@@ -1,6 +1,6 @@
 #include <sstream>
 
-#include "polytope.h"
+#include "geometry/polytope.h"
 #include "python/arrays.h"
 
 namespace overlapper::python {

@@ -1,0 +1,26 @@
+"""Packages that import what they offer when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+
+
+def lazily(package: str, offers: Mapping[str, tuple[str, ...]], needs: str | None = None) -> Callable[[str], object]:
+    """The `__getattr__` of a package (PEP 562) that offers names of its modules.
+
+    `needs` is what an ImportError says of a library that is not installed; without it, the module's own words are kept.
+    """
+    homes = {name: module for module, names in offers.items() for name in names}
+
+    def getattr_(name: str) -> object:
+        if name not in homes:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        try:
+            return getattr(import_module(f"{package}.{homes[name]}"), name)
+        except ImportError as error:
+            if needs:
+                raise ImportError(f"{package} needs {needs}") from error
+            raise
+
+    return getattr_

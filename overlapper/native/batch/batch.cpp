@@ -1,0 +1,366 @@
+#include "batch/batch.h"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "batch/box_tree.h"
+#include "batch/parallel.h"
+#include "distance/box_axes.h"
+#include "distance/minkowski.h"
+#include "shapes/planes_asked.h"
+
+namespace overlapper {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Rows that are laid out and filled before Ctrl-C is looked for: to lay out all of some millions takes seconds.
+constexpr size_t kStretch = 1 << 17;
+
+/// What a pair leaves behind for its next call.
+struct Known {
+  IndexPair pair;
+  std::array<std::uint64_t, 2> version;  ///< of the poses of the two
+  Vec3 axis;  ///< unit, from b to a: the bodies were apart along it; {0, 0, 0} if they were not
+};
+
+/// Of a pair that clipping has measured.
+Overlaps::Row row_of(const ClippedPair& clipped, const Placed& a, const Placed& b) {
+  const auto [depth, normal] = penetration_of_clipped(a, b);
+  return {.status = clipped.status,
+          .widened = clipped.widened,
+          .facets_touched = clipped.facets_touched,
+          .volume = clipped.volume,
+          .volume_error = clipped.volume_error,
+          .area = clipped.area,
+          .depth = depth,
+          .centroid = clipped.centroid,
+          .normal = normal,
+          .gradient = gradient_of_clipped(clipped, a.position, b.position),
+          .source = {}};
+}
+
+Overlaps::Row row_of(Overlap overlap) {
+  Overlaps::Row row;
+  row.status = overlap.status();
+  if (row.status == Status::kSeparated) return row;
+  row.volume_error = overlap.volume_error();
+  row.depth = overlap.contact().depth;
+  row.normal = overlap.contact().normal;
+  if (row.status == Status::kOverlapping) {
+    row.widened = overlap.widened();
+    row.facets_touched = overlap.facets_touched();
+    row.volume = overlap.volume();
+    row.area = overlap.area();
+    row.centroid = overlap.centroid();
+    std::ranges::copy(overlap.gradient(), row.gradient.begin());
+  }
+  row.source = std::make_shared<Overlap>(std::move(overlap));
+  return row;
+}
+
+Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method method) {
+  if (method == Method::kPaper) return row_of(Overlap(a, b, tolerance, method));
+  const std::optional<ClippedPair> clipped = clip(a, b);
+  if (clipped && clipped->status == Status::kSeparated) return {};
+  if (clipped && clipped->measured) return row_of(*clipped, a, b);
+  return row_of(Overlap(a, b, tolerance, clipped));
+}
+
+/// A shape where it is now, and what does not change as it moves.
+struct Body {
+  Placed placed;
+  double reach;               ///< of the shape from its own origin
+  std::uint64_t version = 0;  ///< counts the poses it has had
+
+  /// How far it reaches along a unit direction of the world, from its own origin.
+  double reach_along(Vec3 direction) const {
+    const Vec3 local = apply_transposed(placed.pose.rotation, direction);
+    return dot(local, std::visit([&](const auto& s) { return s.support(local); }, placed.shape));
+  }
+
+  /// How large the numbers are that its pose is made from, beside its reach: those of a hull far from its own origin.
+  double leverage() const {
+    const HullData* hull = polytope_of(placed.shape);
+    return hull && norm2(hull->origin) > 0 ? norm(hull->origin) + norm(placed.position) : 0;
+  }
+};
+
+/// True if the two are farther apart than any rounding, along the axis known or along one found now. Whoever asks again
+/// without an axis then finds one, too: the margin is four times that at which Overlap says so.
+bool apart(const Body& a, const Body& b, Vec3& axis) {
+  const bool open_a = !bounded(a.placed.shape), open_b = !bounded(b.placed.shape);
+  if (open_a && open_b) return false;
+  const Vec3 between = a.placed.pose.translation - b.placed.pose.translation;
+  const double margin = 4 * rounding(norm(between) + a.reach + b.reach + a.leverage() + b.leverage());
+  if (open_a || open_b) {
+    const Body &open = open_a ? a : b, &closed = open_a ? b : a;
+    const Plane& plane = std::get<HalfSpace>(open.placed.shape).plane;
+    const Vec3 normal = open.placed.pose.rotation * plane.normal;
+    const double height = dot(normal, open_a ? -between : between);
+    return height - plane.offset - closed.reach_along(-normal) > margin;
+  }
+  const auto gap = [&] { return dot(axis, between) - a.reach_along(-axis) - b.reach_along(axis); };
+  if (norm2(axis) > 0 && gap() > margin) return true;
+  const Box *box_a = std::get_if<Box>(&a.placed.shape), *box_b = std::get_if<Box>(&b.placed.shape);
+  if (box_a && box_b) {
+    axis = box_penetration(*box_a, a.placed.pose, *box_b, b.placed.pose, margin).normal;
+  } else {
+    const Vec3 reference = a.placed.pose.translation;
+    axis = distance(a.placed.seen_from(reference), b.placed.seen_from(reference)).normal;
+  }
+  return norm2(axis) > 0 && gap() > margin;
+}
+
+/// False where clipping is sooner done than an axis looked for, which there may not be.
+bool axis_soon_found(const Body& a, const Body& b) {
+  const auto polytope = [](const Shape& shape) {
+    return std::holds_alternative<Box>(shape) || std::holds_alternative<Hull>(shape);
+  };
+  return !polytope(a.placed.shape) || !polytope(b.placed.shape);
+}
+
+/// The reach of a shape, and of the numbers that describe it, from its own origin.
+double reach_of(const Shape& shape) {
+  if (const HalfSpace* half = std::get_if<HalfSpace>(&shape)) return std::abs(half->plane.offset);
+  const Bounds box = bounds(Placed{shape, {}, {}, {}});
+  return norm(max(abs(box.lower), abs(box.upper)));
+}
+
+}  // namespace
+
+// ------------------------------------------------------------------------------------------------------------ Overlaps
+
+void Overlaps::append(IndexPair pair, const Row& row) {
+  pairs.push_back(pair);
+  status.push_back(static_cast<std::int8_t>(row.status));
+  widened.push_back(row.widened);
+  facets_touched.push_back(row.facets_touched);
+  volume.push_back(row.volume);
+  volume_error.push_back(row.volume_error);
+  area.push_back(row.area);
+  depth.push_back(row.depth);
+  centroid.push_back(row.status == Status::kOverlapping ? row.centroid : Vec3{kNaN, kNaN, kNaN});
+  normal.push_back(row.normal);
+  gradient.push_back(row.gradient);
+  source.push_back(row.source);
+}
+
+void Overlaps::reserve(size_t rows) {
+  pairs.reserve(rows);
+  status.reserve(rows);
+  widened.reserve(rows);
+  facets_touched.reserve(rows);
+  for (std::vector<double>* column : {&volume, &volume_error, &area, &depth}) column->reserve(rows);
+  centroid.reserve(rows);
+  normal.reserve(rows);
+  gradient.reserve(rows);
+  source.reserve(rows);
+}
+
+std::shared_ptr<Overlap> Overlaps::overlap(size_t row) const {
+  if (auto known = source[row].lock()) return known;
+  std::vector<Placed> bodies;
+  for (int i : pairs[row]) {
+    const PoseNumbers& p = (*poses)[i];
+    bodies.push_back(make_placed((*shapes)[i], {p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}));
+  }
+  return std::make_shared<Overlap>(std::move(bodies), tolerance, method);
+}
+
+Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
+  Overlaps chosen;
+  chosen.examined = examined;
+  chosen.planes_asked = planes_asked;
+  chosen.tolerance = tolerance;
+  chosen.method = method;
+  chosen.shapes = shapes;
+  chosen.poses = poses;
+  chosen.reserve(rows.size());
+  for (std::int64_t i : rows)
+    chosen.append(pairs[i],
+                  {static_cast<Status>(status[i]), widened[i] != 0, facets_touched[i], volume[i], volume_error[i],
+                   area[i], depth[i], centroid[i], normal[i], gradient[i], source[i].lock()});
+  return chosen;
+}
+
+// --------------------------------------------------------------------------------------------------------------- Batch
+
+/// All that a call leaves behind for the next one.
+struct Batch::Memory {
+  std::vector<Body> bodies;
+  std::shared_ptr<const std::vector<PoseNumbers>> poses;  ///< of the bodies; shared with the answers
+  std::vector<Enclosure> enclosures;                      ///< parallel to them
+  BoxTree tree;
+  std::vector<IndexPair> candidates;
+  std::vector<Known> known, next_known;        ///< of the last call with pairs, and of the one under way
+  std::vector<Overlaps::Row> rows, next_rows;  ///< parallel to these
+  std::vector<char> done;                      ///< of the call under way
+  std::atomic<size_t> asked{0};                ///< in the call under way: planes
+  bool sorted = false;                         ///< `known` is, by pair
+  double tolerance = 0;
+  Method method = Method::kAuto;
+
+  std::vector<int> before;   ///< of the call under way, per pair: its row in the last call, or -1
+  bool both_sorted = false;  ///< the pairs of the last call, and of that under way
+  size_t walked = 0;         ///< of the last call's pairs, if so
+
+  explicit Memory(const std::vector<Shape>& shapes) {
+    for (const Shape& shape : shapes) bodies.push_back({make_placed(shape, {}, {}), reach_of(shape), 0});
+    enclosures.resize(shapes.size());
+  }
+
+  void place(std::span<const double> positions, std::span<const double> orientations);
+  void begin(std::span<const IndexPair> pairs);
+  void recall(std::span<const IndexPair> pairs);
+  bool answer(size_t i, double with_tolerance, Method by_method);
+  void keep(double of_tolerance, Method of_method);
+};
+
+/// Poses that are the same to the last bit leave the body as it is.
+void Batch::Memory::place(std::span<const double> positions, std::span<const double> orientations) {
+  const auto before_this = std::exchange(poses, nullptr);
+  auto now = std::make_shared<std::vector<PoseNumbers>>(bodies.size());
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    PoseNumbers& pose = (*now)[i];
+    std::copy_n(&positions[3 * i], 3, pose.begin());
+    std::copy_n(&orientations[4 * i], 4, pose.begin() + 3);
+    if (before_this && std::memcmp(pose.data(), (*before_this)[i].data(), sizeof(PoseNumbers)) == 0) continue;
+    try {
+      bodies[i].placed.move_to({pose[0], pose[1], pose[2]}, {pose[3], pose[4], pose[5], pose[6]});
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("pose " + std::to_string(i) + ": " + error.what());
+    }
+    ++bodies[i].version;
+    enclosures[i] = enclosure(bodies[i].placed);
+  }
+  poses = std::move(now);
+}
+
+void Batch::Memory::begin(std::span<const IndexPair> pairs) {
+  both_sorted = sorted && std::is_sorted(pairs.begin(), pairs.end());
+  walked = 0;
+  asked = 0;
+  next_known.clear(), next_rows.clear(), before.clear(), done.clear();
+  next_known.reserve(pairs.size()), next_rows.reserve(pairs.size());
+  before.reserve(pairs.size()), done.reserve(pairs.size());
+}
+
+/// Lays out rows for more pairs, and finds these in the last call: by a walk along both lists where they are sorted,
+/// else at the same place.
+void Batch::Memory::recall(std::span<const IndexPair> pairs) {
+  for (const IndexPair& pair : pairs) {
+    while (both_sorted && walked < known.size() && known[walked].pair < pair) ++walked;
+    const size_t at = both_sorted ? walked : next_known.size();
+    before.push_back(at < known.size() && known[at].pair == pair ? static_cast<int>(at) : -1);
+    next_known.push_back({pair, {bodies[pair[0]].version, bodies[pair[1]].version}, {}});
+  }
+  next_rows.resize(next_known.size());
+  done.resize(next_known.size());
+}
+
+/// Fills row i; false if that took long.
+bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
+  Known& pair = next_known[i];
+  if (before[i] >= 0) {
+    const Known& last = known[before[i]];
+    pair.axis = last.axis;
+    if (last.version == pair.version && tolerance == with_tolerance && method == by_method) {
+      next_rows[i] = rows[before[i]];
+      done[i] = true;
+      return true;
+    }
+  }
+  const Body &a = bodies[pair.pair[0]], &b = bodies[pair.pair[1]];
+  // The article's method has its own way of telling.
+  const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].status == Status::kOverlapping;
+  const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
+  const size_t planes_before = planes_asked;
+  next_rows[i] = separated ? Overlaps::Row{} : row_of(a.placed, b.placed, with_tolerance, by_method);
+  asked.fetch_add(planes_asked - planes_before, std::memory_order_relaxed);
+  done[i] = true;
+  return !next_rows[i].source;
+}
+
+void Batch::Memory::keep(double of_tolerance, Method of_method) {
+  known.swap(next_known);
+  rows.swap(next_rows);
+  tolerance = of_tolerance;
+  method = of_method;
+  sorted = std::is_sorted(known.begin(), known.end(), [](const Known& a, const Known& b) { return a.pair < b.pair; });
+}
+
+/// The batch's memory, or, while another thread has that, one of its own.
+class Batch::Borrowed {
+ public:
+  explicit Borrowed(Batch& batch) : batch_(batch), first_(!batch.in_use_.test_and_set()) {
+    if (!first_) own_ = std::make_unique<Memory>(batch.shapes());
+  }
+  ~Borrowed() {
+    if (first_) batch_.in_use_.clear();
+  }
+  Borrowed(const Borrowed&) = delete;
+  Borrowed& operator=(const Borrowed&) = delete;
+  Memory* operator->() { return first_ ? batch_.memory_.get() : own_.get(); }
+
+ private:
+  Batch& batch_;
+  bool first_;
+  std::unique_ptr<Memory> own_;
+};
+
+Batch::Batch(std::vector<Shape> shapes)
+    : shapes_(std::make_shared<const std::vector<Shape>>(std::move(shapes))),
+      memory_(std::make_unique<Memory>(*shapes_)) {}
+
+Batch::~Batch() = default;
+
+std::vector<IndexPair> Batch::candidate_pairs(std::span<const double> positions, std::span<const double> orientations) {
+  Borrowed memory(*this);
+  memory->place(positions, orientations);
+  std::vector<IndexPair> pairs;
+  memory->tree.pairs(memory->enclosures, pairs);
+  return pairs;
+}
+
+Overlaps Batch::overlaps(std::span<const double> positions, std::span<const double> orientations,
+                         std::optional<std::span<const IndexPair>> given, bool separated, double tolerance,
+                         Method method, int threads, const std::function<bool()>& go_on, bool& finished) {
+  if (!(tolerance > 0 && tolerance < 1))
+    throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
+  Borrowed memory(*this);
+  memory->place(positions, orientations);
+  if (!given) memory->tree.pairs(memory->enclosures, memory->candidates);
+  const std::span<const IndexPair> pairs = given ? *given : std::span<const IndexPair>(memory->candidates);
+  Overlaps answer;
+  answer.tolerance = tolerance;
+  answer.method = method;
+  answer.shapes = shapes_;
+  answer.poses = memory->poses;
+  const auto listed = [&](size_t i) {
+    return memory->done[i] && (separated || memory->next_rows[i].status != Status::kSeparated);
+  };
+  memory->begin(pairs);
+  finished = true;
+  for (size_t first = 0; finished && first < pairs.size(); first += kStretch) {
+    const size_t count = std::min(kStretch, pairs.size() - first);
+    memory->recall(pairs.subspan(first, count));
+    finished = for_each_in_parallel(
+        count, threads, [&](size_t i, int) { return memory->answer(first + i, tolerance, method); }, go_on);
+    size_t rows = 0;
+    for (size_t i = first; i < first + count; ++i) answer.examined += memory->done[i], rows += listed(i);
+    if (first == 0) answer.reserve(separated ? pairs.size() : rows);
+    for (size_t i = first; i < first + count; ++i)
+      if (listed(i)) answer.append(pairs[i], memory->next_rows[i]);
+    finished = finished && (first + count == pairs.size() || go_on());
+  }
+  answer.planes_asked = memory->asked;
+  if (finished) memory->keep(tolerance, method);
+  return answer;
+}
+
+}  // namespace overlapper

@@ -1,0 +1,57 @@
+#include "distance/box_axes.h"
+
+#include <limits>
+
+namespace overlapper {
+namespace {
+
+/// Two boxes in the axes of the first: the columns of `turn` are the axes of the second.
+class AxisSearch {
+ public:
+  AxisSearch(Vec3 half_a, Vec3 half_b, const Mat3& turn, Vec3 apart)
+      : half_a_(half_a), half_b_(half_b), columns_(transposed(turn)), apart_(apart) {}
+
+  Penetration run(double far) {
+    for (Vec3 axis : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}, columns_.row0, columns_.row1, columns_.row2})
+      if (consider(axis, 0) < -far) return best_;
+    // Where a face and two edges agree to rounding, the face is the better witness.
+    const double worth = rounding(max_component(half_a_) + max_component(half_b_));
+    for (Vec3 column : {columns_.row0, columns_.row1, columns_.row2})
+      // In these axes the products with the first box's edges are orthogonal to them to the last bit, so that the
+      // noise of two nearly parallel edges turns the axis only across both.
+      for (Vec3 axis : {Vec3{0, -column.z, column.y}, Vec3{column.z, 0, -column.x}, Vec3{-column.y, column.x, 0}}) {
+        const double length = std::sqrt(norm2(axis));
+        if (length > 0 && consider(axis / length, worth) < -far) return best_;
+      }
+    return best_;
+  }
+
+ private:
+  /// Keeps the axis if the boxes part sooner along it than along the best so far, by more than `worth`.
+  double consider(Vec3 axis, double worth) {
+    const double reach_a = dot(half_a_, abs(axis));
+    const double reach_b = dot(half_b_, abs(columns_ * axis));
+    const double along = dot(axis, apart_);
+    const double depth = reach_a + reach_b - std::abs(along);
+    if (depth + worth < best_.depth) best_ = {depth, along < 0 ? -axis : axis};
+    return depth;
+  }
+
+  Vec3 half_a_, half_b_;
+  Mat3 columns_;  ///< by rows: the axes of the second box
+  Vec3 apart_;    ///< from the second box to the first
+  Penetration best_{std::numeric_limits<double>::infinity(), {}};
+};
+
+}  // namespace
+
+Penetration box_penetration(const Box& a, const Pose& pose_a, const Box& b, const Pose& pose_b, double far) {
+  const Mat3 into_a = transposed(pose_a.rotation);
+  AxisSearch search(a.half_extents, b.half_extents, into_a * pose_b.rotation,
+                    into_a * (pose_a.translation - pose_b.translation));
+  Penetration result = search.run(far);
+  result.normal = pose_a.rotation * result.normal;
+  return result;
+}
+
+}  // namespace overlapper

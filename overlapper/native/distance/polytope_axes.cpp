@@ -1,0 +1,167 @@
+#include "distance/polytope_axes.h"
+
+#include <limits>
+#include <vector>
+
+#include "geometry/wide.h"
+#include "shapes/solid.h"
+
+namespace overlapper {
+namespace {
+
+/// Of both together: beyond it, EPA is done sooner, which climbs from vertex to vertex.
+constexpr int kMostFacets = 1024;
+
+/// Vertices that one arc passes on the other body; doubles that stay in doubt would go on.
+constexpr int kMostTurns = 64;
+
+/// Vertices looked at before asking whether more are needed.
+constexpr int kGlance = 8;
+
+/// A direction and how far the other solid reaches against it.
+struct Way {
+  Vec3 direction;  ///< unit
+  int vertex;      ///< lowest along it
+  double height;   ///< of that vertex
+};
+
+/// Per facet of one solid, the way along its normal into the other. Where the first few vertices already show that a
+/// way is longer than the best one known, it ends at the lowest of these.
+void ways_along_normals(const Solid& faces, const Solid& other, double best, std::vector<Way>& ways) {
+  ways.resize(faces.stride);
+  for (int f = 0; f < faces.facets; f += 4) {
+    const Pair ax = load(&faces.nx[f]), ay = load(&faces.ny[f]), az = load(&faces.nz[f]),
+               top_a = load(&faces.offset[f]);
+    const Pair bx = load(&faces.nx[f + 2]), by = load(&faces.ny[f + 2]), bz = load(&faces.nz[f + 2]);
+    const Pair top_b = load(&faces.offset[f + 2]);
+    Pair height_a = Pair{} + std::numeric_limits<double>::infinity(), height_b = height_a, lowest_a{}, lowest_b{};
+    for (int v = 0; v < other.vertices;) {
+      for (const int end = std::min(v + kGlance, other.vertices); v < end; ++v) {
+        const double x = other.x[v], y = other.y[v], z = other.z[v];
+        const Pair a = ax * x + ay * y + az * z, b = bx * x + by * y + bz * z, number = Pair{} + static_cast<double>(v);
+        lowest_a = a < height_a ? number : lowest_a;
+        height_a = a < height_a ? a : height_a;
+        lowest_b = b < height_b ? number : lowest_b;
+        height_b = b < height_b ? b : height_b;
+      }
+      const auto shorter = (top_a - height_a < best) | (top_b - height_b < best);
+      if (!(shorter[0] | shorter[1])) break;
+    }
+    for (int i = 0; i < 2; ++i) {
+      ways[f + i] = {faces.normal(f + i), static_cast<int>(lowest_a[i]), height_a[i]};
+      ways[f + 2 + i] = {faces.normal(f + 2 + i), static_cast<int>(lowest_b[i]), height_b[i]};
+    }
+    for (int i = f; i < std::min(f + 4, faces.facets); ++i) best = std::min(best, faces.offset[i] - ways[i].height);
+  }
+}
+
+/// The least translation that parts two solids in the same coordinates.
+class PartingSearch {
+ public:
+  PartingSearch(const Solid& a, const Solid& b, double noise) : a_(a), b_(b), noise_(noise) {}
+
+  /// False if they may be apart, or if doubles cannot tell.
+  bool run() {
+    thread_local std::vector<Way> of_a, of_b;
+    ways_along_normals(a_, b_, best_.depth, of_a);
+    for (int f = 0; f < a_.facets; ++f) keep(of_a[f].direction, a_.offset[f] - of_a[f].height);
+    if (best_.depth <= 4 * noise_) return false;
+    ways_along_normals(b_, a_, best_.depth, of_b);
+    for (int f = 0; f < b_.facets; ++f) keep(-of_b[f].direction, b_.offset[f] - of_b[f].height);
+    for (const Edge& e : a_.edges) {
+      if (best_.depth <= 4 * noise_) return false;
+      if (!search_arc(e, of_a[e.left], of_a[e.right], kMostTurns)) return false;
+    }
+    return best_.depth > 4 * noise_;
+  }
+
+  const Penetration& best() const { return best_; }
+
+ private:
+  void keep(Vec3 direction, double depth) {
+    if (depth < best_.depth) best_ = {depth, Vec3{} - direction};
+  }
+
+  /// Looks for shorter ways out between two directions in which a reaches farthest with an edge.
+  bool search_arc(const Edge& edge, const Way& left, const Way& right, int turns) {
+    if (left.vertex == right.vertex) return true;
+    const Vec3 from = a_.vertex(edge.from), low_left = b_.vertex(left.vertex), low_right = b_.vertex(right.vertex);
+    const Vec3 step = low_right - low_left;
+    const double rise = dot(left.direction, step), fall = -dot(right.direction, step);
+    // Of two ways, one was found among all vertices that the other was, so that either vertex may bound the whole arc,
+    // but not each be the lower one at the far end.
+    if (!(rise > 0 && fall > 0)) return true;
+    // Both vertices of b are equally low here, so that the difference reaches at least so far; between here and either
+    // end, where the vertex there bounds it, it reaches at least as far as at the nearer of the two.
+    const Vec3 crossing = left.direction + rise / (rise + fall) * (right.direction - left.direction);
+    if (dot(crossing, from - low_left) - noise_ >= best_.depth * std::sqrt(norm2(crossing))) return true;
+    if (turns == 0) return false;
+    const Way across = lowest(orthogonal(edge, left.vertex, right.vertex));
+    if (dot(across.direction, from) - across.height < best_.depth - noise_) {
+      const double depth = highest(across.direction) - across.height;
+      // Where a face and two edges agree to rounding, the face is the better witness.
+      if (depth < best_.depth - noise_) keep(across.direction, depth);
+    }
+    if (dot(across.direction, low_left) - across.height <= noise_) return true;
+    return search_arc(edge, left, across, turns - 1) && search_arc(edge, across, right, turns - 1);
+  }
+
+  /// The unit vector of the arc of an edge that is orthogonal also to a segment between two vertices of b.
+  Vec3 orthogonal(const Edge& edge, int left, int right) const {
+    const Vec3 along = a_.vertex(edge.to) - a_.vertex(edge.from), step = b_.vertex(right) - b_.vertex(left);
+    const Vec3 product = cross(along, step);
+    if (16 * norm2(product) > norm2(along) * norm2(step)) return unit(product);
+    // Of nearly parallel edges, the product of doubles would tilt along them.
+    return unit(rounded(wide_cross(wide_difference(a_.vertex(edge.to), a_.vertex(edge.from)),
+                                   wide_difference(b_.vertex(right), b_.vertex(left)))));
+  }
+
+  Way lowest(Vec3 direction) const {
+    Way way{direction, 0, std::numeric_limits<double>::infinity()};
+    for (int v = 0; v < b_.vertices; ++v) {
+      const double height = dot(direction, b_.vertex(v));
+      if (height < way.height) way.height = height, way.vertex = v;
+    }
+    return way;
+  }
+
+  double highest(Vec3 direction) const {
+    double height = -std::numeric_limits<double>::infinity();
+    for (int v = 0; v < a_.vertices; ++v) height = std::max(height, dot(direction, a_.vertex(v)));
+    return height;
+  }
+
+  const Solid &a_, &b_;
+  double noise_;  ///< m: rounding of heights
+  Penetration best_{std::numeric_limits<double>::infinity(), {}};
+};
+
+bool has_edges(const Shape& shape) {
+  const Hull* hull = std::get_if<Hull>(&shape);
+  return hull ? !hull->data->edges.empty() : std::holds_alternative<Box>(shape);
+}
+
+}  // namespace
+
+std::optional<Penetration> polytope_penetration(const Placed& a, const Placed& b) {
+  if (!has_edges(a.shape) || !has_edges(b.shape)) return std::nullopt;
+  if (facets(a.shape) + facets(b.shape) > kMostFacets) return std::nullopt;
+  if (facets(b.shape) < facets(a.shape)) {
+    auto swapped = polytope_penetration(b, a);
+    if (swapped) swapped->normal = Vec3{} - swapped->normal;
+    return swapped;
+  }
+  const Pose pose = relative_pose(a.pose, b.pose);
+  const double reach = radius(a.shape) + radius(b.shape) + norm(pose.translation);
+  const double noise = rounding(reach), flat = flatness(a.shape) + flatness(b.shape);
+  if (flat > 4 * noise) return std::nullopt;
+  thread_local Solid solid_a, solid_b;
+  constexpr double beyond = std::numeric_limits<double>::infinity();
+  set_solid(solid_a, a, 0, nullptr, beyond);
+  set_solid(solid_b, b, 1, &pose, beyond);
+  PartingSearch search(solid_a, solid_b, noise + flat);
+  if (!search.run()) return std::nullopt;
+  return Penetration{search.best().depth, a.pose.rotation * search.best().normal};
+}
+
+}  // namespace overlapper

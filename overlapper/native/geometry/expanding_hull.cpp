@@ -1,0 +1,245 @@
+#include "geometry/expanding_hull.h"
+
+#include <cassert>
+
+#include "geometry/predicates.h"
+
+namespace overlapper {
+namespace {
+
+/// The point farthest from `origin` along `measure`, by the largest value that `measure(point)` takes.
+template <class Measure>
+int farthest(std::span<const Vec3> points, Measure measure) {
+  int best = 0;
+  double largest = -1;
+  for (int i = 0; i < static_cast<int>(points.size()); ++i) {
+    const double value = measure(points[i]);
+    if (value > largest) largest = value, best = i;
+  }
+  return best;
+}
+
+Vec3 flushed(Vec3 p, double negligible) {
+  const auto keep = [negligible](double value) { return std::abs(value) < negligible ? 0 : value; };
+  return {keep(p.x), keep(p.y), keep(p.z)};
+}
+
+/// Four points that span a solid, roughly as large as possible, counter-clockwise seen from the fourth's far side;
+/// false if none do.
+bool extreme_tetrahedron(std::span<const Vec3> points, std::array<int, 4>& corner) {
+  if (points.size() < 4) return false;
+  const Vec3 first = points[0];
+  corner[0] = farthest(points, [&](Vec3 p) { return norm2(p - first); });
+  const Vec3 a = points[corner[0]];
+  corner[1] = farthest(points, [&](Vec3 p) { return norm2(p - a); });
+  const Vec3 ab = points[corner[1]] - a;
+  corner[2] = farthest(points, [&](Vec3 p) { return norm2(cross(ab, p - a)); });
+  const Vec3 normal = accurate_normal(a, points[corner[1]], points[corner[2]]);
+  corner[3] = farthest(points, [&](Vec3 p) { return std::abs(dot(normal, p - a)); });
+
+  const auto side = [&](int d) { return orientation(a, points[corner[1]], points[corner[2]], points[d]); };
+  int sign = side(corner[3]);
+  // Rounding may pick a point in the plane although another lies just off it.
+  for (int d = 0; sign == 0 && d < static_cast<int>(points.size()); ++d) {
+    sign = side(d);
+    if (sign != 0) corner[3] = d;
+  }
+  if (sign > 0) std::swap(corner[1], corner[2]);
+  return sign != 0;
+}
+
+}  // namespace
+
+int ExpandingHull::make_facet(int a, int b, int c) {
+  const Vec3 u = points[b] - points[a], v = points[c] - points[a];
+  Facet facet;
+  facet.vertex = {a, b, c};
+  facet.normal = cross(u, v);
+  facet.normal_rounding = {std::abs(u.y * v.z) + std::abs(u.z * v.y), std::abs(u.z * v.x) + std::abs(u.x * v.z),
+                           std::abs(u.x * v.y) + std::abs(u.y * v.x)};
+  facets.push_back(facet);
+  visited_.push_back(0);
+  return static_cast<int>(facets.size()) - 1;
+}
+
+bool ExpandingHull::start() {
+  facets.clear();
+  visited_.clear();
+  visit_ = 0;
+  double largest = 0;
+  for (Vec3 p : points) largest = std::max(largest, max_component(abs(p)));
+  negligible_coordinate_ = 0x1p-200 * largest;
+  for (Vec3& p : points) p = flushed(p, negligible_coordinate_);
+  std::array<int, 4> corner;
+  if (!extreme_tetrahedron(points, corner)) return false;
+  const auto [a, b, c, d] = corner;
+  inserted_ = 4;
+  make_facet(a, b, c);
+  make_facet(a, d, b);
+  make_facet(b, d, c);
+  make_facet(c, d, a);
+  facets[0].neighbour = {1, 2, 3};
+  facets[1].neighbour = {3, 2, 0};
+  facets[2].neighbour = {1, 3, 0};
+  facets[3].neighbour = {2, 1, 0};
+  return true;
+}
+
+int ExpandingHull::add(Vec3 point) {
+  points.push_back(flushed(point, negligible_coordinate_));
+  return static_cast<int>(points.size()) - 1;
+}
+
+bool ExpandingHull::sees(int facet, int p) const {
+  const Facet& f = facets[facet];
+  const Vec3 w = points[p] - points[f.vertex[0]];
+  const double det = dot(f.normal, w);
+  // The static filter of orientation(), with the facet's share of it computed once.
+  const double error = 8 * 0x1p-53 * dot(f.normal_rounding, abs(w));
+  if (det > error) return true;
+  if (det < -error) return false;
+  return orientation(points[f.vertex[0]], points[f.vertex[1]], points[f.vertex[2]], points[p]) > 0;
+}
+
+double ExpandingHull::height(int facet, int p) const {
+  const Facet& f = facets[facet];
+  const double length = std::sqrt(norm2(f.normal));
+  return length > 0 ? dot(f.normal, points[p] - points[f.vertex[0]]) / length : 0;
+}
+
+void ExpandingHull::collect_visible(int p, int seen) {
+  assert(sees(seen, p));
+  removed_.clear();
+  horizon_.clear();
+  stack_.assign(1, seen);
+  ++visit_;
+  visited_[seen] = visit_;
+  while (!stack_.empty()) {
+    const int facet = stack_.back();
+    stack_.pop_back();
+    removed_.push_back(facet);
+    for (int i = 0; i < 3; ++i) {
+      const int other = facets[facet].neighbour[i];
+      if (visited_[other] == visit_) continue;
+      if (sees(other, p)) {
+        visited_[other] = visit_;
+        stack_.push_back(other);
+      } else {
+        horizon_.push_back({facets[facet].vertex[i], facets[facet].vertex[(i + 1) % 3], other});
+      }
+    }
+  }
+}
+
+void ExpandingHull::insert(int p, int seen) {
+  collect_visible(p, seen);
+  link_cone(p);
+  ++inserted_;
+  for (int facet : removed_) facets[facet].vertex = {-1, -1, -1};
+}
+
+void ExpandingHull::link_cone(int p) {
+  cone_.clear();
+  cone_start_.resize(points.size(), -1);
+  for (const HorizonRidge& ridge : horizon_) {
+    const int facet = make_facet(ridge.from, ridge.to, p);
+    cone_.push_back(facet);
+    cone_start_[ridge.from] = facet;
+    facets[facet].neighbour[0] = ridge.outside;
+    Facet& outside = facets[ridge.outside];
+    for (int i = 0; i < 3; ++i)
+      if (outside.vertex[i] == ridge.to && outside.vertex[(i + 1) % 3] == ridge.from) outside.neighbour[i] = facet;
+  }
+  // The horizon is one closed loop, so every vertex on it begins exactly one ridge.
+  for (int facet : cone_) {
+    const int next = cone_start_[facets[facet].vertex[1]];
+    assert(next >= 0);
+    facets[facet].neighbour[1] = next;
+    facets[next].neighbour[2] = facet;
+  }
+}
+
+bool ExpandingHull::wait_with_any(std::span<const int> candidates, int p) {
+  for (int facet : candidates) {
+    if (!sees(facet, p)) continue;
+    Facet& f = facets[facet];
+    const double distance = height(facet, p);
+    next_conflict_[p] = f.first_conflict;
+    f.first_conflict = p;
+    if (f.farthest_conflict < 0 || distance > f.farthest_height) f.farthest_conflict = p, f.farthest_height = distance;
+    return true;
+  }
+  return false;
+}
+
+void ExpandingHull::hand_on_conflicts(int facet, std::span<const int> candidates, int except) {
+  int p = facets[facet].first_conflict;
+  facets[facet].first_conflict = facets[facet].farthest_conflict = -1;
+  while (p >= 0) {
+    const int next = next_conflict_[p];
+    if (p != except) wait_with_any(candidates, p);
+    p = next;
+  }
+}
+
+bool ExpandingHull::rises_above_facet(int facet, int p, double fraction) const {
+  const Facet& f = facets[facet];
+  const auto [a, b, c] = f.vertex;
+  const Vec3 rise = points[p] - points[a];
+  // As in sees(), and for the facet's distance from the origin alike.
+  const double rounding = 8 * 0x1p-53 * dot(f.normal_rounding, abs(rise) + fraction * abs(points[a]));
+  const double excess = dot(f.normal, rise) - fraction * std::max(0.0, dot(f.normal, points[a]));
+  if (std::abs(excess) > rounding) return excess > 0;
+  const Vec3 normal = accurate_normal(points[a], points[b], points[c]);
+  return dot(normal, rise) > fraction * std::max(0.0, dot(normal, points[a]));
+}
+
+bool ExpandingHull::rises_above(int facet, int p, double fraction) {
+  if (rises_above_facet(facet, p, fraction)) return true;
+  collect_visible(p, facet);
+  return std::any_of(removed_.begin(), removed_.end(), [&](int seen) { return rises_above_facet(seen, p, fraction); });
+}
+
+bool ExpandingHull::build(std::span<const double> negligible) {
+  if (!start()) return false;
+  next_conflict_.assign(points.size(), -1);
+  const std::array<int, 4> first_facets{0, 1, 2, 3};
+  for (int p = 0; p < static_cast<int>(points.size()); ++p) wait_with_any(first_facets, p);
+
+  std::vector<int> pending(first_facets.begin(), first_facets.end());
+  while (!pending.empty()) {
+    const int facet = pending.back();
+    if (facets[facet].removed() || facets[facet].first_conflict < 0) {
+      pending.pop_back();
+      continue;
+    }
+    const int apex = facets[facet].farthest_conflict;
+    if (!negligible.empty() && !rises_above(facet, apex, negligible[apex])) {
+      // The hull only grows, so what is negligible now stays so.
+      hand_on_conflicts(facet, std::array{facet}, apex);
+      continue;
+    }
+    insert(apex, facet);
+    // A point that saw a removed facet and is still outside sees one of the cone: at the horizon, the plane of a cone
+    // facet lies between the planes of the two facets that met there.
+    for (int gone : removed_) hand_on_conflicts(gone, cone_, apex);
+    pending.insert(pending.end(), cone_.begin(), cone_.end());
+  }
+  return true;
+}
+
+std::vector<int> ExpandingHull::facet_at_vertex() const {
+  std::vector<int> at(points.size(), -1);
+  for (int f = 0; f < static_cast<int>(facets.size()); ++f)
+    if (!facets[f].removed())
+      for (int v : facets[f].vertex) at[v] = f;
+  return at;
+}
+
+int ExpandingHull::next_around(int facet, int vertex) const {
+  const Facet& f = facets[facet];
+  const int i = f.vertex[0] == vertex ? 0 : f.vertex[1] == vertex ? 1 : 2;
+  return f.neighbour[(i + 2) % 3];
+}
+
+}  // namespace overlapper

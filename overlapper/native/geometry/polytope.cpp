@@ -1,0 +1,91 @@
+#include "geometry/polytope.h"
+
+#include "geometry/predicates.h"
+
+namespace overlapper {
+
+Polytope polar_dual(const ExpandingHull& hull) {
+  Polytope polytope;
+  std::vector<int> vertex_of(hull.facets.size(), -1);
+  for (int f = 0; f < static_cast<int>(hull.facets.size()); ++f) {
+    const ExpandingHull::Facet& facet = hull.facets[f];
+    if (facet.removed()) continue;
+    const auto [a, b, c] = facet.vertex;
+    vertex_of[f] = static_cast<int>(polytope.vertices.size());
+    polytope.vertices.push_back(polar_vertex(hull.points[a], hull.points[b], hull.points[c]));
+  }
+  const std::vector<int> at = hull.facet_at_vertex();
+  polytope.ring_start.push_back(0);
+  for (int p = 0; p < static_cast<int>(hull.points.size()); ++p) {
+    if (at[p] < 0) continue;
+    int f = at[p];
+    do {
+      polytope.ring.push_back(vertex_of[f]);
+      f = hull.next_around(f, p);
+    } while (f != at[p]);
+    polytope.ring_start.push_back(static_cast<int>(polytope.ring.size()));
+    polytope.dual.push_back(hull.points[p]);
+    polytope.plane.push_back(p);
+  }
+  return polytope;
+}
+
+namespace {
+
+Mat3 outer(Vec3 a, Vec3 b) { return {a.x * b, a.y * b, a.z * b}; }
+
+void add(Mat3& m, double s, const Mat3& other) {
+  m.row0 += s * other.row0;
+  m.row1 += s * other.row1;
+  m.row2 += s * other.row2;
+}
+
+}  // namespace
+
+Measures measure(const Polytope& polytope) {
+  Measures sum;
+  sum.cone_volume.reserve(polytope.facets());
+  sum.facet_centroid.reserve(polytope.facets());
+  for (int f = 0; f < polytope.facets(); ++f) {
+    const auto ring = polytope.facet(f);
+    const Vec3 a = polytope.vertices[ring[0]];
+    double cone = 0;
+    Vec3 weighted;
+    for (size_t i = 1; i + 1 < ring.size(); ++i) {
+      const Vec3 b = polytope.vertices[ring[i]], c = polytope.vertices[ring[i + 1]];
+      const double tetrahedron = dot(a, cross(b, c)) / 6;
+      const Vec3 corners = a + b + c;
+      cone += tetrahedron;
+      weighted += tetrahedron * corners;
+      // ∫ x xᵀ over a tetrahedron with one corner at the origin: V / 20 (Σ pᵢ pᵢᵀ + (Σ pᵢ)(Σ pᵢ)ᵀ).
+      for (Vec3 p : {a, b, c, corners}) add(sum.second_moment, tetrahedron / 20, outer(p, p));
+    }
+    sum.volume += cone;
+    sum.first_moment += weighted / 4;
+    sum.cone_volume.push_back(cone);
+    sum.facet_centroid.push_back(cone > 0 ? weighted / (3 * cone) : a);
+  }
+  return sum;
+}
+
+HullMeasures measure(const HullData& hull) {
+  Vec3 inside;
+  for (Vec3 v : hull.vertices) inside += v / static_cast<double>(hull.vertices.size());
+  HullMeasures sum;
+  Vec3 moment;
+  for (int f = 0; f + 1 < static_cast<int>(hull.ring_start.size()); ++f) {
+    const auto ring = hull.facet(f);
+    const Vec3 a = hull.vertices[ring[0]] - inside;
+    for (size_t i = 1; i + 1 < ring.size(); ++i) {
+      const Vec3 b = hull.vertices[ring[i]] - inside, c = hull.vertices[ring[i + 1]] - inside;
+      const double tetrahedron = dot(a, cross(b, c)) / 6;
+      sum.volume += tetrahedron;
+      sum.area += norm(cross(b - a, c - a)) / 2;
+      moment += tetrahedron / 4 * (a + b + c);
+    }
+  }
+  sum.centroid = inside + moment / sum.volume;
+  return sum;
+}
+
+}  // namespace overlapper

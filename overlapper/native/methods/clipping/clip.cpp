@@ -1,0 +1,413 @@
+#include "methods/clipping/clip.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "distance/minkowski.h"
+#include "methods/clipping/meeting.h"
+#include "methods/tracing/trace.h"
+#include "shapes/canonical_order.h"
+
+namespace overlapper {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Workspace : Meeting {
+  std::vector<int> apex;          ///< per facet: one of its vertices, or -1
+  std::vector<double> cone;       ///< per facet: six times the volume of the cone from the origin
+  std::vector<double> extent;     ///< per vertex: the sum of its coordinates over their size
+  std::vector<Vec3> area_vector;  ///< per facet: twice its
+  std::vector<WideLanes> wide_planes;
+};
+
+Workspace& workspace() {
+  thread_local Workspace kept;
+  return kept;
+}
+
+/// Counts coordinates from the middle of the vertices, which it returns.
+Vec3 centre(std::span<Vec3> vertices) {
+  Vec3 middle;
+  for (Vec3 v : vertices) middle += v;
+  middle = middle / static_cast<double>(vertices.size());
+  for (Vec3& v : vertices) v -= middle;
+  return middle;
+}
+
+/// Two vectors, the coordinates of both side by side.
+struct VecPair {
+  Pair x, y, z;
+};
+inline VecPair beside(Vec3 a, Vec3 b) { return {Pair{a.x, b.x}, Pair{a.y, b.y}, Pair{a.z, b.z}}; }
+inline VecPair operator+(const VecPair& a, const VecPair& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline VecPair operator-(const VecPair& a, const VecPair& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline VecPair operator/(const VecPair& a, double s) { return {a.x / s, a.y / s, a.z / s}; }
+inline VecPair operator*(Pair s, const VecPair& a) { return {s * a.x, s * a.y, s * a.z}; }
+inline Pair dot(const VecPair& a, const VecPair& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline VecPair cross(const VecPair& a, const VecPair& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline Pair norm2(const VecPair& a) { return dot(a, a); }
+inline Vec3 lane(const VecPair& a, int k) { return {a.x[k], a.y[k], a.z[k]}; }
+
+/// Calls `use(e, f, two)` for edges two by two; of an odd number the last one is alone, and `f` is the same.
+template <class Use>
+void for_each_two(std::span<const Edge> edges, Use use) {
+  for (size_t i = 0; i < edges.size(); i += 2) {
+    const bool two = i + 1 < edges.size();
+    use(edges[i], edges[two ? i + 1 : i], two);
+  }
+}
+
+/// Sums over the common polytope that a tracer has left, its vertices counted from a point inside.
+class Sums {
+ public:
+  /// `size` is how far the vertices reach along each axis, or any other unit of length.
+  Sums(Workspace& workspace, Vec3 size) : w_(workspace) {
+    const Vec3 per_size{1 / size.x, 1 / size.y, 1 / size.z};
+    w_.apex.assign(w_.first.facets + w_.second.facets, -1);
+    w_.cone.assign(w_.first.facets + w_.second.facets, 0);
+    w_.extent.resize(w_.vertices.size());
+    std::ranges::transform(w_.vertices, w_.extent.begin(), [&](Vec3 v) { return dot(abs(v), per_size); });
+    for (const auto* list : {&w_.edges, &w_.seam})
+      for (const Edge& e : *list) w_.apex[e.left] = w_.apex[e.right] = e.from;
+    for (const auto* list : {&w_.edges, &w_.seam}) add(*list);
+    // Each product of three coordinates is rounded less than eight times, and then comes the sum of the tetrahedra, of
+    // which none is negative.
+    const double terms = 2 * static_cast<double>(w_.edges.size() + w_.seam.size());
+    rounding_ = 8 * 0x1p-53 * lost_ * size.x * size.y * size.z / 6 + terms * 0x1p-53 * six_volumes_ / 6;
+  }
+
+  double volume() const { return six_volumes_ / 6; }
+  double volume_rounding() const { return rounding_; }
+  Vec3 centroid() const { return moment_ / (4 * six_volumes_); }
+
+  /// On the first body, from the seam.
+  Pull pull() const {
+    const Vec3* vertices = w_.vertices.data();
+    Pull pull{};
+    for_each_two(w_.seam, [&](const Edge& e, const Edge& f, bool two) {
+      const PullOf<VecPair> pulls =
+          pull_along_border(beside(vertices[e.from], vertices[f.from]), beside(vertices[e.to], vertices[f.to]));
+      const auto add_lane = [&](int k) {
+        pull.force += lane(pulls.force, k);
+        pull.moment += lane(pulls.moment, k);
+      };
+      add_lane(0);
+      if (two) add_lane(1);
+    });
+    return {pull.force, pull.moment - cross(centroid(), pull.force)};
+  }
+
+ private:
+  /// Tetrahedra from the origin over each edge and a corner of either facet; none is negative. What two edges add is
+  /// computed at once, and added in their order.
+  void add(std::span<const Edge> edges) {
+    const Vec3* vertices = w_.vertices.data();
+    const double* extent = w_.extent.data();
+    const int* apex = w_.apex.data();
+    double* cone = w_.cone.data();
+    Vec3 moment = moment_;
+    double six_volumes = six_volumes_, lost = lost_;
+    for_each_two(edges, [&](const Edge& e, const Edge& f, bool two) {
+      const int left_e = apex[e.left], left_f = apex[f.left], right_e = apex[e.right], right_f = apex[f.right];
+      const VecPair from = beside(vertices[e.from], vertices[f.from]), to = beside(vertices[e.to], vertices[f.to]);
+      const VecPair left = beside(vertices[left_e], vertices[left_f]), sum = from + to, area = cross(from, to);
+      const VecPair right = beside(vertices[right_e], vertices[right_f]);
+      const Pair on_left = dot(left, area), on_right = -dot(right, area), on_both = on_left + on_right;
+      const Pair products = (Pair{extent[left_e], extent[left_f]} + Pair{extent[right_e], extent[right_f]}) *
+                            Pair{extent[e.from], extent[f.from]} * Pair{extent[e.to], extent[f.to]};
+      const VecPair moments = on_left * (left + sum) + on_right * (right + sum);
+      const auto add_lane = [&](const Edge& edge, int k) {
+        cone[edge.left] += on_left[k];
+        cone[edge.right] += on_right[k];
+        lost += products[k];
+        six_volumes += on_both[k];
+        moment += lane(moments, k);
+      };
+      add_lane(e, 0);
+      if (two) add_lane(f, 1);
+    });
+    moment_ = moment, six_volumes_ = six_volumes, lost_ = lost;
+  }
+
+  Workspace& w_;
+  Vec3 moment_;
+  double six_volumes_ = 0;
+  double lost_ = 0;  ///< the products that the volume is summed from, were none of their terms to cancel
+  double rounding_ = 0;
+};
+
+/// Distance of a common facet's plane from the middle of the common polytope.
+struct Slack {
+  Vec3 normal;
+  double distance;
+};
+
+/// Calls `use(facet, slack)` for each facet of the common polytope.
+template <class Use>
+void for_each_facet(const Workspace& w, Vec3 middle, Use use) {
+  for (int f = 0; f < static_cast<int>(w.apex.size()); ++f) {
+    if (w.apex[f] < 0) continue;
+    const Solid& body = f < w.first.facets ? w.first : w.second;
+    const int plane = f < w.first.facets ? f : f - w.first.facets;
+    use(f, Slack{body.normal(plane), body.offset[plane] - dot(body.normal(plane), middle)});
+  }
+}
+
+/// The volume between the polytope and one whose planes are moved out by `moved`: its area grows on the way.
+double moved_volume(double area, double moved, double least_slack) {
+  const double grown = 1 + moved / least_slack;
+  return moved * area * (grown * grown + grown + 1) / 3;
+}
+
+/// Orthogonal axes as rows, the first across the facet nearest to the middle, the second across the one that is nearest
+/// to it after that: so along each, coordinates in a sliver or a needle are no larger than its thickness there.
+Mat3 thin_axes(const Workspace& w, Vec3 middle) {
+  Slack nearest{{}, kInfinity}, next{{}, kInfinity};
+  for_each_facet(w, middle, [&](int, const Slack& s) { nearest = s.distance < nearest.distance ? s : nearest; });
+  const Vec3 first = unit(nearest.normal);
+  for_each_facet(w, middle, [&](int, const Slack& s) {
+    const Vec3 along = s.normal - dot(s.normal, first) * first;
+    const double length2 = norm2(along);
+    if (length2 < 0x1p-10) return;  // a direction of its own has more than rounding left
+    const double distance = s.distance / std::sqrt(length2);
+    if (distance < next.distance) next = {along, distance};
+  });
+  const Vec3 along = unit(next.normal), second = unit(along - dot(along, first) * first);
+  return {first, second, cross(first, second)};
+}
+
+/// Areas of facets from their corners alone.
+double area_by_corners(Workspace& w) {
+  w.area_vector.assign(w.apex.size(), {});
+  for (const auto* list : {&w.edges, &w.seam}) {
+    for (const Edge& e : *list) {
+      const Vec3 area = cross(w.vertices[e.from], w.vertices[e.to] - w.vertices[e.from]);
+      w.area_vector[e.left] += area;
+      w.area_vector[e.right] -= area;
+    }
+  }
+  double area = 0;
+  for (Vec3 twice : w.area_vector) area += std::sqrt(norm2(twice)) / 2;
+  return area;
+}
+
+/// What a tracer has left, once more about `middle` from corners placed in wider arithmetic. Leaves `common` as it is
+/// where even that is not enough.
+void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reach, double least_slack, Vec3 middle,
+                     ClippedPair& common) {
+  const Mat3 axes = thin_axes(w, middle);
+  const std::optional<double> noise =
+      place_in_wide({a, b, w.first.facets, w.apex, w.corners, middle, reach}, axes, w.vertices, w.wide_planes);
+  if (!noise) return;
+  Vec3 size;
+  for (Vec3 v : w.vertices) size = max(size, abs(v));
+  Sums sums(w, size);
+  const double area = area_by_corners(w);
+  // The axes are at right angles and of length 1 but for a few roundings.
+  const double error = moved_volume(area, *noise, least_slack) + sums.volume_rounding() + 16 * 0x1p-53 * sums.volume();
+  if (!(error <= kEnough * sums.volume())) return;
+  common.measured = common.widened = true;
+  common.volume = sums.volume();
+  common.volume_error = error;
+  common.area = area;
+  common.centroid = middle + apply_transposed(axes, sums.centroid());
+  const Pull pull = sums.pull();
+  common.pull = apply_transposed(axes, pull.force);
+  common.moment = apply_transposed(axes, pull.moment);
+}
+
+/// What sums in doubles say, about `middle`. Nothing if a plane passes that nearer than `least_slack`, which becomes
+/// the distance of the nearest.
+std::optional<Clipped> measure(Workspace& w, const Sums& sums, Vec3 middle, double rounding, double& least_slack) {
+  Clipped common;
+  common.status = Status::kOverlapping;
+  common.volume = sums.volume();
+  common.centroid = middle + sums.centroid();
+  double nearest = kInfinity;
+  for_each_facet(w, middle, [&](int f, const Slack& slack) {
+    common.area += w.cone[f] / (2 * slack.distance);
+    nearest = std::min(nearest, slack.distance);
+    ++common.facets_touched;
+  });
+  if (!(nearest > least_slack)) return std::nullopt;
+  least_slack = nearest;
+  common.volume_error = moved_volume(common.area, rounding, least_slack) + sums.volume_rounding();
+  common.measured = common.volume_error <= kEnough * common.volume;
+  return common;
+}
+
+/// The body with more facets comes first, whose coordinates are used; then the order does not depend on the caller's.
+bool comes_first(const Placed& a, const Placed& b) {
+  const int facets_a = facets(a.shape), facets_b = facets(b.shape);
+  return facets_a != facets_b ? facets_a > facets_b : !comes_before(b, a);
+}
+
+/// Pairs of facets, one of each body, up to which a table of all signs is sooner filled than a seam found: measured
+/// with hulls of 4 to 200 facets, deep and shallow, and boxes.
+constexpr double kLeastPairsTraced = 2500;
+
+bool worth_tracing(const Placed& a, const Placed& b) {
+  return traceable(a, b) && static_cast<double>(facets(a.shape)) * facets(b.shape) > kLeastPairsTraced;
+}
+
+/// How large the numbers are that describe a body in the coordinates of another one.
+double reach_from(const Placed& body, double between) { return between + radius(body.shape) + lost_far_away(body); }
+
+/// What all signs of a pair are computed from: where the second body is in the first one's own coordinates.
+struct Arrangement {
+  Pose pose;
+  double reach;  ///< how large the numbers are
+  double flat;
+  double sign_rounding;
+  bool apart;  ///< the balls around the bodies are
+};
+
+Arrangement arrange(const Placed& a, const Placed& b) {
+  const Pose pose = relative_pose(a.pose, b.pose);
+  const double between = norm(pose.translation), reach = std::max(reach_from(a, 0), reach_from(b, between));
+  const double flat = std::max(flatness(a.shape), flatness(b.shape)), sign_rounding = doubt(reach) + 4 * flat;
+  const bool apart = bounded(b.shape) && between > radius(a.shape) + radius(b.shape) + sign_rounding;
+  return {pose, reach, flat, sign_rounding, apart};
+}
+
+std::optional<ClippedPair> clip_by_table(const Placed& a, const Placed& b) {
+  const auto [pose, reach, flat, sign_rounding, apart] = arrange(a, b);
+  if (apart) return ClippedPair{};
+  Workspace& w = workspace();
+  set_solid(w.first, a, 0, nullptr, 4 * reach);
+  set_solid(w.second, b, 1, &pose, 4 * reach);
+  const Signs signs = w.trace(sign_rounding);
+  if (signs == Signs::kSeparated) return ClippedPair{};
+  if (signs == Signs::kUncertain) return std::nullopt;
+  const Vec3 middle = centre(w.vertices);
+  const Sums sums(w, {1, 1, 1});
+  double least_slack = 4 * sign_rounding;  // rounding might hide what is thinner
+  const std::optional<Clipped> measures = measure(w, sums, middle, rounding(reach) + flat, least_slack);
+  if (!measures) return std::nullopt;
+  ClippedPair common{*measures, {}, {}};
+  if (common.measured) {
+    const Pull pull = sums.pull();
+    common.pull = pull.force, common.moment = pull.moment;
+  } else {
+    measure_widened(w, a, b, reach, least_slack, middle, common);
+  }
+  return common;
+}
+
+std::optional<ClippedPair> clip_by_tracing(const Placed& a, const Placed& b) {
+  const Arrangement at = arrange(a, b);
+  if (at.apart) return ClippedPair{};
+  return trace(a, b, at.pose, at.sign_rounding);
+}
+
+/// Calls `way` with the body first whose coordinates it will use, and says the answer in terms of `a` and the world.
+template <class Way>
+std::optional<ClippedPair> in_order(const Placed& a, const Placed& b, bool swapped, Way way) {
+  const Placed& first = swapped ? b : a;
+  std::optional<ClippedPair> common = way(first, swapped ? a : b);
+  if (!common || common->status != Status::kOverlapping) return common;
+  common->centroid = first.pose * common->centroid;
+  common->pull = first.pose.rotation * common->pull;
+  common->moment = first.pose.rotation * common->moment;
+  if (swapped) {
+    // Not the negatives, which would make negative zeros.
+    common->pull = Vec3{} - common->pull;
+    common->moment = Vec3{} - common->moment;
+  }
+  return common;
+}
+
+/// The smallest body first; then the order does not depend on the caller's.
+std::vector<int> from_small_to_large(std::span<const Placed> bodies) {
+  std::vector<int> order = canonical_order(bodies);
+  const auto size = [&](int i) { return bounded(bodies[i].shape) ? radius(bodies[i].shape) : kInfinity; };
+  std::stable_sort(order.begin(), order.end(), [&](int i, int j) { return size(i) < size(j); });
+  return order;
+}
+
+Ball ball_around(const Solid& solid, double rounding) {
+  Ball ball{};
+  for (int i = 0; i < solid.vertices; ++i) ball.centre += solid.vertex(i);
+  ball.centre = ball.centre / static_cast<double>(solid.vertices);
+  for (int i = 0; i < solid.vertices; ++i)
+    ball.radius = std::max(ball.radius, std::sqrt(norm2(solid.vertex(i) - ball.centre)) + solid.doubt[i]);
+  ball.radius += rounding;
+  return ball;
+}
+
+/// Cuts the first of some bodies by the others one after the other, all in its coordinates.
+Signs clip_in_turn(Workspace& w, std::span<const Placed> bodies, std::span<const int> order, double reach,
+                   double sign_rounding) {
+  const Placed& first = bodies[order[0]];
+  set_solid(w.first, first, order[0], nullptr, 4 * reach);
+  for (int i : order.subspan(1)) {
+    const Pose pose = relative_pose(first.pose, bodies[i].pose);
+    if (!set_part(w.second, bodies[i], i, pose, ball_around(w.first, sign_rounding), 4 * reach))
+      return Signs::kSeparated;
+    if (w.second.facets == 0) continue;
+    if (const Signs signs = w.trace(sign_rounding); signs != Signs::kCertain) return signs;
+    w.take_common(4 * reach);
+  }
+  return Signs::kCertain;
+}
+
+/// The pulls that the common polytope has on its bodies, and their moments about the centroid: as for a seam, along
+/// all borders between two bodies.
+void add_pulls(const Workspace& w, const Pose& pose, Vec3 centroid, std::vector<Pull>& pulls) {
+  for (const Edge& e : w.edges) {
+    const int left = w.owner(e.left), right = w.owner(e.right);
+    if (left == right) continue;
+    const Pull of_edge = pull_along_border(w.vertices[e.from] - centroid, w.vertices[e.to] - centroid);
+    const Vec3 force = pose.rotation * of_edge.force, moment = pose.rotation * of_edge.moment;
+    pulls[left].force += force, pulls[right].force -= force;
+    pulls[left].moment += moment, pulls[right].moment -= moment;
+  }
+}
+
+}  // namespace
+
+std::optional<ClippedPair> clip(const Placed& a, const Placed& b) {
+  if (worth_tracing(a, b))
+    if (auto traced = in_order(a, b, comes_before(b, a), clip_by_tracing)) return traced;
+  if (!clippable(a.shape) || !clippable(b.shape) || !(bounded(a.shape) || bounded(b.shape))) return std::nullopt;
+  return in_order(a, b, !comes_first(a, b), clip_by_table);
+}
+
+std::optional<Region> region_of_clipped(const Placed& a, const Placed& b, Vec3 reference) {
+  const Arrangement at = arrange(a, b);
+  return traced_region(a, b, at.pose, at.sign_rounding, reference);
+}
+
+std::optional<ClippedGroup> clip(std::span<const Placed> bodies) {
+  if (!std::ranges::all_of(bodies, [](const Placed& body) { return clippable(body.shape); })) return std::nullopt;
+  const std::vector<int> order = from_small_to_large(bodies);
+  const Placed& first = bodies[order[0]];
+  if (!bounded(first.shape)) return std::nullopt;
+  double reach = 0, flat = 0;
+  for (const Placed& body : bodies) {
+    reach = std::max(reach, reach_from(body, norm(body.pose.translation - first.pose.translation)));
+    flat = std::max(flat, flatness(body.shape));
+  }
+  const double sign_rounding = doubt(reach) + 4 * flat;
+  Workspace& w = workspace();
+  const Signs signs = clip_in_turn(w, bodies, order, reach, sign_rounding);
+  if (signs == Signs::kSeparated) return ClippedGroup{};
+  if (signs == Signs::kUncertain) return std::nullopt;
+  w.show_first();
+  const Vec3 middle = centre(w.vertices);
+  const Sums sums(w, {1, 1, 1});
+  // Every cut moves what is left of an edge off its planes by three half-ulps or less.
+  const double rounded = rounding(reach) + 3 * 0x1p-53 * reach * static_cast<double>(bodies.size()) + flat;
+  double least_slack = 4 * sign_rounding;
+  const std::optional<Clipped> measures = measure(w, sums, middle, rounded, least_slack);
+  if (!measures || !measures->measured) return std::nullopt;
+  ClippedGroup common{*measures, std::vector<Pull>(bodies.size())};
+  add_pulls(w, first.pose, common.centroid - middle, common.pulls);
+  common.centroid = first.pose * common.centroid;
+  return common;
+}
+
+}  // namespace overlapper

@@ -1,0 +1,360 @@
+#include "methods/clipping/meeting.h"
+
+#include <bit>
+#include <cstring>
+#include <limits>
+#include <tuple>
+
+#include "shapes/planes_asked.h"
+
+namespace overlapper {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Two or four planes are worked on at once, by whatever the machine has.
+template <class Lanes>
+constexpr int kLanes = sizeof(Lanes) / sizeof(double);
+template <class Lanes>
+inline void load(const double* p, Lanes& v) {
+  std::memcpy(&v, p, sizeof v);
+}
+
+/// Calls `use(plane)`, from the first to the last, for planes whose bit j % 64 is set.
+template <class Use>
+inline void for_each_plane(std::uint64_t marked, int stride, Use use) {
+  for (int first = 0; first < stride; first += 64) {
+    for (std::uint64_t rest = marked; rest != 0; rest &= rest - 1)
+      if (const int j = first + std::countr_zero(rest); j < stride) use(j);
+  }
+}
+
+/// Where an edge meets a plane: at `from + at * (to - from)`.
+struct Crossing {
+  int plane;
+  double at;
+};
+
+/// How much of an edge is inside the other body.
+enum class Inside { kNothing, kPart, kUncertain };
+
+/// One edge against all planes of the other body: the signed distances of its ends. The planes that it enters or leaves
+/// through are among the few that an end is outside of.
+struct EdgeSigns {
+  const double *from, *to;
+  std::uint64_t from_outside, to_outside;  ///< as in SignTable
+  int stride;
+  double rounding;
+
+  /// How far off the point may be where an edge of that length crosses a plane: the rounding of two signs as seen along
+  /// the edge.
+  double doubt(Crossing crossing, double length) const {
+    return 2 * rounding * (1 + length / std::abs(to[crossing.plane] - from[crossing.plane]));
+  }
+
+  /// True if the point where the edge crosses a plane, with that doubt, is certainly inside all others.
+  template <class Lanes>
+  bool certain(Crossing crossing, double doubt) const {
+    decltype(Lanes{} > Lanes{}) hidden{};  // per lane, how many planes it may be outside of
+    for (int j = 0; j < stride; j += kLanes<Lanes>) {
+      Lanes begin, end;
+      load(from + j, begin);
+      load(to + j, end);
+      hidden -= begin + crossing.at * (end - begin) >= -doubt;
+    }
+    auto planes = hidden[0];
+    for (int k = 1; k < kLanes<Lanes>; ++k) planes += hidden[k];
+    return planes == 1;  // The crossed one is among them: rounding alone has moved the point off that.
+  }
+
+  Crossing at_plane(int g) const { return {g, from[g] / (from[g] - to[g])}; }
+
+  /// The plane through which it leaves from an end that is inside.
+  Crossing exit(bool from_inside) const {
+    const double *inner = from_inside ? from : to, *outer = from_inside ? to : from;
+    double steepest = 0;
+    int g = 0;
+    for_each_plane(from_inside ? to_outside : from_outside, stride, [&](int j) {
+      const double ratio = outer[j] / -inner[j];
+      if (ratio > steepest) steepest = ratio, g = j;
+    });
+    return at_plane(g);
+  }
+
+  /// True if both ends are certainly outside of the same plane.
+  bool outside() const {
+    bool found = false;
+    for_each_plane(from_outside & to_outside, stride, [&](int j) { found |= std::min(from[j], to[j]) > rounding; });
+    return found;
+  }
+
+  /// For an edge whose ends are both outside, of different planes: where it enters and leaves.
+  std::pair<Crossing, Crossing> passage() const {
+    Crossing enter{-1, -kInfinity}, leave{-1, kInfinity};
+    for_each_plane(from_outside, stride, [&](int j) {
+      const double at = from[j] / (from[j] - to[j]);
+      if (from[j] > 0 && from[j] > to[j] && at > enter.at) enter = {j, at};
+    });
+    for_each_plane(to_outside, stride, [&](int j) {
+      const double at = from[j] / (from[j] - to[j]);
+      if (to[j] > 0 && to[j] > from[j] && at < leave.at) leave = {j, at};
+    });
+    return {enter, leave};
+  }
+
+  /// True if the edge is certainly outside of one of two planes all along.
+  bool misses(int g, int h) const {
+    const double slope_g = to[g] - from[g], slope_h = to[h] - from[h];
+    const double level = std::clamp((from[h] - from[g]) / (slope_g - slope_h), 0.0, 1.0);
+    return std::max(from[g] + level * slope_g, from[h] + level * slope_h) > 2 * rounding;
+  }
+
+  /// Where an edge enters and leaves, of which not both ends are inside.
+  Inside cut(bool from_inside, bool to_inside, Crossing& enter, Crossing& leave) const {
+    if (from_inside) {
+      leave = exit(true);
+    } else if (to_inside) {
+      enter = exit(false);
+    } else {
+      if (outside()) return Inside::kNothing;
+      std::tie(enter, leave) = passage();
+      if (enter.plane < 0 || leave.plane < 0) return Inside::kUncertain;
+      if (misses(enter.plane, leave.plane)) return Inside::kNothing;
+    }
+    return Inside::kPart;
+  }
+};
+
+}  // namespace
+
+template <class Lanes>
+Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
+  stride = by.stride;
+  rows.resize(static_cast<size_t>(of.vertices) * stride);
+  outside.resize(of.vertices);
+  // Taken once: for all that a compiler knows, a sign that is stored might move them.
+  const double *nx = by.nx.data(), *ny = by.ny.data(), *nz = by.nz.data(), *offset = by.offset.data();
+  const double *vx = of.x.data(), *vy = of.y.data(), *vz = of.z.data(), *doubt = of.doubt.data();
+  double* signs = rows.data();
+  const ptrdiff_t vertices = of.vertices, planes = stride;
+  decltype(Lanes{} > Lanes{}) first_bits{};
+  for (int k = 0; k < kLanes<Lanes>; ++k) first_bits[k] = 1 << k;
+  bool uncertain = false;
+  double most_doubt = 0;
+  for (ptrdiff_t i = 0; i < vertices; ++i, signs += planes) {
+    const Lanes x = vx[i] - Lanes{}, y = vy[i] - Lanes{}, z = vz[i] - Lanes{};
+    Lanes farthest = -kInfinity - Lanes{};
+    decltype(x > y) marked{};
+    for (ptrdiff_t first = 0; first < planes; first += 64) {
+      auto bit = first_bits;
+      const ptrdiff_t end = std::min(first + 64, planes);
+      for (ptrdiff_t j = first; j < end; j += kLanes<Lanes>, bit <<= kLanes<Lanes>) {
+        Lanes normal_x, normal_y, normal_z, height;
+        load(nx + j, normal_x);
+        load(ny + j, normal_y);
+        load(nz + j, normal_z);
+        load(offset + j, height);
+        const Lanes s = normal_x * x + normal_y * y + normal_z * z - height;
+        store(signs + j, s);
+        farthest = farthest > s ? farthest : s;
+        marked |= (s > 0.0) & bit;
+      }
+    }
+    double s = farthest[0];
+    outside[i] = static_cast<std::uint64_t>(marked[0]);
+    for (int k = 1; k < kLanes<Lanes>; ++k) {
+      s = std::max(s, farthest[k]);
+      outside[i] |= static_cast<std::uint64_t>(marked[k]);
+    }
+    uncertain |= std::abs(s) <= rounding + doubt[i];
+    most_doubt = std::max(most_doubt, doubt[i]);
+  }
+  if (of.whole && beyond_a_plane(rounding + most_doubt)) return Signs::kSeparated;
+  return uncertain ? Signs::kUncertain : Signs::kCertain;
+}
+
+/// True if all vertices are farther than `margin` outside of the same plane.
+bool SignTable::beyond_a_plane(double margin) const {
+  std::uint64_t shared = ~std::uint64_t{0};
+  for (std::uint64_t marked : outside) shared &= marked;
+  bool found = false;
+  for_each_plane(shared, stride, [&](int j) {
+    double nearest = kInfinity;
+    for (size_t k = j; k < rows.size(); k += stride) nearest = std::min(nearest, rows[k]);
+    found |= nearest > margin;
+  });
+  return found;
+}
+
+/// Finds the common polytope of a meeting whose solids are in place.
+template <class Lanes>
+class Tracer {
+ public:
+  Tracer(Meeting& meeting, double rounding) : w_(meeting), rounding_(rounding) {}
+
+  Signs trace() {
+    const Signs one = w_.first_signs.template fill<Lanes>(w_.first, w_.second, rounding_);
+    if (one == Signs::kSeparated) return one;
+    const Signs other = w_.second_signs.template fill<Lanes>(w_.second, w_.first, rounding_);
+    if (other == Signs::kSeparated) return other;
+    if (one == Signs::kUncertain || other == Signs::kUncertain) return Signs::kUncertain;
+
+    const size_t most_edges = w_.first.edges.size() + w_.second.edges.size();
+    const size_t most_vertices = w_.first.vertices + w_.second.vertices + 2 * most_edges;
+    w_.vertices.begin_with_room(most_vertices);
+    w_.corners.begin_with_room(most_vertices);
+    w_.doubt.begin_with_room(most_vertices);
+    w_.edges.begin_with_room(most_edges);
+    w_.seam.begin_with_room(2 * most_edges);
+    w_.unpaired = 0;
+    w_.open.resize(static_cast<size_t>(w_.first.facets) * w_.second.facets, 0);
+    const bool certain = trace(w_.first, w_.first_signs, w_.first_vertex, true) &&
+                         trace(w_.second, w_.second_signs, w_.second_vertex, false) && w_.unpaired == 0;
+    if (!certain) {
+      std::fill(w_.open.begin(), w_.open.end(), 0);
+      return Signs::kUncertain;
+    }
+    return w_.vertices.empty() ? Signs::kSeparated : Signs::kCertain;
+  }
+
+ private:
+  int add_vertex(Vec3 v, double doubt, const Corner& corner) {
+    w_.vertices.push_back(v);
+    w_.doubt.push_back(doubt);
+    w_.corners.push_back(corner);
+    return static_cast<int>(w_.vertices.size()) - 1;
+  }
+
+  bool trace(const Solid& body, const SignTable& signs, std::vector<int>& common_vertex, bool is_first) {
+    common_vertex.assign(body.vertices, -1);
+    for (int i = 0; i < body.vertices; ++i)
+      if (signs.outside[i] == 0)
+        common_vertex[i] = add_vertex(body.vertex(i), body.doubt[i], {is_first ? 0 : 1, i, {}});
+    const int offset = is_first ? 0 : w_.first.facets, other_offset = w_.first.facets - offset;
+    const double* rows = signs.rows.data();
+    const std::uint64_t* outside = signs.outside.data();
+    const double* doubts = body.doubt.data();
+    const ptrdiff_t stride = signs.stride;
+    for (const Edge& e : body.edges) {
+      Edge common{common_vertex[e.from], common_vertex[e.to], e.left + offset, e.right + offset};
+      const bool from_inside = common.from >= 0, to_inside = common.to >= 0;
+      if (!(from_inside && to_inside)) {
+        const EdgeSigns edge{rows + e.from * stride, rows + e.to * stride,
+                             outside[e.from],        outside[e.to],
+                             signs.stride,           rounding_ + std::max(doubts[e.from], doubts[e.to])};
+        Crossing enter{-1, 0}, leave{-1, 0};
+        const Inside inside = edge.cut(from_inside, to_inside, enter, leave);
+        if (inside == Inside::kNothing) continue;
+        if (inside == Inside::kUncertain) return false;
+        const Vec3 from = body.vertex(e.from), along = body.vertex(e.to) - from;
+        const double length = std::abs(along.x) + std::abs(along.y) + std::abs(along.z);
+        const auto cross = [&](Crossing crossing, bool enters, int& vertex) {
+          const double doubt = edge.doubt(crossing, length);
+          if (!edge.template certain<Lanes>(crossing, doubt)) return false;
+          vertex = add_vertex(from + crossing.at * along, doubt,
+                              {-1, -1, {common.left, common.right, crossing.plane + other_offset}});
+          meet(e, crossing.plane, vertex, enters, is_first);
+          return true;
+        };
+        if (!from_inside && !cross(enter, true, common.from)) return false;
+        if (!to_inside && !cross(leave, false, common.to)) return false;
+      }
+      w_.edges.push_back(common);
+    }
+    return true;
+  }
+
+  /// An edge of one body meets a facet of the other in a common vertex, where two edges of the seam end: walking around
+  /// the facet on its left, one follows the edge up to the exit and turns onto the other body.
+  void meet(const Edge& e, int facet, int vertex, bool enters, bool is_first) {
+    if (is_first) {
+      join(e.left, facet, vertex, !enters);
+      join(e.right, facet, vertex, enters);
+    } else {
+      join(facet, e.left, vertex, enters);
+      join(facet, e.right, vertex, !enters);
+    }
+  }
+
+  void join(int first_facet, int second_facet, int vertex, bool begins) {
+    int& other = w_.open[static_cast<size_t>(first_facet) * w_.second.facets + second_facet];
+    const int mine = begins ? vertex + 1 : -vertex - 1;
+    if (other == 0) {
+      other = mine;
+      ++w_.unpaired;
+    } else if ((other > 0) != begins) {
+      const int begin = begins ? vertex : other - 1, end = begins ? -other - 1 : vertex;
+      w_.seam.push_back({begin, end, first_facet, w_.first.facets + second_facet});
+      other = 0;
+      --w_.unpaired;
+    }
+  }
+
+  Meeting& w_;
+  double rounding_;
+};
+
+namespace {
+
+using Way = Signs(Meeting&, double rounding);
+
+template <class Lanes>
+Signs trace_by(Meeting& meeting, double rounding) {
+  return Tracer<Lanes>(meeting, rounding).trace();
+}
+
+#if defined(__AVX2__)
+Way* fastest_way() { return trace_by<Quad>; }
+#elif defined(__x86_64__)
+/// With all that it calls, for machines that have more than the rest is compiled for.
+__attribute__((target("avx2"), flatten)) Signs trace_by_avx2(Meeting& meeting, double rounding) {
+  return trace_by<Quad>(meeting, rounding);
+}
+Way* fastest_way() { return __builtin_cpu_supports("avx2") ? trace_by_avx2 : trace_by<Pair>; }
+#else
+Way* fastest_way() { return trace_by<Pair>; }
+#endif
+
+}  // namespace
+
+Signs Meeting::trace(double rounding) {
+  static Way* const way = fastest_way();
+  planes_asked += first.facets + second.facets;
+  return way(*this, rounding);
+}
+
+void Meeting::take_common(double beyond) {
+  facet_number.assign(first.facets + second.facets, -1);
+  next.own_edges.clear();
+  int kept = 0;
+  const auto number = [&](int facet) {
+    return facet_number[facet] < 0 ? facet_number[facet] = kept++ : facet_number[facet];
+  };
+  for (const auto* list : {&edges, &seam})
+    for (const Edge& e : *list) next.own_edges.push_back({e.from, e.to, number(e.left), number(e.right)});
+  next.resize(static_cast<int>(vertices.size()), kept, beyond);
+  for (int i = 0; i < next.vertices; ++i) next.set_vertex(i, vertices[i]);
+  next.doubt.assign(doubt.begin(), doubt.end());
+  for (int f = 0; f < first.facets + second.facets; ++f) {
+    const int n = facet_number[f];
+    if (n < 0) continue;
+    const Solid& body = f < first.facets ? first : second;
+    const int plane = f < first.facets ? f : f - first.facets;
+    next.set_plane(n, body.normal(plane), body.offset[plane]);
+    next.owner[n] = body.owner[plane];
+  }
+  next.whole = true;
+  std::swap(first, next);
+  first.edges = first.own_edges;
+}
+
+void Meeting::show_first() {
+  vertices.begin_with_room(first.vertices);
+  for (int i = 0; i < first.vertices; ++i) vertices.push_back(first.vertex(i));
+  edges.begin_with_room(first.edges.size());
+  for (const Edge& e : first.edges) edges.push_back(e);
+  seam.begin_with_room(0);
+  second.facets = 0;
+}
+
+}  // namespace overlapper

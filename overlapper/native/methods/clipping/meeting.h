@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cassert>
+#include <cstdint>
+#include <vector>
+
+#include "methods/clipping/wide_corners.h"
+#include "shapes/solid.h"
+
+namespace overlapper {
+
+enum class Signs { kCertain, kUncertain, kSeparated };
+
+/// Signed distances of the vertices of one body from the planes of the other.
+struct SignTable {
+  int stride = 0;
+  std::vector<double> rows;            ///< by vertex
+  std::vector<std::uint64_t> outside;  ///< per vertex: bit j % 64 is set if it is outside of plane j
+
+  const double* row(int vertex) const { return rows.data() + static_cast<ptrdiff_t>(vertex) * stride; }
+
+  template <class Lanes>
+  Signs fill(const Solid& of, const Solid& by, double rounding);
+
+ private:
+  bool beyond_a_plane(double margin) const;
+};
+
+/// A list that is begun with room for all that may come: adding to it calls nothing, for which the numbers that a loop
+/// works with would have to leave their registers.
+template <class T>
+class RoomyList {
+ public:
+  RoomyList() = default;
+  RoomyList(const RoomyList&) = delete;
+
+  void begin_with_room(size_t most) {
+    if (places_.size() < most) places_.resize(most);
+    end_ = places_.data();
+  }
+  void push_back(const T& value) {
+    assert(size() < places_.size());
+    *end_++ = value;
+  }
+
+  size_t size() const { return end_ - places_.data(); }
+  bool empty() const { return size() == 0; }
+  T* data() { return places_.data(); }
+  T* begin() { return places_.data(); }
+  T* end() { return end_; }
+  const T* begin() const { return places_.data(); }
+  const T* end() const { return end_; }
+  const T& operator[](size_t i) const { return places_[i]; }
+
+ private:
+  std::vector<T> places_;
+  T* end_ = nullptr;
+};
+
+/// Two solids and what they have in common, whose facets are numbered as the first one's and then the second one's.
+struct Meeting {
+  Solid first, second;
+  RoomyList<Vec3> vertices;   ///< of the common polytope
+  RoomyList<Corner> corners;  ///< parallel to them
+  RoomyList<double> doubt;    ///< parallel to them: see Solid
+  RoomyList<Edge> edges;      ///< of the common polytope
+  RoomyList<Edge> seam;       ///< its edges between the first body's facets, on the left, and the second's
+
+  /// Finds the common polytope; what is not certain or separated has none.
+  Signs trace(double rounding);
+
+  int owner(int facet) const { return facet < first.facets ? first.owner[facet] : second.owner[facet - first.facets]; }
+
+  /// The common polytope becomes the first solid; see set_solid for `beyond`.
+  void take_common(double beyond);
+  /// Puts the first solid into the place of the common polytope.
+  void show_first();
+
+ private:
+  template <class Lanes>
+  friend class Tracer;
+
+  SignTable first_signs, second_signs;
+  std::vector<int> first_vertex, second_vertex;  ///< which common vertex a body's vertex is, or -1
+  /// Per pair of facets: 1 + the vertex at which their common edge begins, minus that if it ends there.
+  std::vector<int> open;
+  int unpaired = 0;
+  Solid next;
+  std::vector<int> facet_number;
+};
+
+}  // namespace overlapper

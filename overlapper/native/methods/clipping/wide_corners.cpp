@@ -1,0 +1,268 @@
+#include "methods/clipping/wide_corners.h"
+
+#include <cassert>
+
+namespace overlapper {
+namespace {
+
+constexpr WideColumns kIdentity{WideLanes{Quad{1, 0, 0, 0}, Quad{}}, WideLanes{Quad{0, 1, 0, 0}, Quad{}},
+                                WideLanes{Quad{0, 0, 1, 0}, Quad{}}};
+
+bool unturned(Quaternion q) { return q.w == 1 && q.x == 0 && q.y == 0 && q.z == 0; }
+
+/// Where the coordinates of a hull's data begin.
+Vec3 data_origin(const Shape& shape) {
+  const Hull* hull = std::get_if<Hull>(&shape);
+  return hull ? hull->data->origin : Vec3{};
+}
+
+/// Columns of a rotation matrix, that of a quaternion of length 1 but for a few roundings.
+template <bool fused>
+WideColumns rotation_columns(Quaternion q) {
+  if (unturned(q)) return kIdentity;
+  const Quad xyz{q.x, q.y, q.z}, yzx{q.y, q.z, q.x}, zxy{q.z, q.x, q.y};
+  const WideLanes xx = two_product<fused>(xyz, xyz), xy = two_product<fused>(xyz, yzx);
+  const WideLanes zw = two_product<fused>(zxy, q.w), zz = two_product<fused>(zxy, zxy);
+  WideSum<fused> across(xx), sum(xy), difference(xy);  // zz + xx, xx + yy, yy + zz; xy, yz, zx with zw, xw, yw
+  across.add(zz);
+  sum.add(zw);
+  difference.add(-zw);
+  const WideLanes squares = across.lanes();
+  const DoubleDouble beyond = lane(squares, 0) + lane(xx, 1) + (two_product(q.w, q.w) - DoubleDouble{1});
+  // What the squared length is beyond 1, e, is a few ulps: 1 / (1 + e) = 1 - e + e² to double-double.
+  const DoubleDouble twice{2, -2 * beyond.head * (1 - beyond.head)};
+  const auto scaled = [&](const WideLanes& v) { return WideSum<fused>(v, twice).lanes(); };
+  const WideLanes plus = scaled(sum.lanes()), minus = scaled(difference.lanes());
+  const WideLanes diagonal = WideLanes{Quad{1, 1, 1}, Quad{}} - scaled(squares);
+  const auto column = [](DoubleDouble x, DoubleDouble y, DoubleDouble z) { return in_lanes(WideVector{x, y, z}); };
+  return {column(lane(diagonal, 2), lane(plus, 0), lane(minus, 2)),
+          column(lane(minus, 0), lane(diagonal, 0), lane(plus, 1)),
+          column(lane(plus, 2), lane(minus, 1), lane(diagonal, 1))};
+}
+
+/// Four vectors, one in each lane.
+struct QuadVector {
+  QuadVector(const Quad& xs, const Quad& ys, const Quad& zs) : x(xs), y(ys), z(zs) {}
+  QuadVector(Vec3 a, Vec3 b, Vec3 c, Vec3 d)
+      : QuadVector(Quad{a.x, b.x, c.x, d.x}, Quad{a.y, b.y, c.y, d.y}, Quad{a.z, b.z, c.z, d.z}) {}
+  Quad x, y, z;
+};
+
+QuadVector cross(const WideColumns& a, const WideColumns& b) {
+  const Quad &ax = a[0].head, &ay = a[1].head, &az = a[2].head, &bx = b[0].head, &by = b[1].head, &bz = b[2].head;
+  return {ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx};
+}
+
+/// The arithmetic of one pair, with fused multiply-adds or without.
+template <bool fused>
+class WideCorners {
+ public:
+  WideCorners(const CommonCorners& common, std::span<WideLanes> planes)
+      : common_(common), planes_(planes), lost_(0x1p-96 * common.reach), noise_(lost_) {
+    const Placed &a = common.a, &b = common.b;
+    columns_ = rotation_columns<fused>(b.orientation);
+    translation_ = in_lanes(wide_difference(b.position, a.position));
+    const Vec3 origin_a = data_origin(a.shape), origin_b = data_origin(b.shape);
+    if (norm2(origin_b) > 0) translation_ = translation_ + WideSum<fused>(columns_, origin_b).lanes();
+    if (!unturned(a.orientation)) {
+      // The rows of a rotation are the columns of its inverse.
+      const WideColumns of_a = rotation_columns<fused>(a.orientation);
+      const WideColumns back = transposed(of_a[0], of_a[1], of_a[2]);
+      for (int i = 0; i < 3; ++i) columns_[i] = turned(back, columns_[i]);
+      translation_ = turned(back, translation_);
+    }
+    if (norm2(origin_a) > 0) translation_ = translation_ - in_lanes(origin_a);
+    translation_ = translation_ - in_lanes(common.origin);
+  }
+
+  /// Planes of facets: a normal, of length 1 but for rounding, and last the offset with the other sign.
+  bool add_planes() {
+    const int facets = static_cast<int>(common_.apex.size()), first_facets = common_.first_facets;
+    const Box *box_a = std::get_if<Box>(&common_.a.shape), *box_b = std::get_if<Box>(&common_.b.shape);
+    if (box_a) add_sides(*box_a, kIdentity, in_lanes(-common_.origin), planes_.first(6));
+    if (box_b) {
+      const WideColumns rows = transposed(columns_[0], columns_[1], columns_[2]);
+      add_sides(*box_b, rows, heights(rows, translation_), planes_.subspan(first_facets, 6));
+    }
+    for (int f = box_a ? first_facets : 0; f < (box_b ? first_facets : facets); ++f)
+      if (common_.apex[f] >= 0 && !add_plane(f)) return false;
+    return true;
+  }
+
+  void place(const Mat3& axes, std::span<Vec3> vertices) {
+    for (size_t i = 0; i < vertices.size(); i += 4) {
+      const size_t last = vertices.size() - 1;
+      place_four(axes, vertices, {i, std::min(i + 1, last), std::min(i + 2, last), std::min(i + 3, last)});
+    }
+  }
+
+  double noise() const { return noise_; }
+
+ private:
+  static WideLanes turned(const WideColumns& columns, const WideLanes& v) {
+    return WideSum<fused>(columns, vector(v)).lanes();
+  }
+
+  /// Of a point above planes through the origin, a coordinate of whose normals is in each of the columns.
+  static WideLanes heights(const WideColumns& normals, const WideLanes& point) {
+    const auto [x, y, z] = vector(point);
+    return product<fused>(normals[0], x) + product<fused>(normals[1], y) + product<fused>(normals[2], z);
+  }
+
+  /// The box has its middle at the given heights above planes across its axes.
+  void add_sides(const Box& box, const WideColumns& axes, const WideLanes& middle, std::span<WideLanes> planes) {
+    const Vec3 half = box.half_extents;
+    const WideLanes extents{Quad{half.x, half.y, half.z}, Quad{}};
+    const WideColumns inner = transposed(-axes[0], -axes[1], -axes[2], middle - extents);
+    const WideColumns outer = transposed(axes[0], axes[1], axes[2], -(extents + middle));
+    for (int k = 0; k < 3; ++k) planes[2 * k] = inner[k], planes[2 * k + 1] = outer[k];
+  }
+
+  bool add_plane(int facet) {
+    const bool second = facet >= common_.first_facets;
+    const Shape& shape = second ? common_.b.shape : common_.a.shape;
+    WideVector normal;
+    DoubleDouble level;
+    if (const Hull* hull = std::get_if<Hull>(&shape)) {
+      const HullData& data = *hull->data;
+      const auto& [i, j, k] = data.facet_corners[second ? facet - common_.first_facets : facet];
+      if (i < 0) return false;
+      normal = wide_normal(data.corners[i], data.corners[j], data.corners[k]);
+      level = dot(normal, wide(data.corners[i]));
+    } else {
+      const HalfSpace& half = std::get<HalfSpace>(shape);
+      normal = wide(half.given_normal);
+      level = {half.given_offset};
+    }
+    const DoubleDouble scale{1 / norm(overlapper::rounded(normal))};
+    normal = scale * normal;
+    level = scale * level;
+    if (second) normal = vector(WideSum<fused>(columns_, normal).lanes());
+    level = second ? level + dot(normal, vector(translation_)) : level - dot(normal, wide(common_.origin));
+    planes_[facet] = in_lanes(normal, -level);
+    return true;
+  }
+
+  /// A corner in each lane.
+  void place_four(const Mat3& axes, std::span<Vec3> vertices, const std::array<size_t, 4>& at) {
+    const QuadVector vertex(vertices[at[0]], vertices[at[1]], vertices[at[2]], vertices[at[3]]);
+    QuadVector way{Vec3{}, Vec3{}, Vec3{}, Vec3{}};
+    const std::span<const Corner> corners = common_.corners;
+    if (std::ranges::any_of(at, [&](size_t i) { return corners[i].vertex < 0; })) beside_planes(at, vertex, way);
+    for (int n = 0; n < 4; ++n) {
+      if (corners[at[n]].vertex < 0) continue;
+      const Vec3 beside = beside_vertex(corners[at[n]], vertices[at[n]]);
+      way.x[n] = beside.x, way.y[n] = beside.y, way.z[n] = beside.z;
+    }
+    const auto along = [&](Vec3 axis) {
+      WideSum<fused> sum(vertex.x, axis.x);
+      sum.add_product(vertex.y, axis.y);
+      sum.add_product(vertex.z, axis.z);
+      sum.tail += way.x * axis.x + way.y * axis.y + way.z * axis.z;
+      return sum.lanes();
+    };
+    const WideLanes x = along(axes.row0), y = along(axes.row1), z = along(axes.row2);
+    for (int n = 0; n < 4; ++n) vertices[at[n]] = {x.head[n], y.head[n], z.head[n]};
+  }
+
+  /// From vertices that doubles have placed to where three planes meet; of other corners, nothing that means anything.
+  void beside_planes(const std::array<size_t, 4>& at, const QuadVector& vertex, QuadVector& way) {
+    const auto planes = [&](int n) {
+      const auto plane = [&](size_t i) -> const WideLanes& { return planes_[common_.corners[i].facets[n]]; };
+      return transposed(plane(at[0]), plane(at[1]), plane(at[2]), plane(at[3]));
+    };
+    const WideColumns p = planes(0), q = planes(1), r = planes(2);
+    const auto height = [&](const WideColumns& normal) {
+      WideSum<fused> sum(normal, vertex);
+      sum.add(normal[3]);
+      return sum.lanes();
+    };
+    const WideLanes height_p = height(p), height_q = height(q), height_r = height(r);
+    const QuadVector qr = cross(q, r), rp = cross(r, p), pq = cross(p, q);
+    const Quad volume = p[0].head * qr.x + p[1].head * qr.y + p[2].head * qr.z;
+    const Quad& a = height_p.head;
+    const Quad& b = height_q.head;
+    const Quad& c = height_r.head;
+    way = {(a * qr.x + b * rp.x + c * pq.x) / -volume, (a * qr.y + b * rp.y + c * pq.y) / -volume,
+           (a * qr.z + b * rp.z + c * pq.z) / -volume};
+    // The sum is off by what the heights are and by the roundings of its own terms.
+    const Quad size = volume < 0 ? -volume : volume;
+    const Quad high_a = a < 0 ? -a : a, high_b = b < 0 ? -b : b, high_c = c < 0 ? -c : c;
+    const Quad high = high_a < high_b ? high_b : high_a, highest = high < high_c ? high_c : high;
+    const Quad noise = 4 * (lost_ + 0x1p-50 * highest / size) / size;
+    for (int n = 0; n < 4; ++n)
+      if (common_.corners[at[n]].vertex < 0) noise_ = std::max(noise_, noise[n]);
+  }
+
+  /// From a vertex that doubles have placed to the body's own.
+  Vec3 beside_vertex(const Corner& corner, Vec3 vertex) const {
+    const Shape& shape = corner.body == 0 ? common_.a.shape : common_.b.shape;
+    const Box* box = std::get_if<Box>(&shape);
+    const Vec3 local =
+        box ? overlapper::corner(*box, corner.vertex) : std::get<Hull>(shape).data->vertices[corner.vertex];
+    const Vec3 origin = common_.origin;
+    if (corner.body == 0) {
+      const WideLanes exactly = two_sum(Quad{local.x, local.y, local.z}, Quad{-origin.x, -origin.y, -origin.z});
+      return rounded(vector(exactly - in_lanes(vertex)));
+    }
+    WideSum<fused> sum(columns_, local);
+    sum.add(translation_);
+    sum.add(Quad{-vertex.x, -vertex.y, -vertex.z});
+    return rounded(vector(sum.lanes()));
+  }
+
+  const CommonCorners& common_;
+  std::span<WideLanes> planes_;
+  WideColumns columns_;    ///< of the rotation from the second body's coordinates to the first's
+  WideLanes translation_;  ///< and what follows it
+  double lost_;            ///< m: what a few dozen operations in double-double lose
+  double noise_;
+};
+
+using Way = std::optional<double>(const CommonCorners&, const Mat3& axes, std::span<Vec3> vertices,
+                                  std::span<WideLanes> planes);
+
+template <bool fused>
+std::optional<double> place_by(const CommonCorners& common, const Mat3& axes, std::span<Vec3> vertices,
+                               std::span<WideLanes> planes) {
+  WideCorners<fused> wide(common, planes);
+  if (!wide.add_planes()) return std::nullopt;
+  wide.place(axes, vertices);
+  return wide.noise();
+}
+
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+Way* fastest_way() { return place_by<true>; }
+#elif defined(__x86_64__)
+/// With all that it calls, for machines that have more than the rest is compiled for.
+__attribute__((target("avx2,fma"), flatten)) std::optional<double> place_by_avx2(const CommonCorners& common,
+                                                                                 const Mat3& axes,
+                                                                                 std::span<Vec3> vertices,
+                                                                                 std::span<WideLanes> planes) {
+  return place_by<true>(common, axes, vertices, planes);
+}
+Way* fastest_way() {
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? place_by_avx2 : place_by<false>;
+}
+#else
+Way* fastest_way() { return place_by<false>; }
+#endif
+
+/// But for what underflows, which is nothing beside any body's size.
+[[maybe_unused]] bool same(Vec3 a, Vec3 b) { return !(max_component(abs(a - b)) > 1e-250); }
+
+}  // namespace
+
+std::optional<double> place_in_wide(const CommonCorners& common, const Mat3& axes, std::span<Vec3> vertices,
+                                    std::vector<WideLanes>& planes) {
+  planes.resize(common.apex.size());
+#ifndef NDEBUG
+  std::vector<Vec3> expected(vertices.begin(), vertices.end());
+  place_by<false>(common, axes, expected, planes);
+#endif
+  const std::optional<double> noise = fastest_way()(common, axes, vertices, planes);
+  assert(std::ranges::equal(vertices, expected, same));
+  return noise;
+}
+
+}  // namespace overlapper

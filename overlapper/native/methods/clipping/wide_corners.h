@@ -1,0 +1,36 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "geometry/wide_lanes.h"
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// What makes a corner of the common polytope of two bodies: a vertex of one of them, or three facets that meet. Facets
+/// of the second body are numbered after those of the first.
+struct Corner {
+  int body, vertex;           ///< vertex is -1 where facets meet
+  std::array<int, 3> facets;  ///< only then
+};
+
+/// The common polytope of two bodies. Coordinates are the first body's, counted from `origin`.
+struct CommonCorners {
+  const Placed &a, &b;
+  int first_facets;           ///< of `a`
+  std::span<const int> apex;  ///< per facet of both: -1 if the polytope has none of it
+  std::span<const Corner> corners;
+  Vec3 origin;
+  double reach;  ///< m: how large the numbers are that describe the bodies in these coordinates
+};
+
+/// Replaces the corners' coordinates that doubles have found by those along orthogonal axes, the rows of `axes`: each
+/// right to half an ulp of itself and the length that is returned, in m. Works in double-double from the numbers that
+/// define the bodies: corners of hulls, half extents, positions, and orientations taken as the exact rotations that
+/// their quaternions stand for. Nothing if a facet has a plane only because rounding has merged several.
+std::optional<double> place_in_wide(const CommonCorners& common, const Mat3& axes, std::span<Vec3> vertices,
+                                    std::vector<WideLanes>& planes);
+
+}  // namespace overlapper

@@ -1,0 +1,399 @@
+#include "methods/closed_forms.h"
+
+#include <algorithm>
+#include <array>
+#include <cfloat>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <vector>
+
+namespace overlapper {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Part of a body of revolution left by one plane, in the plane through the axis that is orthogonal to the cut: x along
+/// the axis, y across it, the third coordinate zero by symmetry.
+struct Part {
+  double volume = 0;
+  Vec3 moment;  ///< ∫ x dV
+  double flat_area = 0;
+  Vec3 flat_moment;  ///< ∫ x dA over the cut
+  double curved_area = 0;
+  double scale = 0;  ///< m³: the size of terms that cancelled, for the rounding of the sum
+
+  Part& operator+=(const Part& other) {
+    volume += other.volume;
+    moment += other.moment;
+    flat_area += other.flat_area;
+    flat_moment += other.flat_moment;
+    curved_area += other.curved_area;
+    scale += other.scale;
+    return *this;
+  }
+
+  /// The same part about another point of the axis.
+  Part shifted(double along) const {
+    Part result = *this;
+    result.moment.x += along * volume;
+    result.flat_moment.x += along * flat_area;
+    return result;
+  }
+
+  Part mirrored() const {
+    Part result = *this;
+    result.moment.x = -moment.x;
+    result.flat_moment.x = -flat_moment.x;
+    return result;
+  }
+};
+
+// -------------------------------------------------------------------------------------------------------------- balls
+
+/// The cap of height h, from 0 to 2 r, of a ball about the origin: where dot(direction, x) <= h - r.
+Part cap(double r, double h, Vec3 direction) {
+  const double disc = kPi * h * (2 * r - h);
+  const double volume = kPi / 3 * h * h * (3 * r - h);
+  const double depth = 0.75 * (2 * r - h) * (2 * r - h) / (3 * r - h);
+  return {volume, -volume * depth * direction, disc, disc * (h - r) * direction, 2 * kPi * r * h, volume};
+}
+
+Part half_ball(double r) {
+  const double volume = 2 * kPi / 3 * r * r * r;
+  return {volume, {3 * r / 8 * volume, 0, 0}, 0, {}, 2 * kPi * r * r, volume};
+}
+
+/// What is left of the half ball x >= 0 where sine * x + cosine * y <= t; `cosine` >= 0.
+Part half_ball_below(double r, double sine, double cosine, double t) {
+  if (t >= r) return half_ball(r);
+  if (t <= -r) return {};
+  const Vec3 direction{sine, cosine, 0};
+  const double rho = std::sqrt((r - t) * (r + t));
+  if (std::abs(t * sine) >= rho * cosine) {
+    // The circle of the cut lies on one side of x = 0.
+    if (t * sine < 0 || (t == 0 && sine < 0)) return t >= 0 ? half_ball(r) : Part{};
+    if (t < 0) return cap(r, r + t, direction);
+    Part rest = half_ball(r);
+    const Part removed = cap(r, r - t, -direction);
+    rest.volume -= removed.volume;
+    rest.moment -= removed.moment;
+    rest.flat_area = removed.flat_area;
+    rest.flat_moment = removed.flat_moment;
+    rest.curved_area -= removed.curved_area;
+    return rest;
+  }
+  // Half the angle of the cut's arc, of the arc on x = 0, and the exterior angle of the spherical part where they meet.
+  // All three from the same root, so that what rounding did to it cancels in the sum.
+  const double root = std::sqrt((r * cosine - t) * (r * cosine + t));
+  const double arc = std::atan2(root, -t * sine), base_arc = std::atan2(root, -t);
+  const double exterior = std::atan2(root, -sine * r);
+  // The theorem of Gauss and Bonnet.
+  const double spherical = r * r * (2 * kPi - 2 * exterior) + 2 * r * t * arc;
+  // Segments of discs: area, and second moment about the disc's centre as that of a sector less that of a triangle.
+  const double width = root / cosine;
+  const auto segment = [width](double radius, double half_angle, double height) {
+    const double area = radius * radius * half_angle - height * width;
+    const double second =
+        radius * radius * radius * radius * half_angle / 2 - height * width * (3 * height * height + width * width) / 6;
+    return std::pair(area, second);
+  };
+  const auto [cut, cut_second] = segment(rho, arc, -t * sine / cosine);
+  const auto [base, base_second] = segment(r, base_arc, -t / cosine);
+  Part part;
+  part.volume = (r * spherical + t * cut) / 3;
+  // ∫ x dV = ½ ∮ |x|² dA, and the area vectors of a closed surface sum to zero.
+  const Vec3 along{1, 0, 0};
+  part.moment =
+      (r * r * (base * along - cut * direction) + (t * t * cut + cut_second) * direction - base_second * along) / 2;
+  part.flat_area = cut;
+  part.flat_moment = cut * t * direction + 2.0 / 3.0 * width * width * width * Vec3{cosine, -sine, 0};
+  part.curved_area = spherical;
+  part.scale = 2 * kPi * r * r * r;
+  return part;
+}
+
+// ---------------------------------------------------------------------------------------------------------- cylinders
+
+/// Gauss's sixteen nodes and weights on [0, 1], which integrate cos(4θ) over half a turn to rounding.
+template <class Integrand>
+void integrate(double from, double width, Integrand integrand) {
+  constexpr std::array<double, 8> node{0.0950125098376374, 0.2816035507792589, 0.4580167776572274, 0.6178762444026438,
+                                       0.7554044083550030, 0.8656312023878318, 0.9445750230732326, 0.9894009349916499};
+  constexpr std::array<double, 8> weight{0.1894506104550685, 0.1826034150449236, 0.1691565193950025,
+                                         0.1495959888165767, 0.1246289712555339, 0.0951585116824928,
+                                         0.0622535239386479, 0.0271524594117541};
+  for (int i = 0; i < 8; ++i)
+    for (const double side : {-1.0, 1.0}) {
+      const double advance = width * (1 + side * node[i]) / 2;
+      integrand(from + advance, advance, width * weight[i] / 2);
+    }
+}
+
+/// The angle θ at which y = −r cos θ has risen from −r by `risen`.
+double angle_at(double r, double risen) { return std::atan2(std::sqrt(risen * (2 * r - risen)), r - risen); }
+
+/// angle_at(r, risen + more) − angle_at(r, risen), without cancellation.
+double angle_between(double r, double risen, double more) {
+  const double y = risen - r, end = y + more;
+  const double p = std::sqrt(risen * (2 * r - risen));
+  const double q = std::sqrt(std::max(0.0, (risen + more) * (2 * r - risen - more)));
+  const double sine = y * end > 0 ? more * (y + end) / (end * p + y * q) : (end * p - y * q) / (r * r);
+  return std::atan2(sine, (p * q + y * end) / (r * r));
+}
+
+struct CylinderPart {
+  Part part;
+  double lower_end, upper_end;  ///< m²: what is left of the flat ends
+};
+
+/// What is left of the cylinder |x| <= h, y² + z² <= r², where sine * x + cosine * y <= t; both >= 0. Slices of
+/// constant y are rectangles, 2 √(r² − y²) wide, whose length falls from 2 h to nothing while y crosses the cut; with
+/// y = −r cos θ every integrand is a trigonometric polynomial.
+CylinderPart cylinder_below(double r, double h, double sine, double cosine, double t) {
+  CylinderPart result{{}, 0, 0};
+  Part& part = result.part;
+  // How far the cut has passed y = -r, times cosine: where it enters the upper end, and where it leaves the lower one.
+  const double enter = t - sine * h + cosine * r, leave = t + sine * h + cosine * r;
+  if (leave <= 0) return result;
+  const double across = 2 * r * cosine;
+  const double full = enter <= 0 ? 0 : enter >= across ? kPi : angle_at(r, enter / cosine);
+  integrate(0, full, [&](double angle, double, double weight) {
+    const double y = -r * std::cos(angle), chord = 2 * r * std::sin(angle) * r * std::sin(angle);
+    const double volume = weight * 2 * h * chord;
+    part.volume += volume;
+    part.moment.y += volume * y;
+    part.curved_area += weight * 4 * r * h;
+    result.upper_end += weight * chord;
+  });
+  result.lower_end = result.upper_end;
+  if (enter >= across) return result;
+
+  const double start = enter <= 0 ? 0 : enter / cosine;
+  const double length = enter <= 0 ? leave / sine : 2 * h;
+  const bool open = leave >= across;
+  if (sine == 0) {
+    // The cut is parallel to the axis: a rectangle.
+    part.flat_area = 4 * h * std::sqrt(start * (2 * r - start));
+    part.flat_moment.y = part.flat_area * (start - r);
+    return result;
+  }
+  const double width = open ? kPi - full : angle_between(r, start, (enter <= 0 ? leave : 2 * sine * h) / cosine);
+  integrate(full, width, [&](double angle, double advance, double weight) {
+    const double y = -r * std::cos(angle), chord = 2 * r * std::sin(angle) * r * std::sin(angle);
+    const double risen = 2 * r * std::sin(angle - advance / 2) * std::sin(advance / 2);
+    const double here = std::max(0.0, length - cosine / sine * risen);
+    const double volume = weight * here * chord;
+    part.volume += volume;
+    part.moment += volume * Vec3{here / 2 - h, y, 0};
+    part.curved_area += weight * 2 * r * here;
+    result.lower_end += weight * chord;
+    const double cut = weight * chord / sine;
+    part.flat_area += cut;
+    part.flat_moment += cut * Vec3{here - h, y, 0};
+  });
+  return result;
+}
+
+// -------------------------------------------------------------------------------------------------- one plane, one body
+
+/// A ball, a capsule or a cylinder as all of them are seen here.
+struct Revolved {
+  Vec3 centre, axis;
+  double radius, half_length;
+  bool round;  ///< ends in half balls
+
+  /// The offset of the supporting plane along `direction`, about the centre.
+  double reach(Vec3 direction) const {
+    const double along = dot(axis, direction);
+    return half_length * std::abs(along) + radius * norm(round ? direction : direction - along * axis);
+  }
+};
+
+std::optional<Revolved> revolved(const Placed& body) {
+  const Vec3 axis = body.pose.rotation * Vec3{0, 0, 1};
+  if (const Sphere* s = std::get_if<Sphere>(&body.shape))
+    return Revolved{body.pose.translation, axis, s->radius, 0, true};
+  if (const Capsule* c = std::get_if<Capsule>(&body.shape))
+    return Revolved{body.pose.translation, axis, c->radius, c->length / 2, true};
+  if (const Cylinder* c = std::get_if<Cylinder>(&body.shape))
+    return Revolved{body.pose.translation, axis, c->radius, c->length / 2, false};
+  return std::nullopt;
+}
+
+Part below(const Revolved& body, double sine, double cosine, double t) {
+  const double r = body.radius, h = body.half_length;
+  if (!body.round) {
+    CylinderPart cylinder = cylinder_below(r, h, sine, cosine, t);
+    cylinder.part.curved_area += cylinder.lower_end + cylinder.upper_end;
+    return cylinder.part;
+  }
+  if (h == 0) return t >= r ? cap(r, 2 * r, {1, 0, 0}) : t > -r ? cap(r, r + t, {sine, cosine, 0}) : Part{};
+  Part part = cylinder_below(r, h, sine, cosine, t).part;
+  part += half_ball_below(r, sine, cosine, t - sine * h).shifted(h);
+  part += half_ball_below(r, -sine, cosine, t + sine * h).mirrored().shifted(-h);
+  return part;
+}
+
+/// Sums over terms of that size are right to this fraction of it.
+constexpr double kSummation = 64 * DBL_EPSILON;
+
+/// What the plane leaves of the body; the plane's pull is that of body `other`, and `rounding` as in closed_form().
+std::optional<Quantities> cut_by_plane(const Revolved& body, const Plane& plane, int self, double rounding,
+                                       Vec3 reference) {
+  double sine = dot(body.axis, plane.normal);
+  const Vec3 axis = sine < 0 ? -body.axis : body.axis;
+  sine = std::abs(sine);
+  const Vec3 across = plane.normal - sine * axis;
+  const double cosine = norm(across);
+  const Vec3 sideways = cosine > 0 ? across / cosine : any_orthogonal(axis);
+  const Part part = below(body, sine, cosine, -signed_distance(plane, body.centre));
+  if (!(part.volume > 0)) return std::nullopt;
+  const auto to_world = [&](Vec3 p) { return reference + (body.centre + (p.x * axis + p.y * sideways)); };
+  Quantities q;
+  q.closed_form = true;
+  q.facets_touched = part.flat_area > 0 ? 1 : 0;
+  q.volume = part.volume;
+  q.area = part.flat_area + part.curved_area;
+  q.centroid = to_world(part.moment / part.volume);
+  q.volume_error = rounding * q.area + kSummation * part.scale + kSummation * part.volume;
+  if (part.flat_area > 0) {
+    const Vec3 where = to_world(part.flat_moment / part.flat_area);
+    // The area vectors of a closed surface sum to zero, and so do their moments.
+    q.pulls = {{1 - self, part.flat_area * plane.normal, where}, {self, -part.flat_area * plane.normal, where}};
+  }
+  return q;
+}
+
+/// An upper bound, as low as it takes, of dot(direction, x) over the part of `body` below the plane, about its centre:
+/// by weak duality, reach(direction − λ normal) + λ offset for any λ >= 0, a convex function of λ.
+double reach_below(const Revolved& body, Vec3 normal, double offset, Vec3 direction, double rounding) {
+  const auto bound = [&](double lambda) {
+    return body.reach(direction - lambda * normal) + lambda * offset + (1 + lambda) * rounding;
+  };
+  constexpr double kGolden = 0.6180339887498949;
+  double low = 0, high = 4;
+  while (high < 1e6 && bound(high) < bound(high / 2)) high *= 2;
+  double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
+  double at_left = bound(left), at_right = bound(right);
+  for (int i = 0; i < 48; ++i) {
+    if (at_left < at_right) {
+      high = right, right = left, at_right = at_left;
+      left = high - kGolden * (high - low), at_left = bound(left);
+    } else {
+      low = left, left = right, at_left = at_right;
+      right = low + kGolden * (high - low), at_right = bound(right);
+    }
+  }
+  return std::min({bound(0), at_left, at_right});
+}
+
+/// The body where at most one of the planes cuts off anything that the others leave.
+std::optional<Quantities> cut_by_polytope(const Revolved& body, std::span<const Plane> planes, int self,
+                                          double rounding, Vec3 reference) {
+  const Plane* deepest = nullptr;
+  double most = -kInfinity;
+  std::vector<const Plane*> cutting;
+  for (const Plane& plane : planes) {
+    const double beyond = body.reach(plane.normal) + signed_distance(plane, body.centre);
+    if (beyond > most) most = beyond, deepest = &plane;
+    if (beyond > 0) cutting.push_back(&plane);
+  }
+  double layers = 1;
+  for (const Plane* plane : cutting) {
+    if (plane == deepest) continue;
+    const double offset = -signed_distance(*plane, body.centre);
+    const double deepest_offset = -signed_distance(*deepest, body.centre);
+    const double reach = reach_below(body, deepest->normal, deepest_offset, plane->normal, rounding);
+    if (reach > offset + 2 * rounding) return std::nullopt;
+    if (reach > offset) layers += 4;  // it may cut off a layer of rounding
+  }
+  return cut_by_plane(body, *deepest, self, layers * rounding, reference);
+}
+
+// ----------------------------------------------------------------------------------------------------------------- lens
+
+/// A ball, or the end of a capsule, where dot(outward, x − centre) >= 0; every side of a ball is one.
+struct End {
+  Vec3 centre, outward;
+};
+
+/// How far the cap dot(normal, x − centre) <= offset of a ball keeps to the outer side of an end, at least.
+double clearance(const End& end, Vec3 centre, double radius, Vec3 normal, double offset, double rounding) {
+  const Revolved ball{centre, {0, 0, 1}, radius, 0, true};
+  return dot(end.outward, centre - end.centre) - reach_below(ball, normal, offset, -end.outward, rounding);
+}
+
+/// The lens of two balls: cap of a towards b, cap of b towards a.
+std::optional<Quantities> lens(Vec3 a, double ra, Vec3 b, double rb, double rounding, Vec3 reference,
+                               std::span<const End> ends) {
+  const double distance = norm(b - a), depth = ra + rb - distance;
+  if (!(depth > 0)) return std::nullopt;
+  const Vec3 towards = distance > 0 ? (b - a) / distance : Vec3{1, 0, 0};
+  double height_a = 0, height_b = 0;
+  if (distance <= std::abs(ra - rb)) {
+    (ra <= rb ? height_a : height_b) = 2 * std::min(ra, rb);
+  } else {
+    // The smaller by the formula, the other as the rest: a circle misplaced by rounding then moves no volume.
+    height_a = depth * (rb - ra + distance) / (2 * distance);
+    height_b = depth * (ra - rb + distance) / (2 * distance);
+    (height_a <= height_b ? height_b : height_a) = depth - std::min(height_a, height_b);
+  }
+  for (const End& end : ends) {
+    const double by_a = height_a > 0 ? clearance(end, a, ra, -towards, height_a - ra, rounding) : kInfinity;
+    const double by_b = height_b > 0 ? clearance(end, b, rb, towards, height_b - rb, rounding) : kInfinity;
+    if (std::min(by_a, by_b) <= 0) return std::nullopt;
+  }
+  const Part cap_a = cap(ra, height_a, -towards), cap_b = cap(rb, height_b, towards);
+  Quantities q;
+  q.closed_form = true;
+  q.volume = cap_a.volume + cap_b.volume;
+  q.area = cap_a.curved_area + cap_b.curved_area;
+  // About the point where the line of centres passes through the circle.
+  const Vec3 moment = cap_a.moment + (ra - height_a) * cap_a.volume * -towards + cap_b.moment +
+                      (rb - height_b) * cap_b.volume * towards;
+  const Vec3 circle = height_a > 0 ? a + (ra - height_a) * towards : b - (rb - height_b) * towards;
+  q.centroid = reference + (circle + moment / q.volume);
+  q.volume_error = rounding * q.area + kSummation * q.volume;
+  const double disc = std::max(cap_a.flat_area, cap_b.flat_area);
+  if (disc > 0) q.pulls = {{0, disc * towards, reference + circle}, {1, -disc * towards, reference + circle}};
+  return q;
+}
+
+/// Where every point of the common set lies beyond the ends of both bodies, the ends are all that matters: the set is
+/// connected, and around the lens there is nothing else of them.
+std::optional<Quantities> lens_of_ends(const Revolved& a, const Revolved& b, double rounding, Vec3 reference) {
+  const double sign_a = dot(a.axis, b.centre - a.centre) < 0 ? -1 : 1;
+  const double sign_b = dot(b.axis, a.centre - b.centre) < 0 ? -1 : 1;
+  std::vector<End> ends;
+  Vec3 centre_a = a.centre, centre_b = b.centre;
+  if (a.half_length > 0) {
+    centre_a += sign_a * a.half_length * a.axis;
+    ends.push_back({centre_a, sign_a * a.axis});
+  }
+  if (b.half_length > 0) {
+    centre_b += sign_b * b.half_length * b.axis;
+    ends.push_back({centre_b, sign_b * b.axis});
+  }
+  return lens(centre_a, a.radius, centre_b, b.radius, rounding, reference, ends);
+}
+
+}  // namespace
+
+std::optional<Quantities> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference) {
+  const std::optional<Revolved> smooth_a = revolved(a), smooth_b = revolved(b);
+  if (smooth_a && smooth_b) {
+    if (!smooth_a->round || !smooth_b->round) return std::nullopt;
+    return lens_of_ends(*smooth_a, *smooth_b, rounding, reference);
+  }
+  if (!smooth_a && !smooth_b) return std::nullopt;
+  const Placed& other = smooth_a ? b : a;
+  if (smooth(other.shape)) return std::nullopt;
+  std::vector<Plane> planes;
+  append_planes(other.shape, planes);
+  for (Plane& plane : planes) plane = other.pose * plane;
+  return cut_by_polytope(smooth_a ? *smooth_a : *smooth_b, planes, smooth_a ? 0 : 1, rounding, reference);
+}
+
+}  // namespace overlapper

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <optional>
+
+#include "methods/dual/region.h"
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// The measures of an overlapping pair where a formula gives them, right to rounding, whatever the tolerance:
+///
+/// - the lens of two balls, of a ball and the end of a capsule, or of two ends of capsules;
+/// - a ball, a capsule or a cylinder cut by one plane: that of a half-space, or the only one of a box's or a hull's
+/// that
+///   cuts off anything which the others leave;
+/// - a ball, a capsule or a cylinder that lies inside a ball, a half-space, a box or a hull.
+///
+/// Nothing for every other pair. Bodies relative to `reference`, in any order; `rounding` is how far a surface may be
+/// off, in m. There is no polytope, so `inertia` stays zero; `pulls` has one entry per body, which act along one line.
+std::optional<Quantities> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference);
+
+}  // namespace overlapper

@@ -1,0 +1,359 @@
+#include "methods/dual/deepest_ball.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "distance/minkowski.h"
+
+namespace overlapper {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+using Row4 = std::array<double, 4>;
+
+Row4 row_of(const Plane& plane) { return {plane.normal.x, plane.normal.y, plane.normal.z, 1}; }
+
+/// Solves m z = b by elimination with row pivoting, which is backward stable.
+Row4 solve(std::array<Row4, 4> m, Row4 b) {
+  for (int k = 0; k < 4; ++k) {
+    int pivot = k;
+    for (int i = k + 1; i < 4; ++i)
+      if (std::abs(m[i][k]) > std::abs(m[pivot][k])) pivot = i;
+    std::swap(m[k], m[pivot]);
+    std::swap(b[k], b[pivot]);
+    if (m[k][k] == 0) continue;
+    for (int i = k + 1; i < 4; ++i) {
+      const double factor = m[i][k] / m[k][k];
+      for (int j = k; j < 4; ++j) m[i][j] -= factor * m[k][j];
+      b[i] -= factor * b[k];
+    }
+  }
+  Row4 z{};
+  for (int k = 3; k >= 0; --k) {
+    double sum = b[k];
+    for (int j = k + 1; j < 4; ++j) sum -= m[k][j] * z[j];
+    z[k] = m[k][k] != 0 ? sum / m[k][k] : 0;
+  }
+  return z;
+}
+
+/// Four planes at which the linear programme's optimum over the planes seen so far lies.
+class Basis {
+ public:
+  explicit Basis(const std::array<OwnedPlane, 4>& planes) : planes_(planes) {}
+
+  /// The ball that touches all four planes: centre and radius.
+  std::pair<Vec3, double> ball() const {
+    std::array<Row4, 4> m;
+    Row4 offsets;
+    for (int i = 0; i < 4; ++i) m[i] = row_of(planes_[i].plane), offsets[i] = planes_[i].plane.offset;
+    const Row4 z = solve(m, offsets);
+    return {{z[0], z[1], z[2]}, z[3]};
+  }
+
+  /// Exchanges one plane for `entering` so that the weights stay non-negative. False if rounding leaves no choice.
+  bool exchange(const OwnedPlane& entering) {
+    const Row4 weight = combination_of({0, 0, 0, 1});
+    const Row4 share = combination_of(row_of(entering.plane));
+    int leaving = -1;
+    double least = kInfinity;
+    for (int i = 0; i < 4; ++i) {
+      if (share[i] <= 1e-12) continue;
+      const double ratio = std::max(0.0, weight[i]) / share[i];
+      if (ratio < least) least = ratio, leaving = i;
+    }
+    if (leaving < 0) return false;
+    planes_[leaving] = entering;
+    return true;
+  }
+
+  /// An upper bound of the radius that holds whatever rounding did to the basis: a sum of the four inequalities with
+  /// non-negative weights that add up to one, about `centre`, for balls whose centre is within `reach` of it.
+  double certified_radius(Vec3 centre, double reach) const {
+    Row4 weight = combination_of({0, 0, 0, 1});
+    double total = 0, bound = 0;
+    Vec3 left_over;
+    for (double& w : weight) {
+      w = std::max(0.0, w);
+      total += w;
+    }
+    if (!(total > 0)) return kInfinity;
+    for (int i = 0; i < 4; ++i) {
+      bound -= weight[i] / total * signed_distance(planes_[i].plane, centre);
+      left_over += weight[i] / total * planes_[i].plane.normal;
+    }
+    return bound + norm(left_over) * reach;
+  }
+
+  /// The largest of the numbers that the four planes were made from.
+  double magnitude(std::span<const double> reach) const {
+    double largest = 0;
+    for (const OwnedPlane& p : planes_)
+      largest = std::max(largest, p.owner >= 0 ? reach[p.owner] : std::abs(p.plane.offset));
+    return largest;
+  }
+
+ private:
+  /// The shares of the four planes' rows that add up to `row`.
+  Row4 combination_of(const Row4& row) const {
+    std::array<Row4, 4> transposed_rows;
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) transposed_rows[j][i] = row_of(planes_[i].plane)[j];
+    return solve(transposed_rows, row);
+  }
+
+  std::array<OwnedPlane, 4> planes_;
+};
+
+/// The plane of the listed ones and of the smooth bodies that `point` violates most.
+OwnedPlane tightest(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, Vec3 point) {
+  const OwnedPlane* worst = nullptr;
+  double outside = -kInfinity;
+  for (const OwnedPlane& candidate : planes) {
+    const double d = signed_distance(candidate.plane, point);
+    if (d > outside) outside = d, worst = &candidate;
+  }
+  OwnedPlane result = worst ? *worst : OwnedPlane{{}, -1};
+  for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
+    if (!smooth(bodies[i].shape)) continue;
+    const Plane plane = bodies[i].tightest(point);
+    const double d = signed_distance(plane, point);
+    if (d > outside) outside = d, result = {plane, i};
+  }
+  return result;
+}
+
+/// A tetrahedron around one of the bounded bodies, of its supporting planes; around everything of interest if none is
+/// bounded.
+std::array<OwnedPlane, 4> surrounding_simplex(std::span<const Placed> bodies, std::span<const OwnedPlane> planes) {
+  const double s = 1 / std::sqrt(3.0);
+  const std::array<Vec3, 4> directions{Vec3{s, s, s}, Vec3{s, -s, -s}, Vec3{-s, s, -s}, Vec3{-s, -s, s}};
+  double reach = 1;
+  for (const OwnedPlane& p : planes) reach = std::max(reach, std::abs(p.plane.offset));
+  std::array<OwnedPlane, 4> simplex;
+  for (int k = 0; k < 4; ++k) {
+    simplex[k] = {{directions[k], 1e6 * reach}, -1};
+    bool first = true;
+    for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
+      if (!bounded(bodies[i].shape)) continue;
+      const double offset = dot(directions[k], bodies[i].support(directions[k]));
+      if (first || offset < simplex[k].plane.offset) simplex[k] = {{directions[k], offset}, i};
+      first = false;
+    }
+  }
+  return simplex;
+}
+
+}  // namespace
+
+DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double> reach,
+                         std::span<const OwnedPlane> planes, std::span<const OwnedPlane> hints) {
+  DeepestBall best{{}, -kInfinity, kInfinity, 0, false, false, {}};
+  const std::array<OwnedPlane, 4> simplex = surrounding_simplex(bodies, planes);
+  best.cuts.assign(simplex.begin(), simplex.end());
+  Basis basis(simplex);
+  for (const OwnedPlane& hint : hints) {
+    best.cuts.push_back(hint);
+    basis.exchange(hint);
+  }
+  // Every exchange lowers the optimum or, at a degenerate corner, keeps it; smooth bodies add planes without end.
+  constexpr int kMaxRounds = 256;
+  const double largest_reach = *std::max_element(reach.begin(), reach.end());
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const auto [centre, radius] = basis.ball();
+    // At a nearly singular corner the centre runs away, and both figures with it.
+    const OwnedPlane worst = tightest(bodies, planes, centre);
+    const double made_from = std::max(basis.magnitude(reach), worst.owner >= 0 ? reach[worst.owner] : 0);
+    const double rounding_here = rounding(std::max(made_from, norm(centre)));
+    best.upper = std::min(best.upper, radius + rounding_here);
+    const double certain = doubt(std::max(made_from, norm(centre)));
+    best.apart = radius < -certain && basis.certified_radius(centre, largest_reach + norm(centre)) < -certain;
+    const double slack = -signed_distance(worst.plane, centre);
+    if (slack > best.lower)
+      best.lower = slack, best.centre = centre, best.rounding = rounding_here, best.sure = slack > certain;
+    // Newton's method starts from any inner point; a share of the depth is enough.
+    const bool deep = best.lower > best.rounding && best.lower >= best.upper / 4;
+    const bool optimal = best.upper - best.lower <= 2 * best.rounding;
+    if (deep || best.apart || optimal || !basis.exchange(worst)) break;
+    best.cuts.push_back(worst);
+  }
+  return best;
+}
+
+namespace {
+
+/// The rows of dual points a, factored as a = R^T q with orthonormal columns of q: the Dikin frame of the rows is R^-1.
+struct Orthogonalised {
+  std::vector<Vec3> rows;  ///< q
+  Mat3 inverse_r;          ///< x = inverse_r * y
+};
+
+double column(const Vec3& v, int j) { return v[j]; }
+
+/// Gram-Schmidt, twice, on the three columns of the rows, the longest remaining column first. Rows of sliver planes are
+/// larger by any factor than the rest; each column is therefore first divided by its length.
+Orthogonalised orthogonalise(std::span<const Vec3> a) {
+  const int n = static_cast<int>(a.size());
+  std::array<std::vector<double>, 3> q;
+  std::array<Vec3, 3> combination{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};  // q[j] = a * combination[j]
+  for (int j = 0; j < 3; ++j) {
+    q[j].resize(n);
+    for (int i = 0; i < n; ++i) q[j][i] = column(a[i], j);
+  }
+  const auto product = [&](int j, int k) { return std::inner_product(q[j].begin(), q[j].end(), q[k].begin(), 0.0); };
+  for (int j = 0; j < 3; ++j) {
+    int longest = j;
+    for (int k = j + 1; k < 3; ++k)
+      if (product(k, k) > product(longest, longest)) longest = k;
+    std::swap(q[j], q[longest]);
+    std::swap(combination[j], combination[longest]);
+    for (int repeat = 0; repeat < 2; ++repeat) {
+      for (int k = 0; k < j; ++k) {
+        const double along = product(j, k);
+        for (int i = 0; i < n; ++i) q[j][i] -= along * q[k][i];
+        combination[j] -= along * combination[k];
+      }
+    }
+    const double length = std::sqrt(product(j, j));
+    if (!(length > 0)) continue;
+    for (double& value : q[j]) value /= length;
+    combination[j] = combination[j] / length;
+    for (int k = j + 1; k < 3; ++k) {
+      const double along = product(j, k);
+      for (int i = 0; i < n; ++i) q[k][i] -= along * q[j][i];
+      combination[k] -= along * combination[j];
+    }
+  }
+  Orthogonalised result;
+  result.inverse_r = transposed({combination[0], combination[1], combination[2]});
+  if (determinant(result.inverse_r) < 0) {
+    for (double& value : q[2]) value = -value;
+    combination[2] = -combination[2];
+    result.inverse_r = transposed({combination[0], combination[1], combination[2]});
+  }
+  for (int i = 0; i < n; ++i) result.rows.push_back({q[0][i], q[1][i], q[2][i]});
+  return result;
+}
+
+/// Three orthonormal axes whose first is the given unit vector, by rows.
+Mat3 axes_along(Vec3 first) {
+  const Vec3 second = any_orthogonal(first);
+  return {first, second, cross(first, second)};
+}
+
+/// The step along `direction` that makes the product of the slacks largest. Row q has the slack 1 - step * dot(q,
+/// direction) of what it had; the sum of their logarithms is concave, so its slope is bisected. Unlike the damped step,
+/// which at most doubles a slack, this crosses a sliver of any aspect in one go.
+double best_step(std::span<const Vec3> rows, Vec3 direction) {
+  double steepest = 0;
+  for (Vec3 q : rows) steepest = std::max(steepest, dot(q, direction));
+  if (!(steepest > 0)) return 0;
+  const auto rising = [&](double step) {
+    double slope = 0;
+    for (Vec3 q : rows) {
+      const double rate = dot(q, direction);
+      slope -= rate / (1 - step * rate);
+    }
+    return slope > 0;
+  };
+  double low = 0, high = 1 / steepest;
+  for (int i = 0; i < 12; ++i) {
+    const double middle = (low + high) / 2;
+    (rising(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
+/// The point that is moved by transposed(axes) * way.
+Vec3 moved(Vec3 point, const Mat3& axes, Vec3 way) { return point + apply_transposed(axes, way); }
+WideVector moved(const WideVector& point, const Mat3& axes, Vec3 way) {
+  return point + apply_transposed(axes, wide(way));
+}
+
+/// Newton's method for the analytic centre of the planes, from a point strictly inside all of them. Works in the frame
+/// of the last step, so that slacks of any ratio meet as numbers near one.
+template <class AnyPlane>
+class AnalyticCentre {
+ public:
+  using Point = decltype(AnyPlane::normal);
+
+  explicit AnalyticCentre(const Point& inside) { frame_.origin = inside; }
+
+  void settle(std::span<const Owned<AnyPlane>> planes) {
+    for (int step = 0; step < kMaxSteps; ++step) {
+      std::vector<Vec3> a;
+      Vec3 nearest{1, 0, 0};
+      double closest = kInfinity;
+      for (const Owned<AnyPlane>& p : planes) {
+        const double slack = -rounded(signed_distance(p.plane, frame_.origin));
+        if (slack < closest) closest = slack, nearest = rounded(p.plane.normal);
+      }
+      // In axes along the nearest plane's normal, the large entries of a sliver's rows fall into one column.
+      const Mat3 axes = axes_along(nearest);
+      for (const Owned<AnyPlane>& p : planes) {
+        const double slack = -rounded(signed_distance(p.plane, frame_.origin));
+        a.push_back(rounded(axes * p.plane.normal) / std::max(slack, std::numeric_limits<double>::min()));
+      }
+      const Orthogonalised frame = orthogonalise(a);
+      frame_.axes = transposed(axes) * frame.inverse_r;
+      Vec3 newton;
+      for (Vec3 q : frame.rows) newton -= q;
+      if (norm(newton) < 0.25) return;
+      frame_.origin = moved(frame_.origin, axes, frame.inverse_r * (best_step(frame.rows, newton) * newton));
+    }
+  }
+
+  const FrameAbout<Point>& frame() const { return frame_; }
+  void restart(const Point& inside) { frame_.origin = inside; }
+
+ private:
+  static constexpr int kMaxSteps = 64;
+  FrameAbout<Point> frame_;
+};
+
+}  // namespace
+
+template <class Body>
+FrameAbout<PointOf<Body>> round_frame(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> planes,
+                                      std::vector<Owned<PlaneOf<Body>>> cuts, const PointOf<Body>& inside) {
+  using Cut = Owned<PlaneOf<Body>>;
+  PointOf<Body> safe = inside;
+  // A cut may pass through the point by rounding only; such a plane would stop Newton's method before it starts.
+  AnalyticCentre<PlaneOf<Body>> centre(safe);
+  constexpr int kMaxRounds = 64;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    centre.settle(cuts);
+    const FrameAbout<PointOf<Body>>& frame = centre.frame();
+    // The plane that is nearest in the metric of the frame, or violated.
+    Cut worst{{}, -1};
+    double eccentricity = kEccentricity;
+    const auto consider = [&](const Cut& p) {
+      const double slack = -rounded(signed_distance(p.plane, frame.origin));
+      const double length = slack > 0 ? norm(rounded(apply_transposed(frame.axes, p.plane.normal))) / slack : kInfinity;
+      if (length > eccentricity) eccentricity = length, worst = p;
+    };
+    for (const Cut& p : planes) consider(p);
+    for (int i = 0; i < static_cast<int>(bodies.size()); ++i)
+      if (smooth(bodies[i].shape)) consider({bodies[i].tightest(frame.origin), i});
+    if (eccentricity == kEccentricity) return frame;
+    if (round == kMaxRounds - 1) break;
+    cuts.push_back(worst);
+    const double slack = -rounded(signed_distance(worst.plane, frame.origin));
+    const double safe_slack = -rounded(signed_distance(worst.plane, safe));
+    if (slack > 0) continue;
+    // Back towards the safe point, to the middle of what the new plane leaves.
+    const double reach = safe_slack / (safe_slack - slack);
+    centre.restart(safe + reach / 2 * (frame.origin - safe));
+  }
+  // Not seen to happen: the axes stay, about the point known to be inside.
+  return {safe, centre.frame().axes};
+}
+
+template Frame round_frame<Placed>(std::span<const Placed>, std::span<const OwnedPlane>, std::vector<OwnedPlane>,
+                                   const Vec3&);
+template FrameAbout<WideVector> round_frame<WideBody>(std::span<const WideBody>, std::span<const Owned<WidePlane>>,
+                                                      std::vector<Owned<WidePlane>>, const WideVector&);
+
+}  // namespace overlapper

@@ -1,0 +1,79 @@
+#include "methods/dual/wide_dual.h"
+
+#include "geometry/wide_pose.h"
+
+namespace overlapper {
+namespace {
+
+/// Makes the dual points of one body: the frame's origin and axes are turned into its own coordinates once, and its
+/// planes stay as they are.
+class BodyDuals {
+ public:
+  BodyDuals(const Placed& body, int owner, Vec3 reference, const Frame& frame)
+      : owner_(owner), rotation_(wide_rotation(body.orientation)) {
+    const WideVector from_body = wide_difference(reference, body.position) + wide(frame.origin);
+    origin_ = apply_transposed(rotation_, from_body);
+    if (const Hull* hull = std::get_if<Hull>(&body.shape)) origin_ = origin_ - wide(hull->data->origin);
+    const Mat3 columns = transposed(frame.axes);
+    axis_ = {apply_transposed(rotation_, wide(columns.row0)), apply_transposed(rotation_, wide(columns.row1)),
+             apply_transposed(rotation_, wide(columns.row2))};
+  }
+
+  /// True if the plane of a triangle certainly keeps farther from the origin than `reach` in the frame. In doubles, and
+  /// with their rounding taken for granted: most planes of a large mesh need no more.
+  bool far(Vec3 a, Vec3 b, Vec3 c, double reach) const {
+    const Vec3 normal = cross(b - a, c - a), away = a - rounded(origin_);
+    const double slack = dot(normal, away) - 0x1p-46 * norm(b - a) * norm(c - a) * (norm(a) + norm(away));
+    const Vec3 along{dot(rounded(axis_.row0), normal), dot(rounded(axis_.row1), normal),
+                     dot(rounded(axis_.row2), normal)};
+    return slack > 2 * reach * norm(along);
+  }
+
+  /// Of the plane with that normal, of any length, through a point or at a height along the normal.
+  WideDual through(const WideVector& normal, Vec3 point) const {
+    return make(normal, dot(normal, wide(point) - origin_));
+  }
+  WideDual at(const WideVector& normal, double height) const {
+    return make(normal, DoubleDouble{height} - dot(normal, origin_));
+  }
+
+ private:
+  WideDual make(const WideVector& normal, DoubleDouble slack) const {
+    const Vec3 direction = rounded(rotation_ * normal);
+    const WideVector along = axis_ * normal;
+    return {rounded({along.x / slack, along.y / slack, along.z / slack}), unit(direction), slack.head / norm(direction),
+            owner_};
+  }
+
+  int owner_;
+  WideMatrix rotation_;
+  WideVector origin_;  ///< of the frame, in the body's coordinates
+  WideMatrix axis_;    ///< of the frame, by rows, in the body's coordinates
+};
+
+}  // namespace
+
+std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference, const Frame& frame, double reach) {
+  std::vector<WideDual> duals;
+  for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
+    const BodyDuals body(bodies[i], i, reference, frame);
+    if (const Hull* hull = std::get_if<Hull>(&bodies[i].shape)) {
+      for (const auto& [a, b, c] : hull->data->triangles) {
+        const std::vector<Vec3>& corner = hull->data->corners;
+        if (body.far(corner[a], corner[b], corner[c], reach)) continue;
+        duals.push_back(body.through(wide_normal(corner[a], corner[b], corner[c]), corner[a]));
+      }
+      continue;
+    }
+    if (const HalfSpace* half = std::get_if<HalfSpace>(&bodies[i].shape)) {
+      duals.push_back(body.at(wide(half->given_normal), half->given_offset));
+      continue;
+    }
+    std::vector<Plane> planes;
+    append_planes(bodies[i].shape, planes);
+    for (const Plane& plane : planes) duals.push_back(body.at(wide(plane.normal), plane.offset));
+  }
+  return duals;
+}
+
+}  // namespace overlapper

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "methods/dual/deepest_ball.h"
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// A few ulps: what is left of rounding where everything before the last step was done in double-double.
+inline constexpr double kWideRounding = 8 * 0x1p-53;
+
+/// The dual point of a body's plane in the coordinates of a frame, each coordinate right to an ulp of the point's
+/// length.
+struct WideDual {
+  Vec3 point;
+  Vec3 normal;   ///< unit, in the world
+  double slack;  ///< m: distance of the plane from the frame's origin; not positive if that is outside
+  int owner;
+};
+
+/// The dual points of all planes of polytopes and half-spaces, from the numbers that define them: corners, half
+/// extents, positions, and orientations taken as the exact rotations that their quaternions stand for at any length.
+/// The frame is about `reference`.
+std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference, const Frame& frame, double reach);
+
+}  // namespace overlapper

@@ -1,0 +1,121 @@
+#include "methods/tracing/close_body.h"
+
+#include <limits>
+
+#include "shapes/planes_asked.h"
+
+namespace overlapper {
+
+bool has_graph(const Shape& shape) {
+  const Hull* hull = std::get_if<Hull>(&shape);
+  return hull ? hull->data->graph != nullptr : std::holds_alternative<Box>(shape);
+}
+
+// ----------------------------------------------------------------------------------------------------------------- Mesh
+
+void Mesh::set(const Shape& shape) {
+  if (const Hull* hull = std::get_if<Hull>(&shape)) {
+    data_ = hull->data.get();
+    graph_ = data_->graph.get();
+    // Facets are merged, and points on edges dropped, where corners lie within 32 half-ulps of the largest coordinate.
+    flat_ = graph_->triangular ? 0 : data_->flatness + 32 * 0x1p-53 * data_->radius;
+  } else {
+    set_box(std::get<Box>(shape).half_extents);
+    flat_ = 0;
+  }
+}
+
+void Mesh::set_box(Vec3 h) {
+  if (box_.vertices.empty()) {
+    std::vector<Vec3> cube;
+    for (double x : {-1.0, 1.0})
+      for (double y : {-1.0, 1.0})
+        for (double z : {-1.0, 1.0}) cube.push_back({x, y, z});
+    box_ = *make_hull(cube).data;
+    box_graph_ = *box_.graph;
+  }
+  for (Vec3& v : box_.vertices) v = {std::copysign(h.x, v.x), std::copysign(h.y, v.y), std::copysign(h.z, v.z)};
+  for (size_t f = 0; f < box_.planes.size(); ++f) {
+    Plane& plane = box_.planes[f];
+    plane.offset = dot(abs(plane.normal), h);
+    box_graph_.dual[f] = plane.normal / plane.offset;
+  }
+  box_.radius = box_graph_.circumradius = norm(h);
+  box_graph_.inradius = std::min({h.x, h.y, h.z});
+  data_ = &box_;
+  graph_ = &box_graph_;
+}
+
+// ------------------------------------------------------------------------------------------------------------ CloseBody
+
+CloseFrame close_frame(const Placed& first, const Placed& second, Vec3 origin) {
+  const auto own_origin = [](const Placed& body) {
+    const Hull* hull = std::get_if<Hull>(&body.shape);
+    return hull ? hull->data->origin : Vec3{};
+  };
+  const WideMatrix a = wide_rotation(first.orientation), b = wide_rotation(second.orientation);
+  const WideVector from_second =
+      a * wide_difference(origin, -own_origin(first)) + wide_difference(first.position, second.position);
+  const WideVector in_second = apply_transposed(b, from_second) - wide(own_origin(second));
+  const auto row = [&](DoubleDouble x, DoubleDouble y, DoubleDouble z) {
+    return rounded(apply_transposed(b, WideVector{x, y, z}));
+  };
+  CloseFrame frame;
+  frame.turn = {row(a.row0.x, a.row1.x, a.row2.x), row(a.row0.y, a.row1.y, a.row2.y),
+                row(a.row0.z, a.row1.z, a.row2.z)};
+  frame.origin = origin;
+  frame.origin_in_second = rounded(in_second);
+  frame.rest_in_second = {in_second.x.tail, in_second.y.tail, in_second.z.tail};
+  return frame;
+}
+
+void CloseBody::set(const Mesh& mesh, const CloseFrame& frame, bool is_second) {
+  mesh_ = &mesh;
+  turned_ = is_second;
+  turn_ = frame.turn;
+  origin_ = is_second ? frame.origin_in_second : frame.origin;
+  rest_ = is_second ? frame.rest_in_second : Vec3{};
+  const size_t vertices = data().vertices.size(), facets = data().planes.size();
+  if (++now_ == std::numeric_limits<int>::max()) {
+    std::fill(corner_placed_.begin(), corner_placed_.end(), 0);
+    std::fill(side_placed_.begin(), side_placed_.end(), 0);
+    now_ = 1;
+  }
+  if (corner_placed_.size() < vertices) corner_placed_.resize(vertices, 0), corners_.resize(vertices);
+  if (side_placed_.size() < facets) side_placed_.resize(facets, 0), sides_.resize(facets);
+  // A point of either body, turned and moved, and a dual point, whose plane may be tilted by merging.
+  const double rounding = 64 * 0x1p-53 * (data().radius + graph().circumradius) + 2 * mesh.flat();
+  doubt_ = rounding / graph().inradius;
+  const double inside = std::max(0.0, graph().inradius - rounding);
+  surely_inside2_ = inside * inside;
+  last_ = -1;
+}
+
+void CloseBody::place_corner(int vertex) {
+  const Vec3 at = placed(vertex);
+  corners_[vertex] = {at, std::sqrt(norm2(at))};
+  corner_placed_[vertex] = now_;
+}
+
+void CloseBody::place_side(int facet) {
+  ++planes_asked;
+  const Vec3 normal = data().planes[facet].normal;
+  Side side{turned_ ? turn_ * normal : normal, {}, std::numeric_limits<double>::infinity(), 0};
+  for (int v : data().facet(facet)) {
+    const Corner& c = corner(v);
+    if (c.size < side.size) side.through = c.at, side.size = c.size;
+    side.farthest = std::max(side.farthest, c.size);
+  }
+  sides_[facet] = side;
+  side_placed_[facet] = now_;
+}
+
+int CloseBody::holds(Vec3 at) {
+  const Vec3 own = own_point(at);
+  if (norm2(own - data().centroid) < surely_inside2_) return 1;
+  double gauge;
+  last_ = last_ < 0 ? graph().facet_towards(data(), own, gauge) : graph().facet_towards(data(), own, gauge, last_);
+  return gauge < 1 - doubt_ ? 1 : gauge > 1 + doubt_ ? -1 : 0;
+}
+
+}  // namespace overlapper

@@ -1,0 +1,170 @@
+#include "overlap/surface.h"
+
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <unordered_map>
+#include <utility>
+
+namespace overlapper {
+namespace {
+
+/// The facet on the other side of each directed ridge of a polytope.
+class Ridges {
+ public:
+  explicit Ridges(const Polytope& polytope)
+      : polytope_(polytope), count_(static_cast<int64_t>(polytope.vertices.size())) {
+    for (int f = 0; f < polytope.facets(); ++f) {
+      const auto ring = polytope.facet(f);
+      for (size_t i = 0; i < ring.size(); ++i) facet_left_of_[key(ring[i], ring[(i + 1) % ring.size()])] = f;
+    }
+  }
+  int left_of(int from, int to) const { return facet_left_of_.at(key(from, to)); }
+  int next_in(int facet, int vertex) const {
+    const auto ring = polytope_.facet(facet);
+    size_t i = 0;
+    while (ring[i] != vertex) ++i;
+    return ring[(i + 1) % ring.size()];
+  }
+
+ private:
+  int64_t key(int from, int to) const { return from * count_ + to; }
+  const Polytope& polytope_;
+  int64_t count_;
+  std::unordered_map<int64_t, int> facet_left_of_;
+};
+
+/// Closed loops of vertices around every connected part of the surface that belongs to `owner`, counter-clockwise from
+/// outside.
+void trace_patch(const Polytope& polytope, std::span<const Region::Facet> facets, const Ridges& ridges, int owner,
+                 std::vector<std::vector<int>>& loops) {
+  std::unordered_map<int, std::vector<int>>
+      open;  // vertices that begin border ridges not yet walked, and where they lead
+  const auto mine = [&](int facet) { return facets[facet].owner == owner; };
+  std::vector<std::pair<int, int>> border;
+  for (int f = 0; f < polytope.facets(); ++f) {
+    if (!mine(f)) continue;
+    const auto ring = polytope.facet(f);
+    for (size_t i = 0; i < ring.size(); ++i) {
+      const int from = ring[i], to = ring[(i + 1) % ring.size()];
+      if (!mine(ridges.left_of(to, from))) border.push_back({from, to});
+    }
+  }
+  std::unordered_map<int64_t, bool> walked;
+  const int64_t n = static_cast<int64_t>(polytope.vertices.size());
+  for (const auto& [first_from, first_to] : border) {
+    if (walked[first_from * n + first_to]) continue;
+    std::vector<int> loop;
+    int from = first_from, to = first_to;
+    while (!walked[from * n + to]) {
+      walked[from * n + to] = true;
+      loop.push_back(from);
+      // At the head, turn through the facets of this owner until the next ridge has another on its far side.
+      int facet = ridges.left_of(from, to);
+      int next = ridges.next_in(facet, to);
+      while (mine(ridges.left_of(next, to))) {
+        facet = ridges.left_of(next, to);
+        next = ridges.next_in(facet, to);
+      }
+      from = to;
+      to = next;
+    }
+    loops.push_back(std::move(loop));
+  }
+}
+
+/// Number of the group of each vertex: vertices joined by ridges that rounding alone may have made.
+std::vector<int> merge_vertices(const Region& region, int& groups) {
+  const Polytope& p = region.polytope;
+  std::vector<double> blur(p.vertices.size(), 0);
+  for (int f = 0; f < p.facets(); ++f) {
+    // The plane's rounding in the frame's coordinates, in which its distance from the origin is one over its dual's
+    // length.
+    const double moved = region.facets[f].rounding / region.facets[f].slack / norm(p.dual[f]);
+    // Planes that meet at a small angle move their common vertex by a multiple of that.
+    for (int v : p.facet(f)) blur[v] = std::max(blur[v], std::min(1e-3, 512 * moved));
+  }
+  std::vector<int> parent(p.vertices.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  for (int f = 0; f < p.facets(); ++f) {
+    const auto ring = p.facet(f);
+    for (size_t i = 0; i < ring.size(); ++i) {
+      const int u = ring[i], v = ring[(i + 1) % ring.size()];
+      if (norm(p.vertices[u] - p.vertices[v]) <= std::max(blur[u], blur[v]))
+        parent[std::max(root(u), root(v))] = std::min(root(u), root(v));
+    }
+  }
+  std::vector<int> group(p.vertices.size());
+  groups = 0;
+  for (int v = 0; v < static_cast<int>(group.size()); ++v) group[v] = root(v) == v ? groups++ : group[root(v)];
+  return group;
+}
+
+/// Of each group, the vertex that lies nearest to the planes of all its facets: planes that meet at a small angle place
+/// some of them badly.
+std::vector<int> representatives(const Polytope& p, std::span<const int> group, int groups) {
+  std::vector<std::vector<int>> members(groups), facets_of(groups);
+  for (int v = 0; v < static_cast<int>(group.size()); ++v) members[group[v]].push_back(v);
+  for (int f = 0; f < p.facets(); ++f)
+    for (int v : p.facet(f))
+      if (members[group[v]].size() > 1) facets_of[group[v]].push_back(f);
+  std::vector<int> chosen(groups);
+  for (int g = 0; g < groups; ++g) {
+    double least = std::numeric_limits<double>::infinity();
+    for (int v : members[g]) {
+      double misfit = 0;
+      for (int f : facets_of[g])
+        misfit = std::max(misfit, std::abs(dot(p.dual[f], p.vertices[v]) - 1) / norm(p.dual[f]));
+      if (misfit < least) least = misfit, chosen[g] = v;
+    }
+  }
+  return chosen;
+}
+
+/// The ring with each run of one group written once; empty if fewer than three remain.
+std::vector<int> contracted(std::span<const int> ring, std::span<const int> group) {
+  std::vector<int> result;
+  for (int v : ring)
+    if (result.empty() || result.back() != group[v]) result.push_back(group[v]);
+  while (result.size() > 1 && result.back() == result.front()) result.pop_back();
+  if (result.size() < 3) result.clear();
+  return result;
+}
+
+}  // namespace
+
+Surface surface_of(const Region& region, int bodies) {
+  const Polytope& p = region.polytope;
+  int groups = 0;
+  const std::vector<int> group = merge_vertices(region, groups);
+  Surface surface;
+  surface.vertices.resize(groups);
+  const std::vector<int> chosen = representatives(p, group, groups);
+  for (int g = 0; g < groups; ++g) surface.vertices[g] = region.to_world(p.vertices[chosen[g]]);
+  surface.ring_start.push_back(0);
+  for (int f = 0; f < p.facets(); ++f) {
+    const std::vector<int> ring = contracted(p.facet(f), group);
+    if (ring.empty()) continue;
+    surface.ring.insert(surface.ring.end(), ring.begin(), ring.end());
+    surface.ring_start.push_back(static_cast<int>(surface.ring.size()));
+    const Region::Facet& facet = region.facets[f];
+    const double offset = facet.slack + dot(facet.normal, region.frame.origin) + dot(facet.normal, region.reference);
+    surface.planes.push_back({facet.normal, offset});
+    surface.owner.push_back(facet.owner);
+  }
+  const Ridges ridges(p);
+  std::vector<std::vector<int>> loops;
+  for (int owner = 0; owner < (bodies == 2 ? 1 : bodies); ++owner) trace_patch(p, region.facets, ridges, owner, loops);
+  for (const auto& loop : loops) {
+    std::vector<Vec3> polygon;
+    for (int v : contracted(loop, group)) polygon.push_back(surface.vertices[v]);
+    if (!polygon.empty()) surface.patch.push_back(std::move(polygon));
+  }
+  return surface;
+}
+
+}  // namespace overlapper

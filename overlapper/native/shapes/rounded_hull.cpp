@@ -1,0 +1,158 @@
+#include <cfloat>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+#include "shapes/shape.h"
+
+namespace overlapper {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// A point of a polytope, and a direction out of it there along which no other point of the polytope lies farther.
+struct Foot {
+  Vec3 point, outward;
+  double height2;  ///< squared distance from where it was asked
+};
+
+/// The foot on a facet of a point above its plane.
+Foot foot_on_facet(const HullData& hull, int f, Vec3 x) {
+  const Plane& plane = hull.planes[f];
+  const Vec3 flat = x - signed_distance(plane, x) * plane.normal;
+  const auto ring = hull.facet(f);
+  Foot best{flat, plane.normal, kInfinity};
+  bool inside = true;
+  for (size_t i = 0; i < ring.size(); ++i) {
+    const Vec3 a = hull.vertices[ring[i]], edge = hull.vertices[ring[(i + 1) % ring.size()]] - a;
+    if (dot(cross(edge, plane.normal), flat - a) <= 0) continue;
+    inside = false;
+    const double length2 = norm2(edge), share = std::clamp(dot(x - a, edge) / length2, 0.0, 1.0);
+    const Vec3 point = a + share * edge;
+    Vec3 outward = x - point;
+    // Rounding must not tilt the direction along the edge: the polytope would reach farther that way.
+    if (share > 0 && share < 1) outward -= dot(outward, edge) / length2 * edge;
+    if (norm2(x - point) < best.height2) best = {point, outward, norm2(x - point)};
+  }
+  if (inside) best.height2 = norm2(x - flat);
+  return best;
+}
+
+/// The nearest point of the polytope to a point outside of it. It lies on a facet that the point sees.
+Foot foot(const HullData& hull, Vec3 x) {
+  Foot nearest{x, {}, kInfinity};
+  for (int f = 0; f < static_cast<int>(hull.planes.size()); ++f) {
+    const double height = signed_distance(hull.planes[f], x);
+    if (height <= 0 || height * height >= nearest.height2) continue;
+    const Foot found = foot_on_facet(hull, f, x);
+    if (found.height2 < nearest.height2) nearest = found;
+  }
+  return nearest;
+}
+
+Plane highest_plane(const HullData& hull, Vec3 point) {
+  const Plane* highest = &hull.planes[0];
+  for (const Plane& plane : hull.planes)
+    if (signed_distance(plane, point) > signed_distance(*highest, point)) highest = &plane;
+  return *highest;
+}
+
+/// Sums over the ridges and corners of a polytope of what Steiner's formula asks for.
+struct Steiner {
+  double area = 0, mean_width = 0;  ///< m², m: the volume is V + area r + mean_width r² + 4/3 π r³
+  Vec3 of_facets, of_edges, of_corners;
+};
+
+Steiner steiner(const HullData& hull) {
+  Steiner sums;
+  std::vector<double> defect(hull.vertices.size(), 2 * std::numbers::pi);
+  for (int f = 0; f < static_cast<int>(hull.planes.size()); ++f) {
+    const auto ring = hull.facet(f);
+    const Vec3 apex = hull.vertices[ring[0]];
+    for (size_t i = 0; i < ring.size(); ++i) {
+      const Vec3 a = hull.vertices[ring[(i + ring.size() - 1) % ring.size()]], b = hull.vertices[ring[i]],
+                 c = hull.vertices[ring[(i + 1) % ring.size()]];
+      defect[ring[i]] -= std::atan2(norm(cross(a - b, c - b)), dot(a - b, c - b));
+      const double area = dot(cross(b - apex, c - apex), hull.planes[f].normal) / 2;
+      sums.area += area;
+      sums.of_facets += area / 3 * (apex + b + c);
+    }
+  }
+  for (const Edge& edge : hull.edges) {
+    const Vec3 a = hull.vertices[edge.from], b = hull.vertices[edge.to];
+    const Vec3 left = hull.planes[edge.left].normal, right = hull.planes[edge.right].normal;
+    const double sine = norm(cross(left, right)), cosine = dot(left, right), angle = std::atan2(sine, cosine);
+    const double length = norm(b - a);
+    sums.mean_width += length * angle / 2;
+    sums.of_edges += length * angle / 2 * ((a + b) / 2);
+    // The sum of the outward directions across the ridge: the normals' sum times the tangent of half the angle.
+    sums.of_corners += length / 3 * sine / (1 + cosine) * (left + right);
+  }
+  // The normals at a corner fill a solid angle as large as what its facets lack of a full turn.
+  for (size_t v = 0; v < defect.size(); ++v) sums.of_corners += defect[v] / 3 * hull.vertices[v];
+  return sums;
+}
+
+}  // namespace
+
+RoundedHull make_rounded_hull(std::span<const Vec3> points, double radius) {
+  RoundedHull rounded{make_hull(points), make_sphere(radius).radius};
+  if (rounded.core.data->edges.empty())
+    throw std::invalid_argument("vertices are so close to flat that rounding leaves no ridges to round off");
+  return rounded;
+}
+
+double RoundedHull::volume() const {
+  const Steiner sums = steiner(*core.data);
+  const double r = radius;
+  return core.data->volume + r * (sums.area + r * (sums.mean_width + r * (4.0 / 3.0) * std::numbers::pi));
+}
+
+Vec3 RoundedHull::centroid() const {
+  const Steiner sums = steiner(*core.data);
+  const double r = radius;
+  const Vec3 moment =
+      core.data->volume * core.data->centroid + r * (sums.of_facets + r * (sums.of_edges + r * sums.of_corners));
+  return moment / volume();
+}
+
+Plane RoundedHull::tightest(Vec3 point) const {
+  const Foot nearest = foot(*core.data, point);
+  if (norm2(nearest.outward) > 0) return supporting(nearest.outward);
+  Plane plane = highest_plane(*core.data, point);
+  plane.offset += radius;
+  return plane;
+}
+
+Plane RoundedHull::supporting(Vec3 outward) const {
+  const Vec3 normal = unit(outward);
+  return {normal, dot(normal, core.support(normal)) + radius};
+}
+
+/// Newton's method for the distance from the core along the ray, a convex function, from outside: every step is the
+/// exit through a supporting plane, and none passes the surface.
+Plane RoundedHull::ray_exit(Vec3 origin, Vec3 direction) const {
+  const auto leave = [&](const Plane& plane) {
+    const double rate = dot(plane.normal, direction);
+    return rate > 0 ? -signed_distance(plane, origin) / rate : kInfinity;
+  };
+  Plane exit{};
+  double t = kInfinity;
+  for (Plane plane : core.data->planes) {
+    plane.offset += radius;
+    if (leave(plane) < t) t = leave(plane), exit = plane;
+  }
+  constexpr int kMostSteps = 64;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Plane plane = tightest(origin + t * direction);
+    const double sooner = leave(plane);
+    if (!(sooner < t)) break;
+    exit = plane;
+    if (sooner >= t * (1 - 2 * DBL_EPSILON)) break;
+    t = sooner;
+  }
+  return exit;
+}
+
+}  // namespace overlapper

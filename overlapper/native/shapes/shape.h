@@ -1,0 +1,210 @@
+#pragma once
+
+#include <concepts>
+#include <memory>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "geometry/vec.h"
+#include "shapes/hull_graph.h"
+
+namespace overlapper {
+
+/// A closed convex solid, known only by asking. Directions need not be unit length.
+template <class T>
+concept ConvexOracle = requires(const T& shape, Vec3 point, Vec3 direction) {
+  { shape.support(direction) } -> std::same_as<Vec3>;  // a farthest point; ties are free
+  {
+    shape.ray_exit(point, direction)
+  } -> std::same_as<Plane>;  // supporting plane through which the ray leaves; point strictly inside
+  {
+    shape.tightest(point)
+  } -> std::same_as<Plane>;  // supporting plane with the least slack at the point, inside or out
+};
+
+struct Sphere {
+  double radius;
+
+  Vec3 support(Vec3 direction) const { return radius * unit(direction); }
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+struct Box {
+  Vec3 half_extents;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+/// A box's corners and sides by number: bit k of a corner's says on which side of axis k it is, and so does the last
+/// bit of a side's, 2 k or 2 k + 1.
+inline Vec3 corner(const Box& box, int i) {
+  const Vec3 h = box.half_extents;
+  return {i & 1 ? h.x : -h.x, i & 2 ? h.y : -h.y, i & 4 ? h.z : -h.z};
+}
+inline Plane side(const Box& box, int f) {
+  const double sign = f & 1 ? 1 : -1;
+  const int k = f / 2;
+  return {{k == 0 ? sign : 0, k == 1 ? sign : 0, k == 2 ? sign : 0}, box.half_extents[k]};
+}
+
+/// Around local z; `length` lies between the centres of the caps.
+struct Capsule {
+  double radius, length;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+/// Around local z.
+struct Cylinder {
+  double radius, length;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+/// { x : dot(plane.normal, x) <= plane.offset }. Unbounded: its support is at infinity in all directions but one.
+struct HalfSpace {
+  Plane plane;
+  Vec3 given_normal;  ///< as it came, of any length: dividing by that rounds, and wider arithmetic need not
+  double given_offset;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3, Vec3) const { return plane; }
+  Plane tightest(Vec3) const { return plane; }
+};
+
+/// A ridge of a polytope: from vertex `from` to vertex `to`, the facet `left` on the left hand seen from outside.
+struct Edge {
+  int from, to, left, right;
+};
+
+/// What a convex polytope is made of. Facet f is the polygon ring[ring_start[f] .. ring_start[f + 1]) of vertices,
+/// counter-clockwise from outside, in the plane planes[f]. Coordinates are relative to `origin`: subtracting it lost no
+/// bit, and it keeps the digits of a hull that lies far from where its points are counted from.
+struct HullData {
+  Vec3 origin;
+  std::vector<Vec3> vertices;
+  std::vector<Plane> planes;
+  std::vector<int> ring, ring_start{0};
+  /// The surface as it is before coplanar triangles are merged and what rounding moved is forgotten, for wider
+  /// arithmetic.
+  std::vector<Vec3> corners;
+  std::vector<std::array<int, 3>> triangles;
+  /// Per facet: three corners whose plane holds all corners of its triangles without any rounding; -1 if there are
+  /// none.
+  std::vector<std::array<int, 3>> facet_corners;
+  double volume = 0;
+  Vec3 centroid;
+  std::shared_ptr<const HullGraph> graph;  ///< for climbing; null where rounding left no closed convex surface
+
+  std::vector<Edge> edges;                      ///< none if merging facets has left a ridge without its other side
+  std::vector<std::array<int, 3>> facets_meet;  ///< per vertex: three of its facets, as far from a common line as any
+  double radius = 0;                            ///< of a ball about the coordinates' origin that holds all vertices
+  double flatness = 0;  ///< m: how far vertices of a facet lie inside its plane, or those beside it outside, at most
+
+  std::span<const int> facet(int f) const {
+    return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
+  }
+};
+
+/// The convex hull of points; shared, never changed once built.
+struct Hull {
+  std::shared_ptr<const HullData> data;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+/// All points within `radius` of a polytope: its Minkowski sum with a ball.
+struct RoundedHull {
+  Hull core;
+  double radius;
+
+  Vec3 support(Vec3 direction) const { return core.support(direction) + radius * unit(direction); }
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+  /// The supporting plane whose normal is along `outward`.
+  Plane supporting(Vec3 outward) const;
+
+  double volume() const;  ///< m³, by Steiner's formula
+  Vec3 centroid() const;  ///< about the core's origin
+};
+
+using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Hull, HalfSpace, RoundedHull>;
+
+/// Each throws std::invalid_argument with one sentence that names the argument.
+Sphere make_sphere(double radius);
+Box make_box(Vec3 half_extents);
+Capsule make_capsule(double radius, double length);
+Cylinder make_cylinder(double radius, double length);
+HalfSpace make_half_space(Vec3 normal, double offset);
+/// Interior, duplicate, collinear and coplanar points are welcome; coplanar triangles become one facet.
+Hull make_hull(std::span<const Vec3> points);
+RoundedHull make_rounded_hull(std::span<const Vec3> points, double radius);
+/// The hull of finite points, or null if they are flat; `source[i]` becomes the index of vertex i among the points.
+std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source = nullptr);
+
+/// Fills in what follows from vertices, planes and rings.
+void complete(HullData& data);
+
+/// m³; infinite for a half-space.
+double volume(const Shape& shape);
+Vec3 centroid(const Shape& shape);
+bool bounded(const Shape& shape);
+
+/// True for shapes with infinitely many supporting planes along their boundary: sphere, capsule, cylinder,
+/// rounded hull.
+bool smooth(const Shape& shape);
+
+/// All facet planes of a polytope; for a smooth shape a few of its tangent planes that already bound it. About the
+/// shape's origin.
+void append_planes(const Shape& shape, std::vector<Plane>& planes);
+
+/// A smooth shape is its core (a point, a segment, a polytope) grown by a radius; every other shape is its own core, of
+/// radius 0.
+double core_radius(const Shape& shape);
+
+/// The polytope that a hull is, or that a rounded hull is grown from; null for other shapes.
+const HullData* polytope_of(const Shape& shape);
+
+/// A shape and where it is. `pose` maps the shape's own coordinates (a hull's are about HullData::origin) to the world.
+struct Placed {
+  Shape shape;
+  Vec3 position;
+  Quaternion orientation;
+  Pose pose;
+
+  Vec3 support(Vec3 direction) const;
+  Vec3 core_support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+
+  /// Throws std::invalid_argument, and stays where it is, unless the numbers are finite and the quaternion is not zero.
+  void move_to(Vec3 new_position, Quaternion new_orientation);
+
+  /// The same body with coordinates counted from `reference`: relative poses keep the digits that world ones lose.
+  Placed seen_from(Vec3 reference) const;
+};
+static_assert(ConvexOracle<Placed> && ConvexOracle<Hull> && ConvexOracle<HalfSpace>);
+
+Placed make_placed(Shape shape, Vec3 position, Quaternion orientation);
+
+struct Bounds {
+  Vec3 lower, upper;
+};
+/// The box around a placed shape, from six supports; infinite for a half-space.
+Bounds bounds(const Placed& placed);
+
+/// Vertices and facets of a polytope that approximates a smooth shape from inside, its volume short by the fraction
+/// `tolerance` or less; a polytope's own. Half-spaces and rounded hulls have none: std::invalid_argument.
+Hull tessellated(const Shape& shape, double tolerance);
+
+}  // namespace overlapper

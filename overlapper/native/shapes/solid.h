@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// Two doubles of a column, which every machine adds, multiplies and compares at once.
+using Pair = double __attribute__((vector_size(16)));
+
+inline Pair load(const double* p) {
+  Pair v;
+  std::memcpy(&v, p, sizeof v);
+  return v;
+}
+
+template <class Lanes>
+inline void store(double* p, const Lanes& v) {
+  std::memcpy(p, &v, sizeof v);
+}
+
+/// A convex polytope, or some of its facets with the edges between them, as columns.
+struct Solid {
+  bool whole = false;
+  int vertices = 0, facets = 0;
+  int stride = 0;                          ///< facets rounded up; the rest are planes that hold everything inside
+  std::vector<double> x, y, z;             ///< of vertices
+  std::vector<double> nx, ny, nz, offset;  ///< of planes
+  std::vector<double> doubt;               ///< m: how far off each vertex may be, beside the rounding of all numbers
+  std::vector<int> owner;                  ///< of planes: the body
+  std::span<const Edge> edges;
+  std::vector<Edge> own_edges;  ///< what `edges` looks at, unless that is the shape's
+
+  Vec3 vertex(int i) const { return {x[i], y[i], z[i]}; }
+  Vec3 normal(int f) const { return {nx[f], ny[f], nz[f]}; }
+
+  void resize(int vertex_count, int facet_count, double beyond) {
+    vertices = vertex_count, facets = facet_count, stride = (facet_count + 3) / 4 * 4;
+    const auto resize_each = [](int size, auto&... columns) { (columns.resize(size), ...); };
+    resize_each(vertices, x, y, z);
+    doubt.assign(vertices, 0);
+    owner.resize(facets);
+    resize_each(stride, nx, ny, nz, offset);
+    for (int f = facets; f < stride; ++f) set_plane(f, {}, beyond);
+  }
+  void set_vertex(int i, Vec3 v) { x[i] = v.x, y[i] = v.y, z[i] = v.z; }
+  void set_plane(int f, Vec3 normal, double height) {
+    nx[f] = normal.x, ny[f] = normal.y, nz[f] = normal.z, offset[f] = height;
+  }
+};
+
+struct Ball {
+  Vec3 centre;
+  double radius;
+};
+
+/// A bounded polytope in the coordinates of `pose`, or a half-space. Planes that fill up the stride are `beyond` away.
+void set_solid(Solid& solid, const Placed& body, int owner, const Pose* pose, double beyond);
+
+/// Only those planes and edges of a body that a ball reaches; false if the ball is outside of one of the planes.
+bool set_part(Solid& solid, const Placed& body, int owner, const Pose& pose, const Ball& ball, double beyond);
+
+/// How far from its own origin a shape reaches; of a half-space, how far its plane is.
+double radius(const Shape& shape);
+
+/// What rotating and adding a hull's far origin has cost, as a length.
+double lost_far_away(const Placed& body);
+
+/// m: by how much planes of facets that are not quite flat miss their corners.
+double flatness(const Shape& shape);
+
+int facets(const Shape& shape);
+
+/// Polytopes whose facets are few, and half-spaces.
+bool clippable(const Shape& shape);
+
+}  // namespace overlapper

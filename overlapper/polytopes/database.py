@@ -1,0 +1,137 @@
+"""Polytopes in databases, through SQLAlchemy: SQLite files, PostgreSQL and whatever else it has a driver for.
+
+Two tables hold them. `polytopes` has the column `id`, an integer, and any further columns that others keep there;
+`vertices` has `polytope_id`, `corner` (0, 1, 2, ...) and `x`, `y`, `z` in m, one row per corner. Facets are not kept,
+as the corners determine them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import groupby, islice
+from operator import index
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from overlapper._core import Hull, Overlap
+
+try:
+    import sqlalchemy as sql
+except ImportError as error:
+    raise ImportError("overlapper.polytopes.database needs sqlalchemy: pip install 'overlapper[sql]'") from error
+
+__all__ = ["read_polytopes", "write_polytopes"]
+
+SCHEMA = sql.MetaData()
+POLYTOPES = sql.Table("polytopes", SCHEMA, sql.Column("id", sql.BigInteger, primary_key=True, autoincrement=False))
+VERTICES = sql.Table(
+    "vertices",
+    SCHEMA,
+    sql.Column("polytope_id", sql.ForeignKey("polytopes.id"), primary_key=True),
+    sql.Column("corner", sql.Integer, primary_key=True, autoincrement=False),
+    *(sql.Column(axis, sql.Double, nullable=False) for axis in "xyz"),
+)
+# A polytope without corners is no row of `vertices`; the outer join finds it, so that it is not lost in silence.
+ALL = """
+    SELECT polytopes.id, x, y, z FROM polytopes LEFT JOIN vertices ON polytope_id = polytopes.id
+    ORDER BY polytopes.id, corner
+"""
+ROWS = 10_000  # fetched at a time: some megabytes
+BATCH = 1_000  # polytopes sent at a time
+
+
+def read_polytopes(
+    url: str, query: str | None = None, *, on_bad: Callable[[Any, str], object] | None = None
+) -> Iterator[tuple[Any, Hull]]:
+    """The polytopes of a database one after the other, each with its id; however many there are, few are in memory.
+
+    `url` is SQLAlchemy's, such as "sqlite:///parts.db" or "postgresql+psycopg://user@host/parts". `query` returns four
+    columns, the id (of any type) and x, y, z of a point in m, with the points of a polytope one after the other, as by
+    ORDER BY id; without it, the tables that `write_polytopes` makes are read. Inner points are welcome.
+
+    A polytope that is none (a coordinate missing, fewer than four points, all in one plane) raises ValueError with its
+    id; or `on_bad(id, reason)` is called, if given, and reading goes on. Raises FileNotFoundError if there is no such
+    SQLite file, ValueError if the query has other columns or another order, and sqlalchemy.exc.SQLAlchemyError for what
+    the database refuses.
+    """
+    _must_exist(sql.make_url(url))
+    with ExitStack() as stack:
+        connection = stack.enter_context(stack.enter_context(_engine(url)).connect())
+        # Closed first, as a server keeps a cursor for it.
+        rows = stack.enter_context(connection.execution_options(yield_per=ROWS).execute(sql.text(query or ALL)))
+        if len(rows.keys()) != 4:
+            raise ValueError(f"the query must return id, x, y and z, not {', '.join(rows.keys())}")
+        met = set()
+        for id, points in groupby(rows, key=lambda row: row[0]):
+            if id in met:
+                raise ValueError(f"the query must return the points of polytope {id} together: ORDER BY its id")
+            met.add(id)
+            try:
+                hull = Hull([_point(corner, row) for corner, row in enumerate(points)])
+            except ValueError as error:
+                if on_bad is None:
+                    raise ValueError(f"polytope {id}: {error}") from error
+                on_bad(id, str(error))
+            else:
+                yield id, hull
+
+
+def write_polytopes(url: str, polytopes: Iterable[tuple[int, Hull | Overlap | ArrayLike]]) -> int:
+    """Adds polytopes to a database, each with its id; returns how many.
+
+    Each is a Hull, an Overlap or (n, 3) points in m, of which the corners of the hull are written. The tables are made
+    if they are not there. All is one transaction: when something raises, nothing has been written. Raises ValueError
+    with the id for points that span no polytope, and sqlalchemy.exc.IntegrityError for an id that is taken.
+    """
+    count = 0
+    remaining = iter(polytopes)
+    with _engine(url) as engine, engine.begin() as connection:
+        SCHEMA.create_all(connection)
+        while batch := list(islice(remaining, BATCH)):
+            corners = [row for id, polytope in batch for row in _corners(index(id), polytope)]
+            connection.execute(POLYTOPES.insert(), [{"id": index(id)} for id, _ in batch])
+            connection.execute(VERTICES.insert(), corners)
+            count += len(batch)
+    return count
+
+
+@contextmanager
+def _engine(url: str) -> Iterator[sql.Engine]:
+    engine = sql.create_engine(url)
+    try:
+        yield engine
+    finally:
+        engine.dispose()
+
+
+def _must_exist(url: sql.URL) -> None:
+    """SQLite would make an empty file where there is none."""
+    path = url.database
+    if url.get_backend_name() != "sqlite" or not path or path.startswith((":memory:", "file:")):
+        return
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"there is no database {path}")
+
+
+def _point(corner: int, row: sql.Row[Any]) -> tuple[float, float, float]:
+    try:
+        x, y, z = map(float, row[1:])
+    except (TypeError, ValueError):
+        raise ValueError(f"point {corner} is {tuple(row[1:])}, which is not three numbers") from None
+    return x, y, z
+
+
+def _corners(id: int, polytope: Hull | Overlap | ArrayLike) -> list[dict[str, float]]:
+    points = polytope.vertices if isinstance(polytope, Hull | Overlap) else np.asarray(polytope, dtype=float)
+    try:
+        corners = Hull(points).vertices
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"polytope {id}: {error}") from error
+    return [
+        {"polytope_id": id, "corner": corner, "x": x, "y": y, "z": z}
+        for corner, (x, y, z) in enumerate(corners.tolist())
+    ]

@@ -1,0 +1,275 @@
+"""Closed triangle meshes as convex parts: as they are where convex, else by CoACD in a process of its own.
+
+CoACD (X. Wei, M. Liu, Z. Ling, H. Su, "Approximate convex decomposition for 3D meshes with collision-aware concavity
+and tree search", SIGGRAPH 2022) takes seconds to minutes, ends the process on some meshes and never ends on others.
+What it finds is kept on disk, one file per mesh, threshold and version of CoACD.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.metadata
+import importlib.util
+import io
+import math
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from overlapper import Hull, Placed
+from overlapper.union import union_volume
+
+Vertices = NDArray[np.float64]
+Faces = NDArray[np.int64]
+
+# Part of a mesh's volume by which it may differ from its hull and still be convex: the corners of a mesh come in
+# single precision, 6e-8 of its size, and a face more or less flat has many of them.
+CONVEX = 1e-6
+
+DIGEST = 32  # bytes of SHA-256
+
+
+class NotDecomposed(ValueError):
+    """A mesh has no convex parts; the message is the reason, without a full stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decomposition:
+    """A mesh as the union of convex `parts`, which may overlap each other.
+
+    `mesh_volume` is the volume (m³) that the mesh itself bounds, None if its surface is open or its triangles turn both
+    ways. `path` is where the parts are kept, None if the mesh consists of convex bodies and is modelled exactly.
+    """
+
+    parts: tuple[Hull, ...]
+    mesh_volume: float | None
+    path: Path | None
+
+    @property
+    def volume(self) -> float:
+        """Of the union of the parts, in m³."""
+        return union_volume([Placed(part) for part in self.parts])[0]
+
+
+def cache_folder() -> Path:
+    """Where decompositions are kept: overlapper/convex_parts in $XDG_CACHE_HOME, by default in ~/.cache."""
+    home = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    # A relative path is to be ignored, by the XDG base directory specification.
+    return (home if home.is_absolute() else Path.home() / ".cache") / "overlapper" / "convex_parts"
+
+
+def check_threshold(threshold: float) -> None:
+    """ValueError unless CoACD takes this threshold."""
+    if not 0.01 <= threshold <= 1:
+        raise ValueError(f"the threshold of concavity must lie between 0.01 and 1, not {threshold}")
+
+
+def decompose(
+    triangles: ArrayLike, threshold: float = 0.05, enclose: bool = False, time_limit: float = 600.0
+) -> Decomposition:
+    """The convex parts of the solid that (t, 3, 3) triangles bound; corners that are equal to the bit are one.
+
+    `threshold`, from 0.01 (many parts) to 1 (the convex hull), is the concavity that CoACD leaves, as a part of the
+    mesh's size. A surface with open edges bounds nothing; with `enclose`, CoACD closes it first, by walls that stick
+    out by about 1/180 of the longest side, as it does with surfaces that cross themselves. A line on stderr says when
+    CoACD is started, and where its parts will be kept.
+
+    NotDecomposed if the surface is open, or CoACD is not installed, fails, or takes longer than `time_limit` seconds.
+    """
+    check_threshold(threshold)
+    corners = np.asarray(triangles, dtype=float)
+    if corners.ndim != 3 or corners.shape[1:] != (3, 3):
+        raise ValueError(f"triangles must have the shape (t, 3, 3), not {corners.shape}")
+    if not np.isfinite(corners).all():
+        raise NotDecomposed("the mesh has corners that are not finite")
+    vertices, faces = _welded(corners)
+    if not len(faces):
+        raise NotDecomposed("the mesh has no triangle that has an area")
+    open_edges = _open_edges(faces)
+    if open_edges and not enclose:
+        raise NotDecomposed(f"the concave mesh bounds no volume: its surface is open along {open_edges:,} edges")
+    volume = None
+    if _turns_one_way(faces):
+        volume = _volume(vertices, faces)
+        if volume < 0:
+            faces, volume = np.ascontiguousarray(faces[:, ::-1]), -volume
+        if convex := _convex_bodies(vertices, faces):
+            return Decomposition(tuple(convex), volume, None)
+    path, parts = _kept_or_made(vertices, faces, threshold, time_limit)
+    hulls: list[Hull] = []
+    for part in parts:
+        with contextlib.suppress(ValueError):  # a flat part has no volume
+            hulls.append(Hull(part))
+    if not hulls:
+        raise NotDecomposed("CoACD finds no solid part in the concave mesh")
+    return Decomposition(tuple(hulls), volume, path)
+
+
+def _welded(corners: Vertices) -> tuple[Vertices, Faces]:
+    """Vertices and faces, each once; triangles without three corners are dropped."""
+    vertices, index = np.unique(corners.reshape(-1, 3) + 0.0, axis=0, return_inverse=True)  # + 0.0 makes -0.0 equal 0.0
+    faces = index.reshape(-1, 3).astype(np.int64)
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    # A mesh drawn from both sides has every triangle twice.
+    first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]
+    return vertices, faces[np.sort(first)]
+
+
+def _edges(faces: Faces) -> Faces:
+    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def _open_edges(faces: Faces) -> int:
+    """How many edges have an odd number of triangles: none if the surface parts inside from outside."""
+    _, count = np.unique(np.sort(_edges(faces), axis=1), axis=0, return_counts=True)
+    return int((count % 2).sum())
+
+
+def _turns_one_way(faces: Faces) -> bool:
+    """Whether every edge is run along once in each direction: a closed manifold with one orientation."""
+    edges, count = np.unique(_edges(faces), axis=0, return_counts=True)
+    backwards = edges[:, ::-1]
+    return bool((count == 1).all() and np.array_equal(edges, backwards[np.lexsort(backwards.T[::-1])]))
+
+
+def _volume(vertices: Vertices, faces: Faces) -> float:
+    a, b, c = (vertices[faces] - vertices.mean(axis=0)).transpose(1, 0, 2)
+    return float((a * np.cross(b, c)).sum() / 6)
+
+
+def _convex_bodies(vertices: Vertices, faces: Faces) -> list[Hull] | None:
+    """The connected parts of a closed surface as hulls, if all of them are convex and none is a hole in another."""
+    labels = _components(faces, len(vertices))
+    hulls: list[Hull] = []
+    for label in np.unique(labels[faces[:, 0]]):
+        shell = faces[labels[faces[:, 0]] == label]
+        try:
+            hull = Hull(vertices[np.unique(shell)])
+        except ValueError:
+            return None
+        if not _volume(vertices, shell) >= (1 - CONVEX) * hull.volume:
+            return None
+        hulls.append(hull)
+    return hulls
+
+
+def _components(faces: Faces, count: int) -> Faces:
+    """For each vertex the least vertex that edges join it to."""
+    labels = np.arange(count)
+    while True:
+        least = labels.copy()
+        for k in range(3):
+            np.minimum.at(least, faces[:, k], labels[faces].min(axis=1))
+        least = least[least]
+        if np.array_equal(least, labels):
+            return labels
+        labels = least
+
+
+def _kept_or_made(vertices: Vertices, faces: Faces, threshold: float, time_limit: float) -> tuple[Path, list[Vertices]]:
+    """CoACD's parts, from the file where they are kept if that is sound, and that file."""
+    if importlib.util.find_spec("coacd") is None:
+        raise NotDecomposed("a concave mesh needs CoACD: pip install 'overlapper[concave]'")
+    version = importlib.metadata.version("coacd")
+    settings = repr((version, float(threshold), vertices.shape, faces.shape)).encode()
+    key = hashlib.sha256(settings + vertices.tobytes() + faces.tobytes()).hexdigest()
+    path = cache_folder() / f"{key}.parts"
+    with contextlib.suppress(OSError):
+        if (parts := unpacked(key, path.read_bytes())) is not None:
+            return path, parts
+    words = f"overlapper: CoACD decomposes a mesh of {len(faces):,} triangles, once; the parts are kept in {path}"
+    print(words, file=sys.stderr, flush=True)
+    data = _coacd(key, vertices, faces, threshold, time_limit)
+    parts = unpacked(key, data)
+    if parts is None:
+        raise NotDecomposed("CoACD's process was cut off in the middle of its answer")
+    try:
+        _write(path, data)
+    except OSError as error:
+        warnings.warn(f"the parts of a mesh cannot be kept in {path}: {error.strerror}", stacklevel=2)
+    return path, parts
+
+
+def _write(path: Path, data: bytes) -> None:
+    """The file appears whole or not at all, whoever else writes it at the same time."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".parts")
+    try:
+        with open(descriptor, "wb") as file:
+            file.write(data)
+        os.replace(name, path)
+    except BaseException:
+        os.unlink(name)
+        raise
+
+
+def packed(key: str, parts: list[Vertices]) -> bytes:
+    """Parts as bytes: a digest of the key and the rest, then two arrays, all corners and how many each part has."""
+    buffer = io.BytesIO()
+    np.save(buffer, np.concatenate([np.empty((0, 3)), *parts]))
+    np.save(buffer, np.array([len(part) for part in parts], dtype=np.int64))
+    content = buffer.getvalue()
+    return hashlib.sha256(key.encode() + content).digest() + content
+
+
+def unpacked(key: str, data: bytes) -> list[Vertices] | None:
+    """The parts that `packed` wrote with this key; None if a bit is not as written."""
+    if hashlib.sha256(key.encode() + data[DIGEST:]).digest() != data[:DIGEST]:
+        return None
+    buffer = io.BytesIO(data[DIGEST:])
+    corners: Vertices = np.load(buffer)
+    counts: Faces = np.load(buffer)
+    return np.split(corners, np.cumsum(counts)[:-1]) if len(counts) else []
+
+
+def _coacd(key: str, vertices: Vertices, faces: Faces, threshold: float, time_limit: float) -> bytes:
+    """What `serve` answers, from a process of its own. NotDecomposed says how that ended otherwise."""
+    request = io.BytesIO()
+    np.savez(request, vertices=vertices, faces=faces, threshold=threshold, key=key, seconds=math.ceil(time_limit) + 1)
+    # Not `multiprocessing`, which imports the user's main module once more in the new process.
+    program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.polytopes.decomposition import serve; serve()"
+    command = [sys.executable, "-c", program]
+    try:
+        done = subprocess.run(command, input=request.getvalue(), capture_output=True, timeout=time_limit)
+    except subprocess.TimeoutExpired:
+        raise NotDecomposed(f"CoACD did not decompose the concave mesh within {time_limit:g} s") from None
+    if done.returncode:
+        raise NotDecomposed(f"CoACD failed on the concave mesh: {_cause(done.returncode, done.stderr)}")
+    return done.stdout
+
+
+def _cause(code: int, stderr: bytes) -> str:
+    how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+    words = stderr.decode(errors="replace")
+    said = re.findall(r"what\(\): *(.*)|^(\w*(?:Error|Exception): .*)", words, re.MULTILINE)
+    return f"its process ended with {how}" + (f" ({''.join(said[-1]).strip().rstrip('.')})" if said else "")
+
+
+def serve() -> None:
+    """The process in which CoACD runs: a mesh on standard input, its parts on standard output."""
+    answer = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what CoACD prints must not mix with the answer
+    with contextlib.suppress(ImportError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an abort is an answer here, not a reason to fill the disk
+    request = np.load(io.BytesIO(sys.stdin.buffer.read()))
+    signal.alarm(int(request["seconds"]))  # for when nobody waits any more
+    import coacd
+
+    coacd.set_log_level("error")
+    mesh = coacd.Mesh(request["vertices"], request["faces"].astype(np.int32))
+    parts = coacd.run_coacd(mesh, threshold=float(request["threshold"]))
+    answer.write(packed(str(request["key"]), [np.asarray(vertices, dtype=float) for vertices, _ in parts]))
+    answer.close()

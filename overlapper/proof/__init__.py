@@ -1,0 +1,1 @@
+"""Proofs of what is claimed of an overlap, in rational arithmetic and without the native core."""

@@ -1,0 +1,264 @@
+"""The certificate of an overlap: found in doubles, completed in rational arithmetic, so that its check is exact.
+
+Of the core's answer only the combinatorics are used (which facets there are, whose they are, where they meet) and
+directions of planes; offsets, corners and inner points are computed anew from the shapes. Coordinates are counted from
+a reference near the common part, which keeps the fractions short.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import Capsule, Cylinder, HalfSpace, Overlap, RoundedHull, Sphere
+from overlapper.proof.body_planes import BodyPlanes, Floats, supporting
+from overlapper.proof.claims import (
+    Certificate,
+    CertificateError,
+    Overlapping,
+    OwnedPlane,
+    Separated,
+    Touching,
+    support_above,
+)
+from overlapper.proof.clipping import BORDER, ClippedPolytope
+from overlapper.proof.deepest_ball import DeepestBall, room
+from overlapper.proof.rational import Exact, RationalBody, cross, exact, fans, integers, primitive, root, triple
+from overlapper.proof.ray_exit import ray_exits
+
+# Bits of a coordinate below the thickness of the common part, and of a share below 1. Facets of hulls that differ only
+# by rounding meet in corners that the first number cannot tell apart.
+BITS = (64, 256)
+
+
+def certificate(overlap: Overlap) -> Certificate:
+    """What proves the status of `overlap`, and bounds of its volume, to somebody who does not trust us.
+
+    `verify()` of the result checks it in rational arithmetic, without the core, and returns (lower, upper) bounds of
+    the common volume in m³ as fractions. CertificateError says why there is no certificate.
+    """
+    if any(isinstance(body.shape, RoundedHull) for body in overlap.shapes):
+        raise CertificateError("rounded hulls have no certificate")
+    bodies = [RationalBody(shape) for shape in overlap.shapes]
+    match overlap.status:
+        case "separated":
+            return _separated(overlap, bodies)
+        case "touching":
+            return _touching(overlap, bodies)
+        case _:
+            return _overlapping(overlap, bodies)
+
+
+# ----------------------------------------------------------------------------------------------- separated and touching
+
+
+def _separated(overlap: Overlap, bodies: list[RationalBody]) -> Separated:
+    planes = _facing(overlap, bodies)
+    if not planes or room(planes) >= 0:
+        planes = DeepestBall(bodies, planes).without_common_point()
+    return Separated(overlap.shapes, tuple(planes))
+
+
+def _facing(overlap: Overlap, bodies: list[RationalBody]) -> list[OwnedPlane]:
+    """The supporting planes of a pair across its normal; of a half-space there is only one."""
+    if overlap.normal is None:
+        return []
+    normal = exact(overlap.normal)
+    for body, sign in zip(bodies, (-1, 1)):
+        if isinstance(body.shape, HalfSpace):
+            normal = sign * (body.axes @ exact(body.shape.given_normal))
+    if any(body.support(sign * normal) is None for body, sign in zip(bodies, (-1, 1))):
+        return []
+    return [supporting(bodies, -normal, 0), supporting(bodies, normal, 1)]
+
+
+def _touching(overlap: Overlap, bodies: list[RationalBody]) -> Touching:
+    planes = _facing(overlap, bodies)
+    if planes and any(isinstance(body.shape, Sphere | Capsule | Cylinder) for body in bodies):
+        point: Exact = (exact(overlap.witness_a) + exact(overlap.witness_b)) / 2
+    else:
+        ball = DeepestBall(bodies, planes)
+        planes, point = ball.settled()
+    nearest = np.array([_nearest(body, point) for body in bodies])
+    miss = max(root((point - other) @ (point - other))[1] for other in nearest)
+    inradius = room(planes) / sum(root(plane.normal @ plane.normal)[room(planes) < 0] for plane in planes)
+    return Touching(overlap.shapes, tuple(planes), inradius, point, nearest, miss)
+
+
+def _nearest(body: RationalBody, point: Exact) -> Exact:
+    """A point of the body, next to a point that is next to it: on the way to the middle of the body."""
+    if body.contains(point[None])[0]:
+        return point
+    if isinstance(body.shape, HalfSpace):
+        normal = body.axes @ exact(body.shape.given_normal)
+        outside = normal @ point - support_above(body, normal)
+        foot: Exact = point - normal * (outside / (normal @ normal))
+        return foot
+    middle = body.position + body.axes @ exact(body.shape.centroid)
+    if not body.contains(middle[None])[0]:
+        raise CertificateError("a body too thin for its centroid to lie in it has no certificate")
+    shares = np.array([Fraction(1, 2**k) for k in range(128)])
+    candidates = middle + (1 - shares)[:, None] * (point - middle)
+    nearest: Exact = candidates[np.flatnonzero(body.contains(candidates))[-1]]
+    return nearest
+
+
+# ---------------------------------------------------------------------------------------------------------- overlapping
+
+
+def _overlapping(overlap: Overlap, bodies: list[RationalBody]) -> Overlapping:
+    known = [BodyPlanes(body) for body in bodies]
+    planes = [
+        supporting(bodies, known[owner].along(halfspace[:3]), int(owner))
+        for halfspace, owner in zip(overlap.halfspaces, overlap.owner)
+    ]
+    surfaces = [_common_polytope] if all(body.flat for body in known) else [_published_surface, _common_polytope]
+    made = (surface(overlap, known, planes) for surface in surfaces)
+    for found, fine in ((surface, fine) for surface in made for fine in BITS):
+        bounding, rings, facet, corners, point = found
+        thickness = min(float(p.offset - p.normal @ point) / math.sqrt(p.normal @ p.normal) for p in bounding)
+        if thickness > 0.0:
+            exponent = math.frexp(thickness)[1] - fine
+            centre, vertices = _rounded(point, exponent), _rounded(corners, exponent)
+            arms, _ = integers(vertices - centre)
+            if (triple(*np.moveaxis(arms[fans(rings)], 1, 0)) >= 0).all():
+                break
+    else:
+        raise CertificateError("the facets do not surround a point: the bodies may only touch")
+    margin = _margin(bodies, centre, thickness)
+    pull = np.minimum.reduce([_pull(body, centre, vertices, fine) for body in known]) * Fraction(1, 1 << fine)
+    return Overlapping(overlap.shapes, tuple(bounding), vertices, tuple(rings), facet, centre, margin, pull)
+
+
+class Surface(NamedTuple):
+    """Planes, polygons of corners, the number of each polygon's plane, corners, next to their mean."""
+
+    planes: list[OwnedPlane]
+    rings: list[NDArray[np.int32]]
+    facet: NDArray[np.int32]
+    corners: Exact
+    middle: Exact
+
+
+def _published_surface(overlap: Overlap, known: list[BodyPlanes], planes: list[OwnedPlane]) -> Surface:
+    """The facets of the overlap, where their exact planes meet: of round bodies there are too many to clip."""
+    return _about_middles(planes, overlap.facets, _corners(overlap, planes))
+
+
+def _on_fine_grid(points: Exact) -> tuple[Exact, int, Exact]:
+    """(numbers, scale, first): next to points (n, 3), which may have long denominators, are first + numbers / scale."""
+    arms = points - points[0]
+    numbers, scale = integers(_rounded(arms, math.frexp(float(abs(arms).max()))[1] - BITS[-1]))
+    return numbers, scale, points[0]
+
+
+def _about_middles(planes: list[OwnedPlane], rings: list[NDArray[np.int32]], corners: Exact) -> Surface:
+    """Triangles about the middle of every facet, which on round bodies needs less pull than the corners."""
+    numbers, scale, first = _on_fine_grid(corners)
+    middles = np.array([numbers[ring].sum(axis=0) // len(ring) for ring in rings])
+    fan = [(len(corners) + k, ring[i - 1], ring[i]) for k, ring in enumerate(rings) for i in range(len(ring))]
+    facet = np.repeat(np.arange(len(middles), dtype=np.int32), [len(ring) for ring in rings])
+    numbers = np.vstack([numbers, middles])
+    middle = first + numbers.sum(axis=0) * Fraction(1, scale * len(numbers))
+    return Surface(planes, list(np.array(fan, np.int32)), facet, first + numbers * Fraction(1, scale), middle)
+
+
+def _common_polytope(overlap: Overlap, known: list[BodyPlanes], planes: list[OwnedPlane]) -> Surface:
+    """What is below the planes of the overlap's facets and of all flat facets of the bodies, without rounding."""
+    box = exact(overlap.bounds)
+    reference = box.sum(axis=0) / 2
+    room = max(box[1] - box[0]) + max(abs(reference)) / 2**40
+    polytope = ClippedPolytope(np.array([box[0] - reference - room, box[1] - reference + room]))
+    planes = list(planes)
+    for label, plane in enumerate(planes):
+        polytope.cut(_row_about(reference, plane), label)
+    for owner, body in ((i, body) for i, body in enumerate(known) if body.flat):
+        normals = body.normals @ body.body.axes.T
+        offsets = body.offsets + normals @ body.body.position
+        rows = np.array([_row_about(reference, OwnedPlane(n, d, owner)) for n, d in zip(normals, offsets)], object)
+        for missing in np.flatnonzero(polytope.reaches_past(rows)):
+            planes.append(supporting([body.body for body in known], normals[missing], owner))
+            polytope.cut(_row_about(reference, planes[-1]), len(planes) - 1)
+    if not polytope.rings:
+        raise CertificateError("no point is strictly inside of all bodies: they only touch")
+    if BORDER in polytope.labels:
+        raise CertificateError("the common part must be bounded by the bodies")
+    used = polytope.used()
+    number = {point: i for i, point in enumerate(used)}
+    corners = np.array([[Fraction(x, point[3]) for x in point[:3]] for point in map(polytope.points.__getitem__, used)])
+    planes = [planes[label] for label in polytope.labels]
+    rings = [np.array([number[point] for point in ring], np.int32) for ring in polytope.rings]
+    if not all(body.flat for body in known):
+        return _about_middles(planes, rings, corners + reference)
+    numbers, scale, first = _on_fine_grid(corners)
+    middle = reference + first + numbers.sum(axis=0) * Fraction(1, scale * len(numbers))
+    return Surface(planes, rings, np.arange(len(rings), dtype=np.int32), corners + reference, middle)
+
+
+def _row_about(reference: Exact, plane: OwnedPlane) -> tuple[int, ...]:
+    return primitive([*plane.normal, plane.normal @ reference - plane.offset])
+
+
+def _rounded(points: Exact, exponent: int) -> Exact:
+    """Down to multiples of 2^exponent."""
+    up, down, unit = max(-exponent, 0), max(exponent, 0), Fraction(2) ** exponent
+    rounded: Exact = np.frompyfunc(lambda x: (x.numerator << up) // (x.denominator << down) * unit, 1, 1)(points)
+    return rounded
+
+
+def _corners(overlap: Overlap, planes: Sequence[OwnedPlane]) -> Exact:
+    """Where the planes of the facets around each vertex meet, to rounding; the vertex itself where none of them do."""
+    around = defaultdict(list)
+    for facet, ring in enumerate(overlap.facets):
+        for vertex in ring:
+            around[int(vertex)].append(facet)
+    middle = overlap.vertices.mean(axis=0)
+    reference = exact(middle)
+    units = np.array([plane.normal.astype(float) / math.sqrt(plane.normal @ plane.normal) for plane in planes])
+    chosen = np.array([_spread(units, around[vertex]) for vertex in range(len(overlap.vertices))])
+    rows = np.array([integers([*p.normal, p.offset - p.normal @ reference])[0] for p in planes], object)[chosen]
+    (u, v, w), (a, b, c) = np.moveaxis(rows[:, :, :3], 1, 0), rows[:, :, 3].T[:, :, None]
+    volume = triple(u, v, w)
+    met = volume != 0
+    meeting = (a * cross(v, w) + b * cross(w, u) + c * cross(u, v))[met] * np.sign(volume[met])[:, None]
+    exponent = math.frexp(float(abs(overlap.vertices - middle).max()))[1] - BITS[-1]
+    numbers = (meeting << max(-exponent, 0)) // (abs(volume[met])[:, None] << max(exponent, 0))
+    corners: Exact = exact(overlap.vertices)
+    corners[met] = reference + numbers * Fraction(2) ** exponent
+    return corners
+
+
+def _spread(units: Floats, facets: list[int]) -> tuple[int, int, int]:
+    """Three of the facets whose planes meet at wide angles."""
+    if len(facets) == 3:
+        return facets[0], facets[1], facets[2]
+    first = facets[0]
+    across = np.cross(units[first], units[facets])
+    second = facets[int((across * across).sum(axis=1).argmax())]
+    third = facets[int(abs(units[facets] @ np.cross(units[first], units[second])).argmax())]
+    return first, second, third
+
+
+def _margin(bodies: Sequence[RationalBody], point: Exact, thickness: float) -> Fraction:
+    """The radius of a ball about the point that lies in all bodies: next to the largest, from above."""
+    margin = Fraction(thickness)
+    for _ in range(64):
+        if all(body.contains(point[None], margin)[0] for body in bodies):
+            return margin
+        margin *= Fraction(7, 8)
+    raise CertificateError("no point was found strictly inside of all bodies: they may only touch")
+
+
+def _pull(known: BodyPlanes, point: Exact, vertices: Exact, fine: int) -> Exact:
+    """For each vertex the greatest share of the way to it, from a point inside, that does not leave the body."""
+    pull = np.full(len(vertices), 1 << fine, object)
+    outside = ~known.body.contains(vertices)
+    if outside.any():
+        pull[outside] = ray_exits(known, point, vertices[outside] - point, fine)
+    return pull

@@ -1,0 +1,212 @@
+"""What a certificate claims about the common part of bodies, and the check of it in rational arithmetic.
+
+A check trusts the numbers that define the bodies (see `overlapper.proof.rational`) and what is written here, and
+nothing else: neither the core nor the search that found the certificate. It raises `CertificateError` with the first
+claim that fails, and returns (lower, upper) bounds of the common volume, in m³, as fractions. All coordinates are in m
+in the world.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import HalfSpace, Placed
+from overlapper.proof.rational import Exact, RationalBody, fans, integers, is_closed, root, triple
+
+Bounds = tuple[Fraction, Fraction]
+
+AXES = np.array([[Fraction(int(i == j)) for j in range(3)] for i in range(3)])
+
+
+# Bits below 1 to which shares of single cones are rounded, upwards: their sum then is as short as they are.
+ROUNDED = 128
+
+
+class CertificateError(ValueError):
+    """A claim that is false, or a case for which no certificate was found; one sentence says which."""
+
+
+def require(claim: bool | np.bool_, sentence: str) -> None:
+    if not claim:
+        raise CertificateError(sentence)
+
+
+def require_rational(*values: Exact | Fraction) -> None:
+    """Doubles would be rounded on the way, and NaN would pass for anything."""
+    for number in (x for value in values for x in np.asarray(value, object).flat):
+        require(isinstance(number, int | Fraction), f"numbers must be integers or fractions, not {number!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class OwnedPlane:
+    """Body number `owner` lies in { x : normal . x <= offset }; the normal (3,) is of any length."""
+
+    normal: Exact
+    offset: Fraction
+    owner: int
+
+
+def check_planes(shapes: tuple[Placed, ...], planes: tuple[OwnedPlane, ...]) -> None:
+    bodies = [RationalBody(shape) for shape in shapes]
+    for number, plane in enumerate(planes):
+        require_rational(plane.normal, plane.offset)
+        require(0 <= plane.owner < len(bodies), f"plane {number} must belong to one of the bodies")
+        below = bodies[plane.owner].is_below(plane.normal, plane.offset)
+        require(below, f"plane {number} must have all of body {plane.owner} below it")
+
+
+def check_balance(planes: tuple[OwnedPlane, ...]) -> None:
+    total = sum(plane.normal for plane in planes)
+    require(bool(planes) and not np.any(total), "normals must add up to zero")
+
+
+@dataclass(frozen=True, eq=False)
+class Separated:
+    """At most four planes that no point can be below: their normals add up to zero, their offsets to less.
+
+    Of a pair these are the two sides of a gap. (The weights of Farkas' lemma are in the lengths of the normals.)
+    """
+
+    shapes: tuple[Placed, ...]
+    planes: tuple[OwnedPlane, ...]
+
+    def verify(self) -> Bounds:
+        check_planes(self.shapes, self.planes)
+        check_balance(self.planes)
+        require(sum(plane.offset for plane in self.planes) < 0, "offsets must add up to less than zero")
+        return Fraction(0), Fraction(0)
+
+
+@dataclass(frozen=True, eq=False)
+class Touching:
+    """Nearly a gap and nearly a common point.
+
+    At most four planes whose normals add up to zero leave no room for a ball larger than `inradius`. `point` (3,) is no
+    farther than `miss` from each of the points `nearest` (m, 3), which lie one in each body.
+    """
+
+    shapes: tuple[Placed, ...]
+    planes: tuple[OwnedPlane, ...]
+    inradius: Fraction
+    point: Exact
+    nearest: Exact
+    miss: Fraction
+
+    def verify(self) -> Bounds:
+        check_planes(self.shapes, self.planes)
+        check_balance(self.planes)
+        require_rational(self.inradius, self.point, self.nearest, self.miss)
+        lengths = sum(root(plane.normal @ plane.normal)[0] for plane in self.planes)
+        room = sum(plane.offset for plane in self.planes)
+        require(room <= self.inradius * lengths, "planes must leave no room for a ball larger than the inradius")
+        for number, (shape, point) in enumerate(zip(self.shapes, self.nearest, strict=True)):
+            inside = RationalBody(shape).contains(point[None])[0]
+            require(inside, f"nearest point {number} must lie in body {number}")
+            off = point - self.point
+            require(off @ off <= self.miss**2, f"nearest point {number} must be no farther off than the miss")
+        return Fraction(0), self.volume_bound()
+
+    def volume_bound(self) -> Fraction:
+        """The inradius times the surface of a box around the common part.
+
+        The inner parallel bodies of a convex set have less surface than the set, and that has less than a box around
+        it; the volume is the integral of their surfaces over depths from 0 to the inradius.
+        """
+        bounded = [RationalBody(shape) for shape in self.shapes if not isinstance(shape.shape, HalfSpace)]
+        require(bool(bounded), "one of the bodies must be bounded")
+        upper, lower = ([min(support_above(body, way) for body in bounded) for way in ways] for ways in (AXES, -AXES))
+        x, y, z = (max(a + b, Fraction(0)) for a, b in zip(upper, lower))
+        return max(self.inradius, Fraction(0)) * 2 * (x * y + y * z + z * x)
+
+
+def support_above(body: RationalBody, direction: Exact) -> Fraction:
+    """An upper bound of direction . x on the body, to 1e-19; exact without round parts."""
+    support = body.support(direction)
+    require(support is not None, "a half-space must be asked along its normal")
+    assert support is not None
+    return support[0] + root(support[1])[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Overlapping:
+    """Planes around the common part, and a star inside of it.
+
+    A ball of radius `margin` about `point` (3,) lies in all bodies. Polygons `rings[k]` of `vertices` (n, 3),
+    counter-clockwise from outside, surround the point; number k lies in plane `facet[k]`, to rounding. `pull[v]` is in
+    (0, 1]: at that share of the way from `point` to vertex v lies a point of all bodies. The polytope of the vertices,
+    shrunk by `inner_scale` about `point`, therefore fits into all bodies.
+    """
+
+    shapes: tuple[Placed, ...]
+    planes: tuple[OwnedPlane, ...]
+    vertices: Exact
+    rings: tuple[NDArray[np.int32], ...]
+    facet: NDArray[np.int32]
+    point: Exact
+    margin: Fraction
+    pull: Exact
+
+    @property
+    def inner_scale(self) -> Fraction:
+        scale: Fraction = self.pull.min()
+        return scale
+
+    def verify(self) -> Bounds:
+        check_planes(self.shapes, self.planes)
+        require_rational(self.vertices, self.point, self.margin, self.pull)
+        triangles = fans(self.rings)
+        numbers, unit = integers(np.vstack([self.vertices, self.point]))
+        arms, centre = numbers[:-1] - numbers[-1], numbers[-1]
+        shares, whole = integers(self.pull)
+        self._check_inside(whole * centre + shares[:, None] * arms, whole * unit)
+        corners = arms[triangles]
+        six = triple(*np.moveaxis(corners, 1, 0))
+        self._check_star(triangles, corners, six)
+        lower = Fraction((six * shares[triangles].prod(axis=1)).sum(), 6 * (unit * whole) ** 3)
+        return lower, Fraction((six * self._reach(corners, unit)).sum(), 6 * unit**3 << ROUNDED)
+
+    def _check_inside(self, pulled: Exact, scale: int) -> None:
+        """`pulled / scale` are the vertices after their pull."""
+        require(self.margin > 0, "margin must be greater than 0")
+        require((self.pull > 0).all() and (self.pull <= 1).all(), "pull must be in (0, 1]")
+        for number, body in enumerate(RationalBody(shape) for shape in self.shapes):
+            ball = body.contains(self.point[None], self.margin)[0]
+            require(ball, f"the ball about the point must lie in body {number}")
+            inside = body.contains(pulled, scale=scale)
+            require(inside.all(), f"vertex {inside.argmin()} must lie in body {number} after its pull")
+
+    def _check_star(self, triangles: NDArray[np.intp], corners: Exact, six: Exact) -> None:
+        """The cones over the triangles, about the point, fill space once.
+
+        A closed surface winds about the point as often as a ray in general position leaves through it, each time
+        outwards if no triangle is seen from behind. A ray through an edge shows as zero.
+        """
+        require(len(self.rings) == len(self.facet), "every polygon must have a plane")
+        require(is_closed(triangles), "polygons must form a closed surface")
+        require((six >= 0).all(), "no triangle may be seen from behind by the point")
+        ray = corners[six.argmax()].T @ [17, 19, 23]
+        a, b, c = np.moveaxis(corners, 1, 0)
+        sides = np.array([triple(ray[None], u, v) for u, v in ((a, b), (b, c), (c, a))])
+        met = (sides >= 0).all(axis=0) & (six > 0)
+        require(met.sum() == 1, "the surface must wind about the point once")
+
+    def _reach(self, corners: Exact, unit: int) -> Exact:
+        """By how much a plane cuts off more, or less, of the cone over each of its triangles than the triangle does.
+
+        Above the true share, by 2^-ROUNDED or less, and in units of that.
+        """
+        facets = [facet for facet, ring in zip(self.facet, self.rings) for _ in ring[2:]]
+        slack = [plane.offset - plane.normal @ self.point for plane in self.planes]
+        require(min(slack) > 0, "every plane must have the point below it")
+        rows = np.array([integers([*plane.normal, s])[0] for plane, s in zip(self.planes, slack)], object)[facets]
+        along = (rows[:, None, :3] * corners).sum(axis=2)
+        require((along > 0).all(), "every plane must cut all edges of the cones over its polygon")
+        ratio: Exact = -(-((rows[:, 3] * unit) ** 3 << ROUNDED) // along.prod(axis=1))
+        return ratio
+
+
+Certificate = Separated | Touching | Overlapping

@@ -1,0 +1,120 @@
+"""The largest ball in the common part of bodies, and the planes that leave it no more room, in rational arithmetic."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from overlapper import HalfSpace
+from overlapper.proof.body_planes import BodyPlanes, supporting
+from overlapper.proof.claims import CertificateError, OwnedPlane
+from overlapper.proof.rational import Exact, RationalBody
+
+# Kelley's method on round bodies has no end.
+ROUNDS = 200
+
+
+def room(planes: Sequence[OwnedPlane]) -> Fraction:
+    return sum((plane.offset for plane in planes), Fraction(0))
+
+
+class DeepestBall:
+    """The largest ball in the common part, by cutting planes in rational arithmetic (see common_point.h of the core).
+
+    The linear programme is: the largest r with normal . x + length r <= offset for all supporting planes, `length`
+    being that of the normal to rounding. Its dual weighs four planes so that the weighted normals add up to zero.
+    """
+
+    def __init__(self, bodies: list[RationalBody], hints: Sequence[OwnedPlane] = ()) -> None:
+        self.bodies = bodies
+        self.known = [BodyPlanes(body) for body in bodies]
+        self.basis = self._simplex()
+        self.weights = self._solve(np.array([self._row(plane) for plane in self.basis]).T, [0, 0, 0, 1])
+        for plane in hints:
+            self.exchange(plane)
+
+    def without_common_point(self) -> list[OwnedPlane]:
+        """Weighted planes whose normals add up to zero, and whose offsets to less."""
+        for _ in range(ROUNDS):
+            planes = self.weighted()
+            if room(planes) < 0:
+                break
+            centre, radius = self.ball()
+            if not self.exchange(self.tightest(centre, radius)):
+                break
+        if room(planes) >= 0 or any(plane.owner < 0 for plane in planes):
+            raise CertificateError("no planes were found that prove the bodies apart: they may have a common point")
+        return planes
+
+    def settled(self) -> tuple[list[OwnedPlane], Exact]:
+        """Weighted planes that leave the least room, and the centre of the ball between them."""
+        for _ in range(ROUNDS):
+            centre, radius = self.ball()
+            if not self.exchange(self.tightest(centre, radius)):
+                break
+        planes = self.weighted()
+        if any(plane.owner < 0 for plane in planes):
+            raise CertificateError("no planes were found between which the common part is closed")
+        return planes, centre
+
+    def weighted(self) -> list[OwnedPlane]:
+        return [OwnedPlane(w * p.normal, w * p.offset, p.owner) for w, p in zip(self.weights, self.basis) if w > 0]
+
+    def ball(self) -> tuple[Exact, Fraction]:
+        rows = np.array([self._row(plane) for plane in self.basis])
+        *centre, radius = self._solve(rows, [plane.offset for plane in self.basis])
+        return np.array(centre), radius
+
+    def tightest(self, centre: Exact, radius: Fraction) -> OwnedPlane | None:
+        """The plane that the ball reaches through farthest; None if it is inside of all."""
+        found, farthest = None, Fraction(0)
+        for owner, known in enumerate(self.known):
+            plane = supporting(self.bodies, known.tightest(centre), owner)
+            length = self._row(plane)[3]
+            outside = (plane.normal @ centre + length * radius - plane.offset) / length
+            if outside > farthest:
+                found, farthest = plane, outside
+        return found
+
+    def exchange(self, entering: OwnedPlane | None) -> bool:
+        """Takes a plane into the basis for the one that keeps all weights from getting negative."""
+        if entering is None:
+            return False
+        share = self._solve(np.array([self._row(plane) for plane in self.basis]).T, self._row(entering))
+        ratios = [(weight / s, i) for i, (weight, s) in enumerate(zip(self.weights, share)) if s > 0]
+        if not ratios:
+            return False
+        ratio, leaving = min(ratios)
+        self.weights = self.weights - ratio * share
+        self.weights[leaving] = ratio
+        self.basis[leaving] = entering
+        return True
+
+    @staticmethod
+    def _row(plane: OwnedPlane) -> Exact:
+        return np.array([*plane.normal, Fraction(math.sqrt(plane.normal @ plane.normal))])
+
+    def _simplex(self) -> list[OwnedPlane]:
+        """Around one of the bodies, or around everything if none is bounded: then owned by nobody."""
+        directions = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * Fraction(1)
+        for owner, body in enumerate(self.bodies):
+            if not isinstance(body.shape, HalfSpace):
+                return [supporting(self.bodies, direction, owner) for direction in directions]
+        reach = max(abs(x) for body, known in zip(self.bodies, self.known) for x in [*body.position, *known.levels])
+        return [OwnedPlane(direction, Fraction(2**20 * (1 + reach)), -1) for direction in directions]
+
+    @staticmethod
+    def _solve(matrix: Exact, right: Iterable[Fraction | int]) -> Exact:
+        """Gaussian elimination."""
+        rows: Exact = np.column_stack([matrix, np.array([*right], object)]) * Fraction(1)
+        size = len(rows)
+        for k in range(size):
+            pivot = k + int(np.argmax(rows[k:, k] != 0))
+            rows[[k, pivot]] = rows[[pivot, k]]
+            rows[k] = rows[k] / rows[k, k]
+            others = np.arange(size) != k
+            rows[others] = rows[others] - rows[others, k, None] * rows[k]
+        return rows[:, -1]

@@ -1,0 +1,84 @@
+"""The page of a scene that has moved: its worst step as it was recorded and as it is today, side by side."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from overlapper.scenes.comparison import Move
+from overlapper.scenes.verdict import Still, Verdict
+from overlapper.viewer import Recording
+
+LIMIT = 3  # moves of a cause; what more there is, the terminal counts
+
+
+def save(verdict: Verdict, name: str, path: Path) -> Path:
+    """Write the page of a verdict with moves to one self-contained HTML file, and return its path."""
+    step = verdict.worst_step
+    before, after = (stills.get(step) for stills in (verdict.before, verdict.after))
+    stills = [still for still in (_dressed(before, after), after) if still is not None and still.keys]
+    sections = verdict.causes | ({"overlaps": verdict.overlaps} if verdict.overlaps else {})
+    texts = {
+        "title": escape(f"{name} has moved"),
+        "step": str(step),
+        "verdicts": "\n".join(_section(*each) for each in sections.items()),
+        "recording": _recording(stills, verdict.expected.tolerance),
+        "camera": _camera(stills),
+    }
+    page = Path(__file__).with_suffix(".html").read_text(encoding="utf-8")
+    for mark, text in texts.items():
+        page = page.replace(f"{{{{{mark}}}}}", text)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
+def _dressed(before: Still | None, after: Still | None) -> Still | None:
+    """With today's names and colours, as a recorded step has none of its own."""
+    if before is None or after is None:
+        return before
+    return replace(before, names=before.names | after.names, colors=before.colors | after.colors)
+
+
+def _recording(stills: Sequence[Still], tolerance: float) -> str:
+    """The frames as a page of `overlapper.viewer`, deflated and in base 64; the first at 0 s, the second at 1 s."""
+    recording = Recording()
+    for time, still in enumerate(stills):
+        recording.add(still, still.contacts(tolerance), float(time))
+    with tempfile.TemporaryDirectory() as folder:
+        page = recording.save(Path(folder) / "page.html").read_bytes()
+    return base64.b64encode(gzip.compress(page, compresslevel=6, mtime=0)).decode()
+
+
+def _camera(stills: Sequence[Still]) -> str:
+    """Where the recording is to be seen from, in its own words, so that what is bounded of both frames is in sight."""
+    bounds = [placed.bounds for still in stills for placed in still.placed if np.isfinite(placed.bounds).all()]
+    if not bounds:
+        return ""
+    lower, upper = np.min([each[0] for each in bounds], axis=0), np.max([each[1] for each in bounds], axis=0)
+    at = (lower + upper) / 2
+    # The recording's camera sees 35 degrees, which a ball fills from 1.66 times its diameter.
+    back = np.array([0.60, -0.68, 0.42])
+    start = at + 1.66 * float(np.linalg.norm(upper - lower)) * back
+    return "&" + "&".join(
+        f"{name}={','.join(f'{value:.6g}' for value in point)}" for name, point in (("from", start), ("at", at))
+    )
+
+
+def _section(cause: str, moves: Sequence[Move]) -> str:
+    if not moves:
+        return f'<p><b>{cause}</b><span class="kept">as recorded</span></p>'
+    worst = sorted(moves, key=lambda move: -move.part)
+    rows = "\n".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in move.cells()) + "</tr>" for move in worst[:LIMIT]
+    )
+    heads = "".join(f"<th>{head}</th>" for head in Move.HEADS)
+    count = f"{len(moves):,} moved" + (f", of which the worst {LIMIT}:" if len(moves) > LIMIT else "")
+    return f'<p><b>{cause}</b><span class="moved">{count}</span></p>\n<table><tr>{heads}</tr>\n{rows}</table>'

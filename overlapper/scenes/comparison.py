@@ -1,0 +1,193 @@
+"""What moved between two tables of the same scene: in which step, of which pair, which quantity, and by how much."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper.scenes.expected import MEASURES, Budget, Key
+from overlapper.scenes.table import POSE, Row, Value, key
+
+Names = Mapping[tuple[int, int], str]
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A quantity of a pair of shapes, or of one, that is further from what was recorded than its budget allows.
+
+    `part` is the difference over what is allowed. Where there is nothing to subtract, as between two statuses, both are
+    infinite. Where no budget speaks of it, `allowed` is not a number, and `part` is in hundredths of what was recorded.
+    """
+
+    step: int
+    who: str
+    quantity: str
+    recorded: str
+    found: str
+    difference: float = math.inf
+    allowed: float = 0.0
+    part: float = math.inf
+
+    HEADS: ClassVar = ("step", "of", "quantity", "recorded", "today", "off by", "allowed", "times its budget")
+
+    def cells(self) -> tuple[str, ...]:
+        """A line of a table below HEADS."""
+        told = [self.difference, self.allowed, self.part] if math.isfinite(self.difference) else []
+        figures = [f"{each:.3g}" for each in told]
+        if math.isnan(self.allowed):
+            figures = [figures[0], "", f"{figures[2]} %"]
+        return (str(self.step), self.who, self.quantity, self.recorded, self.found, *figures, *[""] * (3 - len(told)))
+
+    def __str__(self) -> str:
+        moved = f"step {self.step}, {self.who}: {self.quantity} is {self.found}, recorded as {self.recorded}"
+        if not math.isfinite(self.difference):
+            return moved
+        if math.isnan(self.allowed):
+            return f"{moved}: off by {self.difference:.3g}, {self.part:.3g} %"
+        times = f", {self.part:.3g} times its budget" if math.isfinite(self.part) else ""
+        return f"{moved}: off by {self.difference:.3g} where {self.allowed:.3g} is allowed{times}"
+
+
+@dataclass(frozen=True, slots=True)
+class Differences:
+    """`moves`: what is too far from what was recorded, by step and pair.
+
+    `spent`: the largest part of its budget that each quantity used up, 1 being all of it. `error_gain`: the sum of the
+    certified errors of the volumes over what it was when recorded, below 1 if they have become better.
+    """
+
+    moves: list[Move]
+    spent: dict[str, float]
+    error_gain: float = 1.0
+
+
+def compare_measures(
+    recorded: Sequence[Row], found: Sequence[Row], budgets: Mapping[str, Budget], names: Names | None = None
+) -> Differences:
+    """Pairs and statuses must be those recorded, measures within their budgets, certified errors much the same."""
+    names = names or {}
+    old, new = (
+        {(_step(row), *key(row)): row for row in rows if row["status"] != "alone"} for rows in (recorded, found)
+    )
+    moves: list[Move] = []
+    spent = {name: 0.0 for name in MEASURES if name in budgets}
+    for k in sorted(old.keys() | new.keys()):
+        who = label(old.get(k) or new[k], names)
+        was, now = (str(rows[k]["status"]) if k in rows else "not there" for rows in (old, new))
+        if was != now:
+            moves.append(Move(_step(old.get(k) or new[k]), who, "status", was, now))
+        else:
+            moves += _measure_moves(old[k], new[k], who, budgets, spent)
+    before, after = (sum(_number(row, "volume_error_m3") for row in rows) for rows in (recorded, found))
+    return Differences(moves, spent, after / before if before else 1.0)
+
+
+def _measure_moves(
+    old: Row, new: Row, who: str, budgets: Mapping[str, Budget], spent: dict[str, float]
+) -> Iterator[Move]:
+    for name in spent:
+        for column in MEASURES[name]:
+            was, now = _number(old, column), _number(new, column)
+            part = budgets[name].spent(abs(now - was), was)
+            spent[name] = max(spent[name], part)
+            if not part <= 1:  # as it is for a value that is not a number
+                allowed = budgets[name].allowed(was)
+                yield Move(_step(old), who, column, _text(was), _text(now), abs(now - was), allowed, part)
+    # A bound is free to be within the budget of what it bounds. Beyond that ten times are allowed, for the bound of one
+    # pair depends on the order of operations: moving a scene multiplied one by 4.7, another way of cutting one by 14.
+    was, now = (_number(row, "volume_error_m3") for row in (old, new))
+    allowed = max(10 * was, budgets["volume"].allowed(_number(old, "volume_m3")) if "volume" in budgets else 0.0)
+    if now > allowed:
+        part = now / allowed if allowed else math.inf
+        yield Move(_step(old), who, "volume_error_m3", _text(was), _text(now), now - was, allowed - was, part)
+
+
+def compare_poses(
+    recorded: Sequence[Row], found: Sequence[Row], budgets: Mapping[str, Budget], names: Names | None = None
+) -> Differences:
+    """How far each shape is from where it was recorded, in m, and how far turned, in rad; shapes of both are compared.
+
+    A quantity without a budget may be anywhere.
+    """
+    names = names or {}
+    old, new = poses(recorded), poses(found)
+    moves = []
+    spent = {"position": 0.0, "orientation": 0.0}
+    for k in sorted(old.keys() & new.keys()):
+        step, shape = k
+        who = shape_label(shape, names)
+        differences = {
+            "position": float(np.linalg.norm(new[k][:3] - old[k][:3])),
+            "orientation": _angle(old[k][3:], new[k][3:]),
+        }
+        for (name, difference), unit, part_of in zip(differences.items(), ("m", "rad"), (slice(3), slice(3, 7))):
+            budget = budgets.get(name, Budget(0.0, math.inf))
+            part = budget.spent(difference, 0.0)
+            spent[name] = max(spent[name], part)
+            if not part <= 1:
+                was, now = (_numbers(each[k][part_of]) for each in (old, new))
+                moves.append(Move(step, who, f"{name}_{unit}", was, now, difference, budget.allowed(0.0), part))
+    return Differences(moves, spent)
+
+
+def poses(rows: Sequence[Row]) -> dict[tuple[int, Key], NDArray[np.float64]]:
+    """Position and orientation (7,) of every shape, by step and (body, link, shape)."""
+    where = {}
+    for row in rows:
+        for side in "A" if row["status"] == "alone" else "AB":
+            body, link, shape = (int(row[f"{word}{side}"] or 0) for word in ("body", "link", "shape"))
+            where[_step(row), (body, link, shape)] = np.array([row[part.format(side)] for part in POSE], dtype=float)
+    return where
+
+
+def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """The angle of the rotation from one unit quaternion to the other; exact to the last digits for small ones, too."""
+    less, more = sorted((float(np.linalg.norm(a - b)), float(np.linalg.norm(a + b))))
+    return 4 * math.atan2(less, more)
+
+
+def loose_budgets(differences: Differences) -> list[str]:
+    """A sentence for each budget that is ten times what these differences need, if there are any at all."""
+    loose = [
+        f"the budget of {name} is {1 / most:.3g} times what is needed"
+        for name, most in differences.spent.items()
+        if 0 < most < 0.1
+    ]
+    if differences.error_gain < 0.1:
+        loose.append(f"the certified errors of the volumes are {differences.error_gain:.3g} of those recorded")
+    return loose
+
+
+def label(row: Row, names: Names) -> str:
+    """The pair of a row, by name where there is one, and by body/link/shape."""
+    return " and ".join(shape_label(shape, names) for shape in (key(row)[:3], key(row)[3:]))
+
+
+def shape_label(shape: tuple[Value, ...], names: Names) -> str:
+    numbers = "/".join(map(str, shape))
+    body, link, _ = shape
+    name = names.get((int(body or 0), int(link or 0)))
+    return f"{name} ({numbers})" if name else numbers
+
+
+def _step(row: Row) -> int:
+    return int(row["step"] or 0)
+
+
+def _number(row: Row, column: str) -> float:
+    """A measure as a number; 0.0 where it has none, which is the same on both sides if the status is."""
+    value = row.get(column)
+    return float(value) if value is not None else 0.0
+
+
+def _text(value: float) -> str:
+    return f"{value:.12g}"
+
+
+def _numbers(values: NDArray[np.float64]) -> str:
+    return "(" + ", ".join(f"{value:.5g}" for value in values) + ")"

@@ -1,0 +1,171 @@
+"""What was recorded of a scene: the file, and how far a quantity may be from it.
+
+An expected file is a CSV table. It has the shapes, the poses and the measures of some steps of a scene, so that each
+can be told from the others when something has moved.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+
+from overlapper import Shape
+from overlapper.polytopes.shape_text import shape_of, text_of
+from overlapper.scenes.table import COLUMNS, Row, key
+from overlapper.scenes.table_file import CsvTable, read_csv
+
+Key = tuple[int, int, int]  # (body, link, shape)
+
+# A shape that meets no other has a row with the status "alone", of which the columns of B and the measures are empty,
+# so that every shape of a step is placed, and a pair out of nothing is noticed.
+EXPECTED_COLUMNS = [name for name in COLUMNS if name not in ("time_s", "nameA", "nameB", "fcl", "fcl_explanation")]
+
+# The measures that are compared, each with its columns.
+MEASURES = {
+    "volume": ["volume_m3"],
+    "centroid": ["centroid_x_m", "centroid_y_m", "centroid_z_m"],
+    "area": ["area_m2"],
+    "depth": ["depth_m"],
+    "normal": ["normal_x", "normal_y", "normal_z"],
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """How far a quantity may be from what was recorded: `absolute` (SI units) + `relative` times the recorded one."""
+
+    relative: float
+    absolute: float
+
+    def allowed(self, recorded: float) -> float:
+        """The largest difference that is within the budget."""
+        return self.absolute + self.relative * abs(recorded)
+
+    def spent(self, difference: float, recorded: float) -> float:
+        """The part of the budget that a difference uses up; above 1 is too far."""
+        allowed = self.allowed(recorded)
+        if math.isinf(allowed):
+            return 0.0 if math.isfinite(difference) else math.inf
+        return difference / allowed if allowed else 0.0 if difference == 0 else math.inf
+
+
+# The budgets of a scene of polyhedra: five times what rounding did to the scenes when all their poses were moved by
+# less than a metre, which changed volumes by up to 2e-10 of themselves and centroids by up to 3e-12 m. A new file gets
+# what its own scene needs in place of these.
+ROUNDING = {
+    "volume": Budget(1e-9, 0.0),
+    "centroid": Budget(0.0, 1.5e-11),
+    "area": Budget(1e-9, 0.0),
+    "depth": Budget(1e-9, 1e-15),
+    "normal": Budget(0.0, 1e-12),
+}
+
+# How far shapes may be, in m and rad, from where they were recorded: more than another machine's sine moves what does
+# not depend on chance, and less than anyone would call the same grasp.
+DRIFT = {"position": Budget(0.0, 1e-4), "orientation": Budget(0.0, 1e-3)}
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """What was recorded of a scene: some of its `steps`, at `tolerance`, and the budget of each quantity.
+
+    `shapes` are those of every step, by step and (body, link, shape).
+    """
+
+    steps: list[int]
+    tolerance: float
+    budgets: dict[str, Budget]
+    rows: list[Row] = field(default_factory=list)
+    shapes: dict[int, dict[Key, Shape]] = field(default_factory=dict)
+
+    def rows_by_step(self) -> Iterator[tuple[int, list[Row]]]:
+        for step, rows in groupby(self.rows, lambda row: int(row["step"] or 0)):
+            yield step, list(rows)
+
+    def write(self, path: Path, origin: dict[str, str]) -> None:
+        """Write the file; its first lines are for people to change where the budgets do not do."""
+        heading = {"steps": " ".join(map(str, self.steps)), "tolerance": repr(self.tolerance)}
+        heading |= {
+            f"budget {name}": f"relative {each.relative!r} absolute {each.absolute!r}"
+            for name, each in self.budgets.items()
+        }
+        path.parent.mkdir(parents=True, exist_ok=True)
+        table = CsvTable(path, heading | origin, EXPECTED_COLUMNS)
+        known: dict[Key, str] = {}
+        for step, rows in self.rows_by_step():
+            texts = {shape_key: text_of(shape) for shape_key, shape in self.shapes[step].items()}
+            new = {shape_key: text for shape_key, text in texts.items() if known.get(shape_key) != text}
+            for text in dict.fromkeys(new.values()):
+                users = " ".join("/".join(map(str, each)) for each, its in new.items() if its == text)
+                table.comment(f"shapes {users}: {text}")
+            known |= new
+            table.write(rows)
+        table.close()
+
+
+def read_expected(path: Path) -> Expected:
+    """An expected file. FileNotFoundError if there is none, ValueError if it is not one."""
+    text = path.read_text(encoding="utf-8")
+    steps = re.search(r"^# steps: ([\d ]+)$", text, re.MULTILINE)
+    tolerance = re.search(r"^# tolerance: ([-+.e\d]+)$", text, re.MULTILINE)
+    if steps is None or tolerance is None:
+        raise ValueError(f"{path} must say `# steps: <numbers>` and `# tolerance: <number>` in its first lines")
+    rows = read_csv(path)
+    try:
+        shapes = _shapes(text, rows)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+    return Expected(
+        [int(step) for step in steps[1].split()],
+        float(tolerance[1]),
+        read_budgets(path),
+        rows,
+        shapes,
+    )
+
+
+def read_budgets(path: Path) -> dict[str, Budget]:
+    """The budgets in the heading of a table; only a CSV table has any. ValueError if one is of no quantity."""
+    if path.suffix != ".csv":
+        return {}
+    pattern = r"^# budget (\w+): relative (\S+) absolute (\S+)$"
+    budgets = {
+        name: Budget(float(relative), float(absolute))
+        for name, relative, absolute in re.findall(pattern, path.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    unknown = budgets.keys() - ROUNDING.keys() - DRIFT.keys()
+    if unknown:
+        raise ValueError(f"{path} has a budget of {min(unknown)!r}, which is none of {', '.join(ROUNDING | DRIFT)}")
+    return budgets
+
+
+def _shapes(text: str, rows: list[Row]) -> dict[int, dict[Key, Shape]]:
+    """The shapes of every step: a line `# shapes` holds for the rows that follow, until another says otherwise."""
+    present: dict[int, set[object]] = {}
+    for row in rows:
+        present.setdefault(int(row["step"] or 0), set()).update((key(row)[:3], key(row)[3:]))
+    known: dict[Key, Shape] = {}
+    shapes: dict[int, dict[Key, Shape]] = {}
+    for line in text.splitlines():
+        if line.startswith("# shapes "):
+            users, _, words = line.removeprefix("# shapes ").partition(": ")
+            shape = shape_of(words)
+            known |= {_key(user): shape for user in users.split()}
+        elif line[:1].isdigit():
+            step = int(line.partition(",")[0])
+            if step not in shapes:
+                shapes[step] = {each: shape for each, shape in known.items() if each in present[step]}
+    for step, keys in present.items():
+        missing = keys - shapes[step].keys() - {(None, None, None)}
+        if missing:
+            raise ValueError(f"the shape {min(map(str, missing))} of step {step} is in no line `# shapes`")
+    return shapes
+
+
+def _key(text: str) -> Key:
+    body, link, shape = map(int, text.split("/"))
+    return body, link, shape

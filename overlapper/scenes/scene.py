@@ -1,0 +1,140 @@
+"""What a scene is, and how it is found: by name or by path.
+
+A scene is a Python file with a docstring that says what is hard about it, `STEPS`, and `build(client)`, which fills the
+pybullet client and may return `step(i)`, called before every stepSimulation. `PAIRS`, if it is there, says which pairs
+are looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
+apart.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import re
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+Step = Callable[[int], object]
+
+
+class SceneError(Exception):
+    """A scene that cannot be found, loaded or run; the message is one sentence for whoever can mend it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A simulation that can be built again and again, and how many steps of it are worth looking at."""
+
+    name: str
+    path: Path
+    difficulty: str
+    steps: int
+    build: Callable[[int], Step | None]
+    pairs: Any = "simulated"
+
+    @property
+    def expected(self) -> Path:
+        """Where its expected file is or would be."""
+        return self.path.parent / "expected" / f"{self.name}.csv"
+
+
+def scene_paths() -> dict[str, Path]:
+    """The scenes that can be run by name: those of the folder `scenes` here, then those of the checkout."""
+    checkout = Path(__file__).parents[2]
+    folders = [checkout / "scenes"] if (checkout / "pyproject.toml").is_file() else []
+    paths = {path.stem: path for folder in [*folders, Path("scenes")] for path in folder.glob("[!_]*.py")}
+    return dict(sorted(paths.items()))
+
+
+def is_scene(path: Path) -> bool:
+    """True for a Python file with a docstring, STEPS and build(client); it is read, not run.
+
+    A file with the last two that is not Python at all counts as one, so that it is refused and not overlooked.
+    """
+    source = path.read_bytes()
+    # Most files are no scenes, and are not worth parsing.
+    if not all(re.search(pattern, source, re.MULTILINE) for pattern in (rb"^STEPS\b", rb"^def build\(\s*client\b")):
+        return False
+    try:
+        module = ast.parse(source)
+    except (SyntaxError, ValueError):
+        return True
+    # The lines found may be those of a string.
+    names = {node.name for node in module.body if isinstance(node, ast.FunctionDef)}
+    for node in module.body:
+        targets = getattr(node, "targets", [getattr(node, "target", None)])
+        names |= {target.id for target in targets if isinstance(target, ast.Name)}
+    return {"STEPS", "build"} <= names and ast.get_docstring(module) is not None
+
+
+def scenes_in(path: Path) -> list[Path]:
+    """The scene files in a folder and the folders in it, by name; or the one file. SceneError if there is none."""
+    paths = [path] if path.is_file() else sorted(filter(is_scene, path.rglob("*.py")))
+    if not paths:
+        raise SceneError(f"there is no scene in {path}" if path.is_dir() else f"there is no scene file {path}")
+    return paths
+
+
+def headline(path: Path) -> str:
+    """The first line of a scene's docstring; the scene is not run."""
+    try:
+        docstring = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+    except SyntaxError:
+        return "(not a Python file)"
+    return (docstring or "").partition("\n")[0]
+
+
+def load_scene(name_or_path: str | Path) -> Scene:
+    """The scene of that name, or of that file (a path ends in .py). SceneError says what is wrong with it."""
+    path = _find(name_or_path)
+    module = _imported(path)
+    steps, build = getattr(module, "STEPS", None), getattr(module, "build", None)
+    if not isinstance(steps, int) or steps < 1:
+        raise SceneError(f"{path} must have STEPS, a whole number of steps from 1, but STEPS is {steps!r}")
+    if not callable(build):
+        raise SceneError(f"{path} must have a function build(client)")
+    pairs = getattr(module, "PAIRS", "simulated")
+    if isinstance(pairs, str) and pairs not in ("simulated", "all"):
+        raise SceneError(f"{path} has PAIRS = {pairs!r}, which must be 'simulated', 'all' or a list of pairs")
+    return Scene(path.stem, path, (module.__doc__ or "").strip(), steps, build, pairs)
+
+
+def _find(name_or_path: str | Path) -> Path:
+    path = Path(name_or_path)
+    if path.suffix == ".py":
+        if not path.is_file():
+            raise SceneError(f"there is no scene file {path}")
+        return path
+    name, known = str(name_or_path), scene_paths()
+    if name not in known:
+        nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.3)
+        hint = f"; the nearest is {nearest[0]!r}" if nearest else ""
+        names = ", ".join(sorted(known)) or "none here: give the path of a scene file"
+        raise SceneError(f"there is no scene {name!r}{hint} (known scenes: {names})")
+    return known[name]
+
+
+def _imported(path: Path) -> ModuleType:
+    module = ModuleType(path.stem)
+    module.__file__ = str(path)
+    try:
+        # Bytecode on disk is taken for that of a source of the same size that was written in the same second.
+        exec(compile(path.read_bytes(), path, "exec"), module.__dict__)
+    except Exception as error:
+        raise broken(path, "cannot be loaded", error) from error
+    return module
+
+
+def broken(path: Path, what: str, error: Exception) -> SceneError:
+    """The SceneError for an `error` that the scene file raised, with the line of the file where it came from."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if Path(frame.filename).resolve() == path.resolve()]
+    reason: object = error
+    if isinstance(error, SyntaxError):
+        lines, reason = [error.lineno], error.msg
+    where = f" at line {lines[-1]}" if lines else ""
+    return SceneError(f"the scene {path} {what}{where}: {type(error).__name__}: {reason}")

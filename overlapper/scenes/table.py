@@ -1,0 +1,130 @@
+"""A run as a table: one row per step and pair, of shapes or of links, that overlaps or touches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from overlapper.reference import Comparison
+    from overlapper.simulation.contacts import Contact
+    from overlapper.simulation.links import LinkContact
+
+Value = int | float | str | None
+Row = dict[str, Value]
+
+POSE = [f"position{{}}_{axis}_m" for axis in "xyz"] + [f"orientation{{}}_{part}" for part in "xyzw"]
+MEASURES = [
+    "volume_m3",
+    "volume_error_m3",
+    *[f"centroid_{axis}_m" for axis in "xyz"],
+    "area_m2",
+    "depth_m",
+    *[f"normal_{axis}" for axis in "xyz"],
+]
+
+# Every column of a run, in order, with its type; the unit is in the name. `link` is -1 for the base, `shape` counts the
+# shapes of that link, the poses are those of the two shapes in the world, `normal` points from B to A. The columns of
+# the centroid are empty for a pair that only touches.
+COLUMNS: dict[str, type] = {
+    "step": int,
+    "time_s": float,
+    **{
+        f"{word}{side}": kind
+        for side in "AB"
+        for word, kind in (("body", int), ("link", int), ("shape", int), ("name", str))
+    },
+    **{part.format(side): float for side in "AB" for part in POSE},
+    "status": str,
+    **dict.fromkeys(MEASURES, float),
+    "fcl": str,
+    "fcl_explanation": str,
+}
+
+
+class Bodies(Protocol):
+    """What a table asks of them: the shapes by (body, link, shape), their poses in that order, the links' names."""
+
+    @property
+    def keys(self) -> list[tuple[int, int, int]]: ...
+    @property
+    def positions(self) -> NDArray[np.float64]: ...
+    @property
+    def orientations(self) -> NDArray[np.float64]: ...
+    @property
+    def names(self) -> dict[tuple[int, int], str]: ...
+
+
+def key(row: Row) -> tuple[Value, ...]:
+    """(bodyA, linkA, shapeA, bodyB, linkB, shapeB); None for a missing B."""
+    return tuple(row.get(f"{word}{side}") for side in "AB" for word in ("body", "link", "shape"))
+
+
+def placements(bodies: Bodies, side: str) -> dict[tuple[int, int, int], Row]:
+    """Which shape, and where: the columns of side "A" or "B" for every shape, by (body, link, shape)."""
+    names = bodies.names
+    poses = np.hstack([bodies.positions, bodies.orientations]).tolist()
+    return {
+        (body, link, shape): {
+            f"body{side}": body,
+            f"link{side}": link,
+            f"shape{side}": shape,
+            f"name{side}": names[body, link],
+            **{part.format(side): value for part, value in zip(POSE, pose)},
+        }
+        for (body, link, shape), pose in zip(bodies.keys, poses)
+    }
+
+
+def rows(
+    step: int, time: float, bodies: Bodies, contacts: Sequence[Contact], opinions: Sequence[Comparison] = ()
+) -> list[Row]:
+    """The rows of one step; `opinions` are FCL's of the same contacts, if it was asked."""
+    a, b = placements(bodies, "A"), placements(bodies, "B")
+    table: list[Row] = []
+    for k, contact in enumerate(contacts):
+        overlap = contact.overlap
+        assert overlap.depth is not None and overlap.normal is not None
+        centroid = [None] * 3 if overlap.centroid is None else overlap.centroid.tolist()
+        normal = overlap.normal.tolist()
+        measures = [overlap.volume, overlap.volume_error, *centroid, overlap.area, overlap.depth, *normal]
+        table.append(
+            {
+                "step": step,
+                "time_s": time,
+                **a[contact.bodyA, contact.linkA, contact.shapeA],
+                **b[contact.bodyB, contact.linkB, contact.shapeB],
+                "status": overlap.status,
+                **dict(zip(MEASURES, measures)),
+                "fcl": opinions[k].verdict if opinions else None,
+                "fcl_explanation": opinions[k].explanation if opinions else None,
+            }
+        )
+    return table
+
+
+def link_rows(step: int, time: float, bodies: Bodies, pairs: Sequence[LinkContact]) -> list[Row]:
+    """The rows of one step by links as a whole; columns of single shapes, their poses, area and FCL, are left empty."""
+    names = bodies.names
+    table: list[Row] = []
+    for pair in pairs:
+        centroid = [None] * 3 if pair.centroid is None else pair.centroid.tolist()
+        measures = [pair.volume, pair.volume_error, *centroid, None, pair.depth, *pair.normal.tolist()]
+        table.append(
+            {
+                "step": step,
+                "time_s": time,
+                "bodyA": pair.bodyA,
+                "linkA": pair.linkA,
+                "nameA": names[pair.bodyA, pair.linkA],
+                "bodyB": pair.bodyB,
+                "linkB": pair.linkB,
+                "nameB": names[pair.bodyB, pair.linkB],
+                "status": pair.status,
+                **dict(zip(MEASURES, measures)),
+            }
+        )
+    return table

@@ -1,0 +1,46 @@
+"""The collision shapes of a running pybullet simulation, and their overlaps.
+
+Shapes are read once, poses at every step. Surfaces are the nominal ones or, with surface="margin", those that Bullet
+collides with: it lays a margin of 1 mm around convex hulls (mesh shapes, and the `<cylinder>` of a URDF, which Bullet
+makes a 32-gon hull). Pairs are those that the simulator lets collide.
+"""
+
+from typing import TYPE_CHECKING
+
+from overlapper.face import lazily
+
+if TYPE_CHECKING:
+    from overlapper.simulation.bodies import Among, Bodies, Report, SkippedShapeWarning
+    from overlapper.simulation.contacts import Contact, Contacts
+    from overlapper.simulation.extraction import Concave, Decomposed, Skipped, Surface
+    from overlapper.simulation.links import LinkContact, link_contacts
+    from overlapper.simulation.recorder import Recorder
+
+__all__ = [
+    "Among",
+    "Bodies",
+    "Concave",
+    "Contact",
+    "Contacts",
+    "Decomposed",
+    "LinkContact",
+    "Recorder",
+    "Report",
+    "Skipped",
+    "SkippedShapeWarning",
+    "Surface",
+    "link_contacts",
+]
+
+# Imported when asked for: pybullet says on import when it was built, and there is more in here than needs it.
+__getattr__ = lazily(
+    __name__,
+    {
+        "bodies": ("Among", "Bodies", "Report", "SkippedShapeWarning"),
+        "contacts": ("Contact", "Contacts"),
+        "extraction": ("Concave", "Decomposed", "Skipped", "Surface"),
+        "links": ("LinkContact", "link_contacts"),
+        "recorder": ("Recorder",),
+    },
+    needs="pybullet: pip install 'overlapper[sim]'",
+)

@@ -1,0 +1,54 @@
+"""Where the links of a pybullet client are, read at every step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import repeat
+
+import pybullet
+
+from overlapper.simulation.bullet_file import SavedBody
+from overlapper.simulation.extraction import BASE, save
+
+Frame = Sequence[Sequence[float]]  # begins with position and quaternion xyzw
+
+
+class ColliderPoses:
+    """The inertial frames of bases and links, which shapes are fixed to, and which bases are static.
+
+    `frames` are in the order of `colliders`, (body, link) each; `static` in that of `bodies`.
+    """
+
+    def __init__(self, client: int, links: Mapping[int, Sequence[int]], hidden: Mapping[int, int]) -> None:
+        """`links` by body are those wanted beside its base; `hidden` bodies have these places in a .bullet file."""
+        self._client = client
+        self._hidden = [(hidden[id], links[id]) for id in links if id in hidden]
+        self._seen = [id for id in links if id not in hidden]
+        self._jointed = [(id, links[id]) for id in self._seen if links[id]]
+        self.bodies = [*self._seen, *(id for id in links if id in hidden)]
+        self.colliders = [(id, BASE) for id in self.bodies]
+        self.colliders += [(id, link) for id in self.bodies for link in links[id]]
+        self.frames: list[Frame] = []
+        self.static = [True] * len(self.bodies)
+
+    def read(self) -> None:
+        """Read the frames anew, and which bases are static."""
+        client, before = self._client, self.frames or [()] * len(self.bodies)
+        saved = save(client).bodies if self._hidden else []
+        frames: list[Frame] = list(map(pybullet.getBasePositionAndOrientation, self._seen, repeat(client)))
+        frames += [_frame(saved[row], BASE) for row, _ in self._hidden]
+        for id, links in self._jointed:
+            # Without forward kinematics the poses of links lag one step behind.
+            frames += pybullet.getLinkStates(id, links, computeForwardKinematics=1, physicsClientId=client)
+        frames += [_frame(saved[row], link) for row, links in self._hidden for link in links]
+        self.frames = frames
+        # changeDynamics may turn a static body into a moving one, and back. A body that has moved of itself is not
+        # static; one that is moved by hand is asked once it rests.
+        for k, id in enumerate(self.bodies):
+            if self.static[k] or frames[k] == before[k]:
+                self.static[k] = pybullet.getDynamicsInfo(id, BASE, client)[0] == 0
+
+
+def _frame(body: SavedBody, link: int) -> Frame:
+    collider = body.colliders[link]
+    return collider.position.tolist(), collider.orientation.tolist()

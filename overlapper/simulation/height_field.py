@@ -1,0 +1,110 @@
+"""Height fields as Bullet has them: a grid of heights, two triangles to a cell, the ground below them solid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from overlapper import Hull
+from overlapper.quaternion import composed, rotated
+
+if TYPE_CHECKING:
+    from overlapper.simulation.extraction import Ground
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class HeightField:
+    """The ground under a grid of heights, in the frame of its shape.
+
+    `heights` (c, r) in m are those at x = (i - (r - 1) / 2) * spacing[0], y = (j - (c - 1) / 2) * spacing[1] for row j
+    and column i of the array. Each cell is cut into two triangles from its corner at i + 1 to the one at j + 1; the
+    triangles of the cell (i, j) have the numbers 2 * (j * (r - 1) + i) and the next.
+    """
+
+    heights: Array
+    spacing: tuple[float, float]
+    middle: float = 0.0
+    """m: what Bullet has taken off the heights it was given."""
+
+    @classmethod
+    def of_pybullet(
+        cls, data: ArrayLike, rows: int, columns: int, scale: ArrayLike, before: HeightField | None = None
+    ) -> HeightField:
+        """As createCollisionShape takes it, `rows` of them along x; Bullet puts the middle height at z = 0.
+
+        A field that takes the place of another `before` keeps the middle of that.
+        """
+        x, y, z = np.asarray(scale, dtype=float)
+        # Bullet keeps the heights in single precision.
+        plain = z * np.asarray(data, dtype=np.float32).astype(float).reshape(columns, rows)
+        middle = before.middle if before else float(plain.min() + plain.max()) / 2
+        return cls(plain - middle, (float(x), float(y)), middle)
+
+    @property
+    def count(self) -> int:
+        """Of its triangles."""
+        columns, rows = self.heights.shape
+        return int(2 * (columns - 1) * (rows - 1))
+
+    @cached_property
+    def base(self) -> float:
+        """m: how far down the ground is solid, as far below its lowest point as the field is wide."""
+        columns, rows = self.heights.shape
+        return float(self.heights.min() - max((rows - 1) * self.spacing[0], (columns - 1) * self.spacing[1]))
+
+    def under(self, lower: Array, upper: Array) -> Numbers:
+        """The numbers of the triangles that the box between two corners may meet from above or in the ground."""
+        columns, rows = self.heights.shape
+        if lower[2] > self.heights.max():
+            return np.empty(0, dtype=np.int64)
+        spans = []
+        for axis, cells in ((0, rows - 1), (1, columns - 1)):
+            first, last = (np.floor(at / self.spacing[axis] + cells / 2) for at in (lower[axis], upper[axis]))
+            spans.append(np.arange(max(first, 0), min(last, cells - 1) + 1, dtype=np.int64))
+        j, i = np.meshgrid(spans[1], spans[0], indexing="ij")
+        tops = np.max([self.heights[j + v, i + u] for u in (0, 1) for v in (0, 1)], axis=0)
+        cells_met = (j * (rows - 1) + i)[tops >= lower[2]]
+        return np.concatenate([2 * cells_met, 2 * cells_met + 1])
+
+    def prism(self, number: int) -> Hull:
+        """The ground below a triangle, down to the base."""
+        columns, rows = self.heights.shape
+        j, i = divmod(number // 2, rows - 1)
+        corners = [(i + 1, j), (i, j + 1), (i + 1, j + 1) if number % 2 else (i, j)]
+        flat = [((u - (rows - 1) / 2) * self.spacing[0], (v - (columns - 1) / 2) * self.spacing[1]) for u, v in corners]
+        tops = [self.heights[v, u] for u, v in corners]
+        return Hull([(*at, z) for at, top in zip(flat, tops) for z in (top, self.base)])
+
+
+class GroundBelow:
+    """Which triangles of a height field shapes are near; shapes that have hardly moved are not asked about again."""
+
+    def __init__(self, ground: Ground) -> None:
+        self._ground = ground
+        self._slack = min(ground.field.spacing) / 2
+        self._asked = np.empty((0, 3))
+
+    def reached(self, position: Array, orientation: Array, centres: Array, reach: Array, meets: Mask) -> set[int]:
+        """Of the shapes that `meets` picks, which lie within `reach` (n,) of `centres` (n, 3) in the world.
+
+        The field's collider is at `position` and `orientation`, xyzw.
+        """
+        turn = composed(orientation, self._ground.orientation)
+        origin = position + rotated(orientation, self._ground.position)
+        local = rotated(turn * [-1.0, -1.0, -1.0, 1.0], centres - origin)
+        if self._asked.shape != local.shape:
+            self._asked = np.full(local.shape, np.inf)
+        moved = meets & np.isfinite(reach) & ~(np.abs(local - self._asked).max(axis=1) <= self._slack)
+        self._asked[moved] = local[moved]
+        found: set[int] = set()
+        for centre, radius in zip(local[moved], reach[moved] + self._slack):
+            found.update(self._ground.field.under(centre - radius, centre + radius).tolist())
+        return found

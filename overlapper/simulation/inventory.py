@@ -1,0 +1,255 @@
+"""What is modelled of a file that pybullet can load: every shape, and which links the simulator lets collide.
+
+It is read in a process of its own, as pybullet dies of some files.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import warnings
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere
+from overlapper.quaternion import composed, rotated
+
+if TYPE_CHECKING:
+    from overlapper.simulation.extraction import Concave, Surface
+
+Listed = dict[tuple[int, int], list[Placed]]
+
+ENDINGS = (".urdf", ".sdf", ".xml", ".bullet")
+
+
+class NotRead(Exception):
+    """A file of which pybullet makes nothing; the message is one sentence."""
+
+
+@dataclass(frozen=True, slots=True)
+class ListedShape:
+    """A modelled shape. `size` says its dimensions in m, `box` (3,) are the sides of the box around it as loaded.
+
+    `corners` is 0 for all but hulls; `volume` (m³) and `box` are infinite for a plane.
+    """
+
+    kind: str
+    size: str
+    corners: int
+    volume: float
+    box: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ListedLink:
+    """A link (-1 is the base) that has shapes; it `meets` so many other links of the file, as the simulator has it."""
+
+    body: int
+    link: int
+    name: str
+    shapes: tuple[ListedShape, ...]
+    meets: int
+
+
+@dataclass(frozen=True, slots=True)
+class Inventory:
+    """What `Bodies` makes of a file. `pairs` counts the pairs of shapes that the simulator lets collide."""
+
+    bodies: int
+    shapes: int
+    shapes_read: int
+    pairs: int
+    links: tuple[ListedLink, ...]
+    skipped: tuple[tuple[str, str], ...]  # name and reason
+    decomposed: tuple[tuple[str, int], ...]  # name and number of convex parts
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON takes it, which has no infinity."""
+        made = asdict(self)
+        for link in made["links"]:
+            for shape in link["shapes"]:
+                if not np.isfinite(shape["volume"]):
+                    shape |= {"volume": None, "box": None}
+        return made
+
+
+def inventory(path: Path, self_collision: bool = False, **settings: Any) -> Inventory:
+    """What is modelled of a URDF, SDF, MJCF or .bullet file; `settings` are those of `simulation.Bodies`.
+
+    With `self_collision` a URDF or MJCF model is loaded with pybullet's URDF_USE_SELF_COLLISION. NotRead if the file is
+    not there, or pybullet refuses it or dies of it.
+    """
+    if path.suffix.lower() not in ENDINGS:
+        raise NotRead(f"the name must end in {', '.join(ENDINGS)}, and {path.name!r} does not")
+    if not path.is_file():
+        raise NotRead(f"there is no file {path}")
+    request = json.dumps([str(path), self_collision, settings])
+    program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.simulation.inventory import serve; serve()"
+    done = subprocess.run(
+        [sys.executable, "-c", program], input=request, capture_output=True, text=True, errors="replace"
+    )
+    if done.returncode < 0:
+        raise NotRead(f"pybullet dies of {path} with signal {signal.Signals(-done.returncode).name}")
+    if done.returncode:
+        raise RuntimeError(f"the process that reads {path} failed:\n{done.stderr}")
+    answer = json.loads(done.stdout)
+    if isinstance(answer, str):
+        raise NotRead(f"{path} cannot be read: {answer}")
+    return _of_answer(answer)
+
+
+def serve() -> None:
+    """The process in which pybullet reads the file: a request on standard input, then an answer or a reason."""
+    answer = os.dup(1)
+    os.dup2(2, 1)  # what pybullet prints must not mix with it
+    path, self_collision, settings = json.load(sys.stdin)
+    found: dict[str, Any] | str
+    try:
+        found = asdict(_read(Path(path), self_collision, settings))
+    except (NotRead, ValueError) as error:
+        found = str(error)
+    with open(answer, "w") as out:
+        json.dump(found, out)
+
+
+def _of_answer(answer: dict[str, Any]) -> Inventory:
+    links = tuple(
+        ListedLink(
+            **link | {"shapes": tuple(ListedShape(**each | {"box": tuple(each["box"])}) for each in link["shapes"])}
+        )
+        for link in answer["links"]
+    )
+    pairs = {name: tuple((first, second) for first, second in answer[name]) for name in ("skipped", "decomposed")}
+    return Inventory(**answer | {"links": links} | pairs)
+
+
+def _read(path: Path, self_collision: bool, settings: dict[str, Any]) -> Inventory:
+    if path.suffix.lower() == ".bullet":
+        return _of_bullet_file(path, **settings)
+    import pybullet
+
+    from overlapper.simulation import Bodies, Recorder
+
+    client = pybullet.connect(pybullet.DIRECT)
+    with Recorder(client) as recorder:
+        _load(path, self_collision, client)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of shapes left out, which the inventory names
+            bodies = Bodies(client, recorder=recorder, **settings)
+    listed: Listed = {}
+    for (body, link, _), placed in zip(bodies.keys, bodies.placed):
+        listed.setdefault((body, link), []).append(placed)
+    report, names = bodies.report(), bodies.names
+    meets = {key: len(others) for key, others in bodies.partners().items()}
+    return Inventory(
+        report.bodies,
+        report.shapes,
+        report.shapes_read,
+        report.pairs_possible,
+        _links(listed, names, meets),
+        tuple((each.name, each.reason) for each in bodies.skipped),
+        tuple((each.name, len(each.shapes)) for each in bodies.decomposed),
+    )
+
+
+def _of_bullet_file(
+    path: Path, surface: Surface = "nominal", concave: Concave = "decompose", concave_threshold: float = 0.05
+) -> Inventory:
+    """Of what saveBullet wrote; loadBullet would not load all of it. Bodies have numbers, and no names."""
+    from overlapper.simulation.bullet_file import BulletFile
+    from overlapper.simulation.collision_rules import Colliders, CollisionRules
+    from overlapper.simulation.extraction import Settings, modelled, summary
+
+    file, settings = BulletFile(path), Settings(concave, concave_threshold, surface)
+    colliders = {
+        (number, link): collider
+        for number, body in enumerate(file.bodies)
+        for link, collider in sorted(body.colliders.items())
+    }
+    names = {(body, link): f"body {body}/{f'link {link}' if link >= 0 else 'base'}" for body, link in colliders}
+    listed: Listed = {}
+    skipped, decomposed = [], []
+    for key, collider in colliders.items():
+        parts, reasons, meshes = modelled(key[1], file.leaves(collider.shape), settings)
+        for part in parts:
+            position = collider.position + rotated(collider.orientation, part.position)
+            orientation = composed(collider.orientation, part.orientation)
+            listed.setdefault(key, []).append(Placed(part.shape, position, orientation))
+        if reasons:
+            skipped.append((names[key], summary(reasons, len(parts) + len(reasons))))
+        decomposed += [(names[key], len(mesh.parts)) for _, mesh in meshes]
+    rows = {key: row for row, key in enumerate(colliders)}
+    group, mask = np.array([(each.group, each.mask) for each in colliders.values()], dtype=int).reshape(-1, 2).T
+    bodies = np.array([body for body, _ in colliders], dtype=int)
+    rules = CollisionRules(Colliders(rows, bodies, group, mask, {}), None)
+    read = np.array([len(listed.get(key, ())) for key in colliders])
+    meets = {key: len(others) for key, others in rules.partners(np.flatnonzero(read)).items()}
+    shapes = sum(len(file.leaves(each.shape)) for each in colliders.values())
+    return Inventory(
+        len(file.bodies),
+        shapes + sum(parts - 1 for _, parts in decomposed),
+        int(read.sum()),
+        rules.count(read),
+        _links(listed, names, meets),
+        tuple(skipped),
+        tuple(decomposed),
+    )
+
+
+def _links(
+    listed: Listed, names: Mapping[tuple[int, int], str], meets: Mapping[tuple[int, int], int]
+) -> tuple[ListedLink, ...]:
+    return tuple(
+        ListedLink(*key, names[key], tuple(map(_listed, shapes)), meets[key]) for key, shapes in listed.items()
+    )
+
+
+def _load(path: Path, self_collision: bool, client: int) -> None:
+    import pybullet
+    import pybullet_data
+
+    pybullet.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
+    flags = pybullet.URDF_USE_SELF_COLLISION if self_collision else 0
+    try:
+        match path.suffix.lower():
+            case ".urdf":
+                pybullet.loadURDF(str(path), flags=flags, physicsClientId=client)
+            case ".xml":
+                pybullet.loadMJCF(str(path), flags=flags, physicsClientId=client)
+            case _:
+                pybullet.loadSDF(str(path), physicsClientId=client)
+    except pybullet.error as error:
+        raise NotRead(f"pybullet says {str(error).strip().rstrip('.')!r}") from error
+
+
+def _listed(placed: Placed) -> ListedShape:
+    shape, sides = placed.shape, tuple(float(side) for side in placed.bounds[1] - placed.bounds[0])
+    kind, corners = type(shape).__name__.lower(), 0
+    match shape:
+        case Box():
+            size = _product(2 * shape.half_extents)
+        case Sphere():
+            size = f"radius {shape.radius:.4g}"
+        case Capsule() | Cylinder():
+            size = f"radius {shape.radius:.4g}, length {shape.length:.4g}"
+        case HalfSpace():
+            kind, size = "plane", f"normal {', '.join(f'{x:.4g}' for x in shape.normal)}"
+        case Hull() | RoundedHull():
+            core = shape if isinstance(shape, Hull) else shape.core
+            corners = len(core.vertices)
+            low, high = core.bounds
+            size = f"{corners} corners in {_product(high - low)}"
+            if isinstance(shape, RoundedHull):
+                kind, size = "hull", f"{size}, rounded by {shape.radius:.4g}"
+    return ListedShape(kind, size, corners, shape.volume, sides)
+
+
+def _product(sides: Any) -> str:
+    return " × ".join(f"{side:.4g}" for side in sides)

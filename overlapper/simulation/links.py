@@ -1,0 +1,95 @@
+"""The overlaps of a simulation per pair of links: what the unions of their shapes share, every volume counted once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper.union import UnionOverlap, of_pair, of_pairs
+
+if TYPE_CHECKING:
+    from overlapper import Placed
+    from overlapper.simulation.contacts import Contact
+
+
+@dataclass(frozen=True, slots=True)
+class LinkContact:
+    """Two links of which shapes overlap or touch. True only if they overlap.
+
+    `contacts` are the pairs of their shapes, and `deepest` is the one of them with the largest depth: its depth and
+    normal, from B to A, are those of the links where one pair of shapes overlaps, and otherwise a lower bound of how
+    far the links must be moved apart, and a first guess of where to.
+    """
+
+    bodyA: int
+    linkA: int
+    bodyB: int
+    linkB: int
+    contacts: tuple[Contact, ...]
+    overlap: UnionOverlap
+
+    def __bool__(self) -> bool:
+        return any(contact.overlap for contact in self.contacts)
+
+    @property
+    def status(self) -> Literal["touching", "overlapping"]:
+        return "overlapping" if self else "touching"
+
+    @property
+    def volume(self) -> float:
+        """m³ that the union of the shapes of one link shares with that of the other; 0 unless overlapping."""
+        return self.overlap.volume
+
+    @property
+    def volume_error(self) -> float:
+        """m³: the true volume is within volume ± volume_error."""
+        return self.overlap.volume_error
+
+    @property
+    def centroid(self) -> NDArray[np.float64] | None:
+        """(3,) of the common volume in the world, m; None unless overlapping."""
+        return self.overlap.centroid
+
+    @property
+    def deepest(self) -> Contact:
+        return max(self.contacts, key=lambda contact: contact.overlap.depth or 0.0)
+
+    @property
+    def depth(self) -> float:
+        """m, of the deepest pair of shapes."""
+        return self.deepest.overlap.depth or 0.0
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """(3,) unit, from B to A, of the deepest pair of shapes."""
+        normal = self.deepest.overlap.normal
+        assert normal is not None
+        return normal
+
+
+def link_contacts(contacts: Iterable[Contact]) -> list[LinkContact]:
+    """The contacts that `Bodies.overlaps` found, per pair of links, sorted by (bodyA, linkA, bodyB, linkB)."""
+    ordered = sorted(contacts, key=lambda each: (*_links(each), each.shapeA, each.shapeB))
+    return [LinkContact(*links, (each := tuple(group)), _union(each)) for links, group in groupby(ordered, _links)]
+
+
+def _links(contact: Contact) -> tuple[int, int, int, int]:
+    return contact.bodyA, contact.linkA, contact.bodyB, contact.linkB
+
+
+def _union(contacts: tuple[Contact, ...]) -> UnionOverlap:
+    if len(contacts) == 1:
+        return of_pair(contacts[0].overlap)
+    sides: tuple[dict[int, Placed], dict[int, Placed]] = ({}, {})
+    for contact in contacts:
+        a, b = contact.overlap.shapes
+        sides[0].setdefault(contact.shapeA, a)
+        sides[1].setdefault(contact.shapeB, b)
+    rows = [{shape: row for row, shape in enumerate(side)} for side in sides]
+    pairs = {(rows[0][each.shapeA], rows[1][each.shapeB]): each.overlap for each in contacts}
+    return of_pairs([*sides[0].values()], [*sides[1].values()], pairs)

@@ -1,0 +1,176 @@
+"""What a pybullet simulation has been told and cannot be asked for later."""
+
+from __future__ import annotations
+
+import functools
+import types
+from collections.abc import Callable
+from typing import Any
+
+import pybullet
+
+from overlapper.simulation.height_field import HeightField
+
+# The calls that are noted, with their parameters in pybullet's order, as far as they are needed.
+CALLS: dict[str, tuple[str, ...]] = {
+    "setCollisionFilterPair": (
+        *("bodyUniqueIdA", "bodyUniqueIdB", "linkIndexA", "linkIndexB", "enableCollision", "physicsClientId"),
+    ),
+    "setCollisionFilterGroupMask": (
+        *("bodyUniqueId", "linkIndexA", "collisionFilterGroup", "collisionFilterMask", "physicsClientId"),
+    ),
+    "setPhysicsEngineParameter": (
+        *("fixedTimeStep", "numSolverIterations", "useSplitImpulse", "splitImpulsePenetrationThreshold"),
+        *("numSubSteps", "collisionFilterMode"),
+    ),
+    "loadURDF": (
+        *("fileName", "basePosition", "baseOrientation", "useMaximalCoordinates", "useFixedBase", "flags"),
+        *("globalScaling", "physicsClientId"),
+    ),
+    "loadMJCF": ("mjcfFileName", "flags", "useMultiBody", "physicsClientId"),
+    "createMultiBody": (
+        *("baseMass", "baseCollisionShapeIndex", "baseVisualShapeIndex", "basePosition", "baseOrientation"),
+        *("baseInertialFramePosition", "baseInertialFrameOrientation", "linkMasses", "linkCollisionShapeIndices"),
+        *("linkVisualShapeIndices", "linkPositions", "linkOrientations", "linkInertialFramePositions"),
+        *("linkInertialFrameOrientations", "linkParentIndices", "linkJointTypes", "linkJointAxis"),
+        *("useMaximalCoordinates", "flags", "batchPositions", "physicsClientId"),
+    ),
+    "createCollisionShape": (
+        *("shapeType", "radius", "halfExtents", "height", "fileName", "meshScale", "planeNormal", "flags"),
+        *("collisionFramePosition", "collisionFrameOrientation", "vertices", "indices", "heightfieldTextureScaling"),
+        *("heightfieldData", "numHeightfieldRows", "numHeightfieldColumns", "replaceHeightfieldIndex"),
+        "physicsClientId",
+    ),
+    "removeBody": ("bodyUniqueId", "physicsClientId"),
+    "resetSimulation": ("flags", "physicsClientId"),
+    "disconnect": ("physicsClientId",),
+}
+
+Link = tuple[int, int]  # body and link, -1 for the base
+Arguments = dict[str, Any]
+
+_ORIGINALS: dict[str, Callable[..., Any]] = {}
+_open: list[Recorder] = []
+
+
+class Recorder:
+    """Notes what pybullet is told about collisions and cannot be asked for later.
+
+    These are pair filters, the filter mode, self-collision and the data of height fields.
+
+        client = pybullet.connect(pybullet.DIRECT)
+        recorder = Recorder(client)
+        ...  # build the scene
+        bodies = Bodies(client, recorder=recorder)
+
+    Set it up before the scene is built, and before `from pybullet import ...` of the functions in question: until
+    `close()`, or the end of a `with`, they are replaced in the module `pybullet`, for all clients, by ones that call
+    them and note what was asked of this client. What another process tells a shared simulation is not seen.
+    """
+
+    def __init__(self, physicsClientId: int = 0) -> None:
+        self.physicsClientId = physicsClientId
+        self.changes = 0
+        """How often anything was noted."""
+        self.masks_set = 0
+        """How often groups and masks were set."""
+        self._forget()
+        if not _open:
+            _ORIGINALS.update({name: getattr(pybullet, name) for name in CALLS})
+            for name in CALLS:
+                setattr(pybullet, name, _Noted(name))
+        _open.append(self)
+
+    def _forget(self) -> None:
+        self.pair_filters: dict[tuple[Link, Link], bool] = {}
+        """Whether setCollisionFilterPair lets two links collide; the lesser link first."""
+        self.both_masks_must_agree = False
+        """collisionFilterMode 0; by default one mask that admits the other's group is enough."""
+        self.self_collision: dict[int, int] = {}
+        """The flags, by body, that a body with URDF_USE_SELF_COLLISION was loaded with."""
+        self._fields: dict[int, HeightField] = {}  # by shape
+        self._shapes: dict[int, int] = {}  # by body that is a height field
+
+    def height_field(self, body: int) -> HeightField | None:
+        """The height field that a body is, if it was given as heightfieldData."""
+        return self._fields.get(self._shapes.get(body, -1))
+
+    def close(self) -> None:
+        """Note nothing any more; what was noted stays. pybullet is as before once all recorders are closed."""
+        if self in _open:
+            _open.remove(self)
+            if not _open:
+                for name, original in _ORIGINALS.items():
+                    setattr(pybullet, name, original)
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def note(self, name: str, arguments: Arguments, result: Any) -> None:
+        self.changes += 1
+        match name:
+            case "setCollisionFilterPair":
+                links = [(arguments[f"bodyUniqueId{side}"], arguments[f"linkIndex{side}"]) for side in "AB"]
+                first, second = sorted(links)
+                self.pair_filters[first, second] = bool(arguments["enableCollision"])
+            case "setCollisionFilterGroupMask":
+                self.masks_set += 1
+            case "setPhysicsEngineParameter":
+                if (mode := arguments.get("collisionFilterMode", -1)) >= 0:
+                    self.both_masks_must_agree = mode == 0
+            case "loadURDF" | "loadMJCF" | "createMultiBody":
+                flags = arguments.get("flags", 0)
+                for body in result if isinstance(result, tuple) else (result,):
+                    self._drop(body)
+                    if arguments.get("baseCollisionShapeIndex", -1) in self._fields:
+                        self._shapes[body] = arguments["baseCollisionShapeIndex"]
+                    if flags & pybullet.URDF_USE_SELF_COLLISION:
+                        self.self_collision[body] = flags
+            case "removeBody":
+                # Pair filters outlive the body, and apply to the next one with its id.
+                self._drop(arguments["bodyUniqueId"])
+            case "createCollisionShape":
+                if arguments["shapeType"] == pybullet.GEOM_HEIGHTFIELD and arguments.get("heightfieldData") is not None:
+                    self._note_field(arguments, result)
+                else:
+                    self._fields.pop(result, None)
+            case "resetSimulation" | "disconnect":
+                self._forget()
+
+    def _note_field(self, arguments: Arguments, shape: int) -> None:
+        replaced = self._fields.get(arguments.get("replaceHeightfieldIndex", -1))
+        self._fields[shape] = HeightField.of_pybullet(
+            arguments["heightfieldData"],
+            arguments["numHeightfieldRows"],
+            arguments["numHeightfieldColumns"],
+            arguments.get("meshScale", (1.0, 1.0, 1.0)),
+            replaced,
+        )
+
+    def _drop(self, body: int) -> None:
+        self.self_collision.pop(body, None)
+        self._shapes.pop(body, None)
+
+
+class _Noted:
+    """A function of pybullet that open recorders hear of."""
+
+    def __init__(self, name: str) -> None:
+        functools.update_wrapper(self, _ORIGINALS[name])
+        self._name = name
+
+    @property  # type: ignore[misc]
+    def __class__(self) -> type:
+        # pybullet_utils.bullet_client hands its client's id to what inspect.isbuiltin finds, and to nothing else.
+        return types.BuiltinFunctionType
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        result = _ORIGINALS[self._name](*args, **kwargs)
+        arguments = dict(zip(CALLS[self._name], args)) | kwargs
+        for recorder in _open:
+            if recorder.physicsClientId == arguments.get("physicsClientId", 0):
+                recorder.note(self._name, arguments, result)
+        return result

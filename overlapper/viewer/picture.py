@@ -1,0 +1,266 @@
+"""A picture of bodies and their overlaps as a PNG, drawn without a browser or a display.
+
+The camera, the light and the colours are those of a recording. Bodies are painted first, from far to near, each as a
+whole, as the faces that a convex body turns to the camera never hide each other; then overlaps in the same way; then
+what shines through everything. Pillow paints the faces, matplotlib draws lines and letters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from overlapper import HalfSpace, Overlap, Placed
+from overlapper.quaternion import rotated
+from overlapper.viewer.labels import Bodies, Contact, pairs
+from overlapper.viewer.look import (
+    BODIES,
+    BOTTOM,
+    FIELD_OF_VIEW,
+    INK,
+    LIGHT,
+    LINE,
+    OVERLAPS,
+    OWNER_COLORS,
+    TOP,
+    Array,
+    Look,
+    arrow_length,
+    boxes,
+    camera,
+    channels,
+    to_draw,
+    volume_text,
+)
+from overlapper.viewer.outline import Surface, plate, polytope_edges, surface
+
+try:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.figure import Figure
+    from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea, VPacker
+    from PIL import Image, ImageDraw
+except ImportError as missing:
+    raise ImportError("overlapper.viewer.picture needs matplotlib: pip install 'overlapper[view]'") from missing
+
+WIDTH, HEIGHT = 1200, 900  # pixels
+FINER = 2  # times: so much larger are faces painted, to be smooth when made smaller
+ROWS = 8  # of the table: the largest
+BEHIND, BEFORE = 2, 4  # overlaps: where lines are drawn
+NEAR = 4.0  # times its size: from how far an overlap is looked at
+
+
+def save(
+    path: str | Path,
+    bodies: Bodies,
+    contacts: Iterable[Contact],
+    title: str = "",
+    close: bool = False,
+    looks: tuple[Look, Look] = (BODIES, OVERLAPS),
+) -> Path:
+    """Draw the bodies where they are and the overlapping pairs among `contacts`; returns the path.
+
+    With `close`, the camera comes near the largest of them. `looks` are those of the bodies and of the overlaps.
+    """
+    overlaps = sorted(pairs(bodies, contacts).items(), key=lambda item: -item[1].volume)
+    framed = boxes(bodies.placed)
+    near = [np.asarray(overlaps[0][1].bounds)] if close and overlaps else None
+    picture = _Picture(framed, near)
+    for key, placed in zip(bodies.keys, bodies.placed, strict=True):
+        picture.add_body(placed, np.array(bodies.colors[key[:2]][:3]), looks[0])
+    for _, overlap in overlaps:
+        picture.add_overlap(to_draw(overlap, picture.size), looks[1])
+    picture.save(Path(path), title, overlaps)
+    return Path(path)
+
+
+@dataclass
+class _Side:
+    """What is seen of a convex body from outside, or from inside: polygons on the screen, and their colours."""
+
+    depth: float
+    opacity: float
+    polygons: list[Array]
+    colors: list[Array]
+
+    def paint(self, canvas: Image.Image) -> None:
+        if not self.polygons or self.opacity == 0:
+            return
+        scale = FINER * HEIGHT / 2
+        middle = np.array(canvas.size) / 2
+        polygons = [np.clip(middle + points * [scale, -scale], -1e5, 1e5) for points in self.polygons]
+        corners = np.concatenate(polygons)
+        left, top = np.clip(np.floor(corners.min(axis=0)), 0, canvas.size).astype(int)
+        right, bottom = np.clip(np.ceil(corners.max(axis=0)) + 1, 0, canvas.size).astype(int)
+        if left >= right or top >= bottom:
+            return
+        paint = Image.new("RGB", (right - left, bottom - top))
+        mask = Image.new("L", paint.size)
+        for points, color in zip(polygons, self.colors, strict=True):
+            outline = list(map(tuple, points - [left, top]))
+            ImageDraw.Draw(paint).polygon(outline, fill=tuple((255 * color).round().astype(int)))
+            ImageDraw.Draw(mask).polygon(outline, fill=round(255 * self.opacity))
+        paint.putalpha(mask)
+        canvas.alpha_composite(paint, (int(left), int(top)))
+
+
+class _Picture:
+    def __init__(self, framed: Sequence[Array], near: Sequence[Array] | None) -> None:
+        corners = np.array(framed)
+        lower, upper = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+        self.center, self.size = (lower + upper) / 2, float(np.linalg.norm(upper - lower))
+        self.target, self.back, self.distance = camera(near or framed)
+        if near:
+            self.distance = NEAR * float(np.linalg.norm(near[0][1] - near[0][0]))
+        right = np.array([-self.back[1], self.back[0], 0.0]) / np.hypot(self.back[0], self.back[1])
+        self.axes = np.array([right, np.cross(self.back, right), self.back])
+        self.bodies: list[_Side] = []
+        self.overlaps: list[_Side] = []
+        self.lines: list[tuple[Array, Array, int]] = []  # (k, 2, 2) segments, colour with opacity, BEHIND or BEFORE
+        self.heads: list[Array] = []
+        self.dots: list[tuple[Array, Array, float]] = []
+
+    def seen(self, points: Array) -> tuple[Array, Array]:
+        """Where world points (n, 3) are on the screen, (n, 2), in half heights from its middle, and how far off, m."""
+        view = (points - self.target) @ self.axes.T
+        depth = np.maximum(self.distance - view[:, 2], 1e-3 * self.distance)
+        return view[:, :2] / (depth * np.tan(np.deg2rad(FIELD_OF_VIEW) / 2))[:, None], depth
+
+    def add_body(self, placed: Placed, color: Array, look: Look) -> None:
+        endless = isinstance(placed.shape, HalfSpace)
+        drawn = self._surface(placed)
+        vertices = _in_world(placed, drawn.vertices)
+        opacity = look.opacity * (0.4 if endless else 1.0)
+        if look.faces:
+            front = channels(look.front) if look.front else color
+            back = channels(look.back) if look.back else color if endless else None
+            rings = list(drawn.faces)
+            self._add_sides([vertices[ring] for ring in rings], [front] * len(rings), back, opacity, self.bodies)
+        segments = drawn.edges if look.faces else drawn.wires
+        if look.edges:
+            shade = np.append(color, 0.35 if look.faces else 0.8)
+            self._add_lines(_in_world(placed, segments), shade, BEHIND)
+        if look.vertices:
+            self.dots.append((self.seen(vertices)[0], color, 4.0))
+
+    def _surface(self, placed: Placed) -> Surface:
+        if not isinstance(placed.shape, HalfSpace):
+            return surface(placed.shape)
+        back = np.append(-placed.orientation[:3], placed.orientation[3])
+        return plate(placed.shape, rotated(back, self.center - placed.position), self.size)
+
+    def add_overlap(self, overlap: Overlap, look: Look) -> None:
+        vertices, centroid = overlap.vertices, np.asarray(overlap.centroid)
+        if look.faces:
+            own = [np.array(OWNER_COLORS[owner % len(OWNER_COLORS)]) for owner in overlap.owner]
+            fronts = [channels(look.front)] * len(own) if look.front else own
+            back = channels(look.back) if look.back else np.array([0.3, 0.3, 0.3])
+            self._add_sides([vertices[ring] for ring in overlap.facets], fronts, back, look.opacity, self.overlaps)
+        if look.edges:
+            self._add_lines(vertices[polytope_edges(overlap.facets)], np.append(LINE, 1.0), BEFORE)
+        if look.vertices:
+            self.dots.append((self.seen(vertices)[0], np.array(LINE), 5.0))
+        if look.marks:
+            self._add_marks(overlap, centroid)
+        if np.ptp(vertices, axis=0).max() < 0.015 * self.size:
+            self.dots.append((self.seen(centroid[None])[0], np.array(INK), 6.0))
+
+    def _add_marks(self, overlap: Overlap, centroid: Array) -> None:
+        ink = np.append(INK, 1.0)
+        for ring in overlap.patch:
+            self._add_lines(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1), ink, BEFORE)
+        if overlap.normal is None:
+            return
+        tip = centroid + arrow_length(overlap.area, self.size) * overlap.normal
+        self._add_lines(np.array([[centroid, tip]]), ink, BEFORE)
+        (start, end), _ = self.seen(np.array([centroid, tip]))
+        along = end - start
+        aside = 0.3 * np.array([-along[1], along[0]])
+        self.heads.append(np.array([end, end - 0.2 * along + 0.25 * aside, end - 0.2 * along - 0.25 * aside]))
+
+    def _add_sides(
+        self, faces: Sequence[Array], fronts: Sequence[Array], back: Array | None, opacity: float, to: list[_Side]
+    ) -> None:
+        """Faces, counter-clockwise from outside, flat and matt; first those seen from inside, if they have a colour."""
+        outside, inside = _Side(0.0, opacity, [], []), _Side(0.0, opacity, [], [])
+        eye = self.target + self.distance * self.back
+        for corners, front in zip(faces, fronts, strict=True):
+            normal = np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
+            normal /= np.linalg.norm(normal) or 1.0
+            light = 0.4 + 0.7 * (0.45 + 0.55 * max(0.0, float(normal @ LIGHT)))
+            if normal @ (eye - corners[0]) > 0:
+                side, color = outside, front * light
+            elif back is not None:
+                side, color = inside, back
+            else:
+                continue
+            side.polygons.append(self.seen(corners)[0])
+            side.colors.append(np.minimum(color, 1.0))
+        # Of two bodies, the one whose middle is nearer is taken for the one in front.
+        depth = float(self.seen(np.mean([face.mean(axis=0) for face in faces], axis=0)[None])[1][0])
+        outside.depth, inside.depth = depth, depth + 1e-6 * self.size
+        to += [outside, inside]
+
+    def _add_lines(self, segments: Array, color: Array, order: int) -> None:
+        self.lines.append((self.seen(segments.reshape(-1, 3))[0].reshape(-1, 2, 2), color, order))
+
+    def save(self, path: Path, title: str, overlaps: Sequence[tuple[tuple[str, str], Overlap]]) -> None:
+        figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, facecolor=BOTTOM)
+        axes = figure.add_axes((0, 0, 1, 1), xlim=(-WIDTH / HEIGHT, WIDTH / HEIGHT), ylim=(-1, 1))
+        axes.set_axis_off()
+        axes.set_autoscale_on(False)
+        shades = np.linspace(TOP, BOTTOM, HEIGHT)[:, None].repeat(WIDTH, axis=1)
+        for order, layer in ((0, shades), (1, _painted(self.bodies)), (3, _painted(self.overlaps))):
+            axes.imshow(layer, extent=(-WIDTH / HEIGHT, WIDTH / HEIGHT, -1, 1), aspect="auto", zorder=order)
+        for segments, color, order in self.lines:
+            axes.add_collection(LineCollection(list(segments), colors=[tuple(color)], linewidths=1.0, zorder=order))
+        axes.add_collection(PolyCollection(self.heads, facecolors=[INK], zorder=BEFORE))
+        for points, color, size in self.dots:
+            axes.plot(*points.T, ".", color=tuple(color), markersize=size, zorder=BEFORE + 1)
+        axes.add_artist(_table(title, overlaps))
+        FigureCanvasAgg(figure).print_png(str(path))  # type: ignore[no-untyped-call]
+
+
+def _in_world(placed: Placed, points: Array) -> Array:
+    return rotated(placed.orientation, points) + placed.position
+
+
+def _painted(sides: Sequence[_Side]) -> Any:
+    """(HEIGHT, WIDTH, 4), from far to near."""
+    canvas = Image.new("RGBA", (FINER * WIDTH, FINER * HEIGHT))
+    for side in sorted(sides, key=lambda side: -side.depth):
+        side.paint(canvas)
+    return np.asarray(canvas.resize((WIDTH, HEIGHT), Image.Resampling.BOX))
+
+
+def _table(title: str, overlaps: Sequence[tuple[tuple[str, str], Overlap]]) -> AnchoredOffsetbox:
+    """The title, and the pairs with volume and depth, the largest first."""
+
+    def text(words: str, color: Any = LINE) -> TextArea:
+        return TextArea(words, textprops={"color": color, "fontsize": 11, "family": "DejaVu Sans"})
+
+    names: list[Any] = []
+    volumes: list[Any] = []
+    depths: list[Any] = []
+    for (first, second), overlap in overlaps[:ROWS]:
+        parts: list[Any] = [text(first, OWNER_COLORS[0]), text("–", "#9aa3b0"), text(second, OWNER_COLORS[1])]
+        names.append(HPacker(children=parts, pad=0, sep=4))
+        volumes.append(text(volume_text(overlap.volume)))
+        depths.append(text(f"{1e3 * (overlap.depth or 0.0):.3g} mm deep"))
+    columns: list[Any] = [
+        VPacker(children=names, pad=0, sep=5),
+        VPacker(children=volumes, pad=0, sep=5, align="right"),
+        VPacker(children=depths, pad=0, sep=5, align="right"),
+    ]
+    lines: list[Any] = [text(title)] if title else []
+    lines += [HPacker(children=columns, pad=0, sep=18)] if names else [text("nothing overlaps", "#9aa3b0")]
+    if len(overlaps) > ROWS:
+        lines.append(text(f"and {len(overlaps) - ROWS:,} more", "#9aa3b0"))
+    box = AnchoredOffsetbox("upper left", child=VPacker(children=lines, pad=4, sep=7), pad=0.3, borderpad=0.7)
+    box.patch.set(facecolor="#16181d", edgecolor="none", alpha=0.8, boxstyle="round,pad=0.2")
+    box.set_zorder(20)
+    return box

@@ -1,0 +1,309 @@
+"""A run recorded to one HTML file, which is looked at in any browser, without a server and without a network.
+
+The page keeps bodies, poses, polytopes and numbers in arrays of the narrowest type that is seen to be enough: of what
+is at rest nothing is said twice, vertices are 16-bit fractions of their polytope's size, numbers have five digits.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import math
+import pickle
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import Overlap, Placed, Sphere
+from overlapper.viewer.labels import ROOT, Bodies, Contact, body_paths, pairs
+from overlapper.viewer.look import (
+    BODIES,
+    INK,
+    LIGHT,
+    LINE,
+    MANY_FACETS,
+    OVERLAPS,
+    OWNER_COLORS,
+    Array,
+    Look,
+    boxes,
+    to_draw,
+)
+from overlapper.viewer.stage import Stage, rgb
+
+from meshcat import Visualizer  # isort: skip  # after the stage, which says what to install
+from meshcat.servers.zmqserver import VIEWER_ROOT  # isort: skip
+from meshcat.transformations import translation_matrix  # isort: skip
+
+Pair = tuple[str, str]
+SCRIPTS = (
+    "film",
+    "scene",
+    "look",
+    "camera",
+    "numbers",
+    "chart",
+    "time",
+)  # of the page, in the order they need each other
+ARRAYS = {"float32": "Float32Array", "uint32": "Uint32Array", "int32": "Int32Array", "uint16": "Uint16Array"}
+ARRAYS |= {"int16": "Int16Array", "uint8": "Uint8Array"}
+
+
+# Volume; its error, of which one digit is shown; depth, area, centroid; normal: columns, and bits that are enough.
+NUMBERS = [(slice(0, 1), 17), (slice(1, 2), 6), (slice(2, 7), 17), (slice(7, 10), 14)]
+
+
+class Recording:
+    """A run as one self-contained HTML file with a time slider; made without a server, read without a network.
+
+    The page shows one recorded frame at a time and never a mixture of two, so the bodies drawn are those that made the
+    overlaps drawn. `recording.html#t=0.25` opens at that time, paused; `#t=0.25&from=1,0,1&at=0,0,0.5` with the camera
+    at one point of the world and turned to another; `#t=0.25&pair=cup,hand` with the numbers of that pair. About 30
+    frames a second are enough to look at.
+    """
+
+    def __init__(self, bodies: Look = BODIES, overlaps: Look = OVERLAPS) -> None:
+        self._looks = {"bodies": bodies, "overlaps": overlaps}
+        self._tape = _Tape([])
+        self._visualizer = Visualizer(window=self._tape)
+        self._stage: Stage | None = None
+        self._start = 0.0
+        self._times: list[float] = []
+        self._framed: list[Array] = []
+        self._bodies: dict[str, tuple[bytes, str]] = {}
+        self._nodes: dict[str, int] = {}
+        self._poses: dict[str, tuple[float, ...]] = {}  # the last of each node
+        self._keys: list[tuple[int, int, tuple[float, ...]]] = []  # frame, node, pose
+        self._pairs: dict[Pair, int] = {}
+        self._drawn: dict[Pair, tuple[Overlap, int]] = {}  # the last of each pair, and its place among the polytopes
+        self._seen_in: dict[Pair, Array] = {}  # the box around all that a pair has shared
+        self._polytopes = _Polytopes()
+        self._sightings: list[tuple[int, int, int]] = []  # frame, pair, polytope
+        self._numbers: list[Array] = []
+
+    def add(self, bodies: Bodies, contacts: Iterable[Contact], time: float) -> None:
+        """Record the bodies where they are now and the overlapping pairs among `contacts`.
+
+        `time` in seconds must increase from call to call; the page counts from the first.
+        """
+        if self._stage is None:
+            self._stage = Stage(bodies.placed, *self._looks.values())
+            self._start = time
+            self._framed.extend(boxes(bodies.placed))
+            self._visualizer[ROOT].set_transform(translation_matrix(self._stage.center))
+        seconds = time - self._start
+        if self._times and not seconds > self._times[-1]:
+            raise ValueError(f"time must increase from frame to frame: {time} s came no later than the frame before")
+        self._times.append(seconds)
+        colors = bodies.colors
+        places = {
+            self._add_body(self._stage, path, placed, colors[key[:2]]): _pose(self._stage, placed)
+            for path, key, placed in zip(body_paths(bodies), bodies.keys, bodies.placed, strict=True)
+        }
+        absent = (0.0,) * 7
+        for node in {**self._poses, **places}:
+            pose = places.get(node, absent)
+            if self._poses.get(node, absent) != pose:
+                self._keys.append((len(self._times) - 1, self._nodes[node], pose))
+            self._poses[node] = pose
+        for pair, overlap in pairs(bodies, contacts).items():
+            self._add_overlap(self._stage, pair, overlap)
+
+    def save(self, path: str | Path) -> Path:
+        """Write what was added so far to one HTML file, and return its path."""
+        if self._stage is None:
+            raise ValueError("there is nothing to save: add at least one frame first")
+        tape = _Tape(list(self._tape.commands))
+        self._stage.set(Visualizer(window=tape), [*self._framed, *self._seen_in.values()])
+        folder = Path(__file__).with_name("page")
+        texts = {
+            "script": "\n".join((folder / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS),
+            "meshcat": Path(VIEWER_ROOT, "main.min.js").read_text(encoding="utf-8"),
+            "commands": _packed(f"[{','.join(tape.commands)}]".encode()),
+            "film": _packed(_film(self._heading(self._stage), self._arrays())),
+        }
+        page = (folder / "recording.html").read_text(encoding="utf-8")
+        for mark, text in texts.items():
+            page = page.replace(f"{{{{{mark}}}}}", text)
+        Path(path).write_text(page, encoding="utf-8")
+        return Path(path)
+
+    def _heading(self, stage: Stage) -> dict[str, Any]:
+        return {
+            "times": self._times,
+            "pairs": list(self._pairs),
+            "nodes": list(self._nodes),
+            "center": stage.center.tolist(),
+            "size": stage.size,
+            "looks": {name: asdict(look) for name, look in self._looks.items()},
+            "colors": {"owners": [rgb(color) for color in OWNER_COLORS[:2]], "ink": rgb(INK), "line": rgb(LINE)},
+            "light": LIGHT.tolist(),
+        }
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        frames, nodes, poses = (list(column) for column in zip(*self._keys, strict=True)) if self._keys else ([],) * 3
+        sightings = np.array(self._sightings, dtype=np.uint32).reshape(-1, 3)
+        numbers = np.array(self._numbers, dtype=np.float32).reshape(-1, 10)
+        return {
+            "key_frame": np.array(frames, dtype=np.uint32),
+            "key_node": np.array(nodes, dtype=np.uint32),
+            "key_pose": np.array(poses, dtype=np.float32).reshape(-1, 7).T,
+            "sighting_start": np.searchsorted(sightings[:, 0], np.arange(len(self._times) + 1)).astype(np.uint32),
+            "sighting_pair": sightings[:, 1],
+            "sighting_polytope": sightings[:, 2],
+            "numbers": np.hstack([_rounded(numbers[:, column], bits) for column, bits in NUMBERS]).T,
+            **self._polytopes.arrays(),
+        }
+
+    def _add_body(self, stage: Stage, path: str, placed: Placed, color: Sequence[float]) -> str:
+        """The node that shows the body, drawn if it is new."""
+        shape = pickle.dumps(placed.shape)
+        drawn, node = self._bodies.get(path, (None, path))
+        if drawn != shape:
+            node = path if drawn is None else f"{path} from frame {len(self._times)}"
+            self._visualizer[node].set_object(stage.body(placed, color))
+            self._bodies[path] = shape, node
+            self._nodes[node] = len(self._nodes)
+        return node
+
+    def _add_overlap(self, stage: Stage, pair: Pair, overlap: Overlap) -> None:
+        number = self._pairs.setdefault(pair, len(self._pairs))
+        last, polytope = self._drawn.get(pair, (None, -1))
+        slack = 2 if len(overlap.owner) > MANY_FACETS else 1
+        if last is None or not _look_alike(last, overlap, slack):
+            polytope = self._polytopes.add(to_draw(overlap, stage.size), stage.center, polytope, slack)
+            self._drawn[pair] = overlap, polytope
+            box = np.asarray(overlap.bounds)
+            lower, upper = self._seen_in.get(pair, box)
+            self._seen_in[pair] = np.array([np.minimum(lower, box[0]), np.maximum(upper, box[1])])
+        self._sightings.append((len(self._times) - 1, number, polytope))
+        measures = [overlap.volume, overlap.volume_error, overlap.depth or 0.0, overlap.area]
+        normal = np.zeros(3) if overlap.normal is None else overlap.normal
+        self._numbers.append(np.hstack([measures, np.asarray(overlap.centroid) - stage.center, normal]))
+
+
+@dataclass
+class _Polytopes:
+    """Facets by their vertices and owners; where facets have the same vertices as before, only how these have moved."""
+
+    frames: list[tuple[float, ...]] = field(default_factory=list)  # middle, and half the longest side: the unit
+    previous: list[int] = field(default_factory=list)  # the polytope that vertices are counted from, or -1
+    vertices: list[NDArray[np.int16]] = field(default_factory=list)
+    owners: list[NDArray[np.integer[Any]]] = field(default_factory=list)
+    facets: list[list[NDArray[np.int32]]] = field(default_factory=list)
+
+    def add(self, overlap: Overlap, center: Array, like: int, slack: int) -> int:
+        """Keep the overlap, about `center`; `like` is the one that the pair had before, or -1. Returns its number.
+
+        Where there is `slack`, as what is round is drawn within a tenth, vertices are as fine as 1/1000 of the size.
+        """
+        lower, upper = np.asarray(overlap.bounds)
+        unit = float((upper - lower).max()) / 2
+        self.frames.append((*((lower + upper) / 2 - center), unit))
+        grain = 64 if slack > 1 else 1
+        steps = np.round((overlap.vertices - (lower + upper) / 2) / unit * 32767 / grain) * grain
+        grid = np.clip(steps, -32767, 32767).astype(np.int16)
+        self.previous.append(like if like >= 0 and self.vertices[like].shape == grid.shape else -1)
+        self.vertices.append(grid)
+        self.owners.append(overlap.owner)
+        self.facets.append(overlap.facets)
+        return len(self.vertices) - 1
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        moved = [
+            grid - self.vertices[like] if like >= 0 else grid  # modulo 2^16
+            for grid, like in zip(self.vertices, self.previous, strict=True)
+        ]
+        rings = [ring for facets in self.facets for ring in facets]
+        return {
+            "polytope_frame": np.array(self.frames, dtype=np.float32).reshape(-1, 4).T,
+            "polytope_previous": np.array(self.previous, dtype=np.int32),
+            "polytope_vertices": np.array([len(grid) for grid in self.vertices], dtype=np.uint16),
+            "polytope_facets": np.array([len(facets) for facets in self.facets], dtype=np.uint16),
+            "vertices": np.concatenate([np.zeros((0, 3), np.int16), *moved]),
+            "owners": np.concatenate([np.zeros(0), *self.owners]).astype(np.uint8),
+            "ring_length": np.array([len(ring) for ring in rings], dtype=np.uint16),
+            "rings": np.concatenate([np.zeros(0), *rings]).astype(np.uint16),
+        }
+
+
+class _Tape:
+    """In the place of meshcat's window: keeps the commands instead of sending them to a server.
+
+    A geometry is kept once; where it is used again, by its uuid alone.
+    """
+
+    def __init__(self, commands: list[str]) -> None:
+        self.commands = commands
+        self._known: set[str] = set()
+
+    def send(self, command: Any) -> None:
+        lowered = command.lower()
+        for each in lowered.get("object", {}).get("geometries", ()):
+            if each["uuid"] in self._known:
+                del each["data"]
+            self._known.add(each["uuid"])
+        self.commands.append(json.dumps(lowered, default=lambda packed: base64.b64encode(packed.data).decode()))
+
+
+def _pose(stage: Stage, placed: Placed) -> tuple[float, ...]:
+    """Position about the scene's centre and quaternion.
+
+    A millionth of the scene is far below a pixel: what rests has one pose in spite of rounding.
+    """
+    position = np.round((placed.position - stage.center) / stage.size, 6) * stage.size
+    return (*position.tolist(), *np.round(placed.orientation, 6).tolist())
+
+
+def _look_alike(a: Overlap, b: Overlap, slack: int) -> bool:
+    """True if the one can stand for the other in a picture.
+
+    Neither shape has moved by more than 1/200 of the size of what they share, a pixel where that fills a quarter
+    of the page, nor has its volume or area changed by more than 3 %, as it does in a thin overlap where that is much.
+    Both are multiplied by `slack`.
+    """
+    changed = max(abs(b.volume / a.volume - 1), abs(b.area / a.area - 1))
+    if changed >= 0.03 * slack:
+        return False
+    size, centroid = float(np.ptp(np.asarray(a.bounds), axis=0).max()), np.asarray(a.centroid)
+    return all(
+        _motion(before, after, centroid, size) < slack * size / 200
+        for before, after in zip(a.shapes, b.shapes, strict=True)
+    )
+
+
+def _motion(before: Placed, after: Placed, point: Array, reach: float) -> float:
+    """About how far the shape has moved, at the most, as far as `reach` from a point."""
+    if isinstance(before.shape, Sphere):
+        return math.dist(after.position, before.position)
+    # A quaternion and its negative are the same rotation.
+    turn = 2 * min(math.dist(after.orientation, sign * before.orientation) for sign in (1, -1))
+    return math.dist(after.position, before.position) + (math.dist(before.position, point) + reach) * turn
+
+
+def _rounded(numbers: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
+    """With so many bits of 24 significant ones, so that the last bytes pack well."""
+    spare = 24 - bits
+    raised = np.ascontiguousarray(numbers).view(np.uint32) + np.uint32(1 << (spare - 1))
+    rounded: NDArray[np.float32] = (raised >> spare << spare).view(np.float32)
+    return rounded
+
+
+def _film(heading: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """The length of the heading, the heading in JSON, and the arrays, byte by byte: all first bytes, all second ones...
+
+    Numbers of like size have like bytes, and what is alike packs best side by side.
+    """
+    kinds = {name: [ARRAYS[array.dtype.name], array.size] for name, array in arrays.items()}
+    head = json.dumps({**heading, "arrays": kinds}).encode()
+    parts = [np.ascontiguousarray(array).reshape(-1, 1).view(np.uint8).T.tobytes() for array in arrays.values()]
+    return b"".join([len(head).to_bytes(4, "little"), head, *parts])
+
+
+def _packed(data: bytes) -> str:
+    return base64.b64encode(gzip.compress(data, compresslevel=9, mtime=0)).decode()

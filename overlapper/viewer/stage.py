@@ -1,0 +1,255 @@
+"""What bodies and overlaps are in meshcat: geometries, materials, lights and a camera. Lengths in metres, z is up."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import HalfSpace, Overlap, Placed
+from overlapper.viewer.look import (
+    BOTTOM,
+    FIELD_OF_VIEW,
+    INK,
+    LIGHT,
+    LINE,
+    OWNER_COLORS,
+    TOP,
+    Look,
+    arrow_length,
+    boxes,
+    camera,
+    channels,
+    to_draw,
+)
+from overlapper.viewer.outline import Surface, cone, plate, polytope_edges, rotation_from_z, surface, triangles
+
+try:
+    from meshcat import geometry
+    from meshcat.transformations import quaternion_matrix, rotation_matrix, translation_matrix
+except ImportError as missing:
+    raise ImportError("overlapper.viewer needs meshcat: pip install 'overlapper[view]'") from missing
+
+Array = NDArray[np.float64]
+FRONT, BACK, BOTH = 0, 1, 2  # three.js: the sides from which a face is seen
+
+
+class Stage:
+    """Background, lights, camera, and the sizes that follow the scene; fixed by the first bodies seen."""
+
+    def __init__(self, placed: Sequence[Placed], bodies: Look, overlaps: Look) -> None:
+        corners = np.array(boxes(placed))
+        lower, upper = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+        self.center = (lower + upper) / 2
+        self.size = float(np.linalg.norm(upper - lower))
+        self._bodies, self._overlaps = bodies, overlaps
+        self._known: dict[bytes, tuple[bool, _Mesh, geometry.PointsGeometry, geometry.PointsGeometry]] = {}
+        fronts = [channels(overlaps.front)] if overlaps.front else [np.array(color) for color in OWNER_COLORS]
+        # Mostly of their own light, so that an owner is known from the shaded side, too.
+        fade = {"opacity": overlaps.opacity, "depthWrite": overlaps.opacity == 1}
+        self._fronts = [_skin(rgb(0.7 * color), flat=True, emissive=rgb(0.4 * color), **fade) for color in fronts]
+        backs = [channels(overlaps.back)] if overlaps.back else [0.5 * color for color in fronts]
+        self._backs = [
+            geometry.MeshBasicMaterial(color=rgb(each), transparent=True, side=BACK, **fade) for each in backs
+        ]
+        self._lines = geometry.LineBasicMaterial(color=rgb(LINE), transparent=True)
+        self._corners = _DotMaterial(color=rgb(LINE), size=4, sizeAttenuation=False, transparent=True)
+        through_everything = {"color": rgb(INK), "transparent": True, "depthTest": False}
+        self._shining = geometry.LineBasicMaterial(**through_everything)
+        self._dot = geometry.Points(
+            _points(np.zeros((1, 3))), _DotMaterial(size=5, sizeAttenuation=False, **through_everything)
+        )
+        head = cone(radius=0.05, bottom=0.8, top=1.0)
+        self._arrowhead = geometry.Mesh(
+            _Mesh(head.vertices, head.faces), geometry.MeshBasicMaterial(**through_everything)
+        )
+
+    def surface(self, placed: Placed) -> Surface:
+        """What to draw a shape by, in its own frame; a half-space is a plate as large as the scene."""
+        if not isinstance(placed.shape, HalfSpace):
+            return surface(placed.shape)
+        center = np.linalg.inv(matrix(placed)) @ [*self.center, 1]
+        return plate(placed.shape, center[:3], self.size)
+
+    def body(self, placed: Placed, color: Sequence[float]) -> Group:
+        """A shape in its own frame. What is not to be seen is there, too, so that a page can show it."""
+        look, endless = self._bodies, isinstance(placed.shape, HalfSpace)
+        flat, mesh, edges, wires = self._geometries(placed)
+        opacity = look.opacity * (0.4 if endless else 1)
+        seen = {"opacity": opacity, "depthWrite": opacity == 1, "side": BOTH if endless and not look.back else FRONT}
+        front = _skin(rgb(channels(look.front) if look.front else color), flat, **seen)
+        line = geometry.LineBasicMaterial(color=rgb(color), opacity=0.35, transparent=True, depthWrite=False)
+        wire = geometry.LineBasicMaterial(color=rgb(color), transparent=True)
+        dots = _DotMaterial(color=rgb(color), size=4, sizeAttenuation=False, transparent=True)
+        return Group(
+            (geometry.Mesh(mesh, front), {"name": "faces", "visible": look.faces}),
+            *self._inside(mesh, look),
+            (geometry.LineSegments(edges, line), {"name": "edges", "visible": look.edges and look.faces}),
+            (
+                geometry.LineSegments(wires, wire),
+                {"name": "wires", "visible": look.edges and not look.faces},
+            ),
+            (geometry.Points(mesh, dots), {"name": "vertices", "visible": look.vertices}),
+        )
+
+    def _geometries(self, placed: Placed) -> tuple[bool, _Mesh, geometry.PointsGeometry, geometry.PointsGeometry]:
+        """Whether faces are flat; faces, edges and wires, which are the same for the same shape."""
+        shape = pickle.dumps(placed.shape)
+        if shape not in self._known or isinstance(placed.shape, HalfSpace):
+            drawn = self.surface(placed)
+            mesh = _Mesh(drawn.vertices, drawn.faces, drawn.normals)
+            self._known[shape] = drawn.normals is None, mesh, _lines(drawn.edges), _lines(drawn.wires)
+        return self._known[shape]
+
+    def _inside(self, mesh: _Mesh, look: Look) -> list[tuple[geometry.Object, dict[str, Any]]]:
+        if look.back is None:
+            return []
+        skin = _skin(rgb(channels(look.back)), True, side=BACK, opacity=look.opacity, depthWrite=look.opacity == 1)
+        return [(geometry.Mesh(mesh, skin), {"name": "inside", "visible": look.faces})]
+
+    def overlap(self, overlap: Overlap) -> Group:
+        """Facets by owner, patch outline and normal; about the centroid, where float32 is fine enough."""
+        overlap, look = to_draw(overlap, self.size), self._overlaps
+        centroid = np.asarray(overlap.centroid)
+        vertices = overlap.vertices - centroid
+        parts = self._facets(overlap, vertices) if look.faces else []
+        if look.edges:
+            segments = vertices[polytope_edges(overlap.facets)]
+            parts.append((geometry.LineSegments(_lines(segments), self._lines), {"renderOrder": 1}))
+        if look.vertices:
+            parts.append((geometry.Points(_points(vertices), self._corners), {"renderOrder": 1}))
+        if look.marks:
+            parts += self._marks(overlap, centroid)
+        if np.ptp(vertices, axis=0).max() < 0.015 * self.size:
+            parts.append((self._dot, {"renderOrder": 3}))
+        return Group((Group(*parts), {"position": centroid.tolist()}))
+
+    def _marks(self, overlap: Overlap, centroid: Array) -> list[tuple[geometry.Object, dict[str, Any]]]:
+        parts: list[tuple[geometry.Object, dict[str, Any]]] = []
+        lines = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) - centroid for ring in overlap.patch]
+        if overlap.normal is not None:
+            length = arrow_length(overlap.area, self.size)
+            lines.append(np.array([[np.zeros(3), length * overlap.normal]]))
+            pose = np.eye(4)
+            pose[:3, :3] = length * rotation_from_z(overlap.normal)
+            parts.append((self._arrowhead, {"renderOrder": 2, "matrix": pose.T.ravel().tolist()}))
+        if lines:
+            parts.append((geometry.LineSegments(_lines(np.concatenate(lines)), self._shining), {"renderOrder": 2}))
+        return parts
+
+    def _facets(self, overlap: Overlap, vertices: Array) -> list[tuple[geometry.Object, dict[str, Any]]]:
+        """A mesh for each owner, and for what is seen of it from inside if faces are seen through."""
+        faces = triangles(overlap.facets)
+        owners = np.repeat(overlap.owner, [len(facet) - 2 for facet in overlap.facets])
+        parts: list[tuple[geometry.Object, dict[str, Any]]] = []
+        for owner in np.unique(owners):
+            used, renumbered = np.unique(faces[owners == owner], return_inverse=True)
+            mesh = _Mesh(vertices[used], renumbered.reshape(-1, 3))
+            if self._overlaps.opacity < 1:
+                parts.append((geometry.Mesh(mesh, self._backs[owner % len(self._backs)]), {"renderOrder": 0.5}))
+            parts.append((geometry.Mesh(mesh, self._fronts[owner % len(self._fronts)]), {"renderOrder": 1}))
+        return parts
+
+    def set(self, visualizer: Any, framed: Sequence[Array]) -> None:
+        """A dark room, plain light, and a camera that sees the boxes `framed`, each (2, 3): lower and upper corner."""
+        for name in ("Grid", "Axes", "Lights/PointLightNegativeX", "Lights/PointLightPositiveX"):
+            visualizer[f"/{name}"].set_property("visible", False)
+        visualizer["/Background"].set_property("top_color", list(TOP))
+        visualizer["/Background"].set_property("bottom_color", list(BOTTOM))
+        center, back, distance = camera(framed)
+        # meshcat's camera circles about the page's origin; so the scene is moved there, and the camera moved with it.
+        z_up = rotation_matrix(-np.pi / 2, (1, 0, 0))
+        visualizer["/"].set_transform(z_up @ translation_matrix(-center))
+        visualizer["/Cameras/default"].set_transform(translation_matrix(center))
+        lens = visualizer["/Cameras/default/rotated/<object>"]
+        x, y, z = (distance * back).tolist()
+        lens.set_property("position", [x, z, -y])
+        lens.set_property("fov", FIELD_OF_VIEW)
+        lens.set_property("near", distance / 500)
+        lens.set_property("far", distance * 100)
+        light = visualizer["/Lights/FillLight/<object>"]
+        light.set_property("position", (center + LIGHT).tolist())
+        light.set_property("intensity", 0.55)
+        visualizer["/Lights/AmbientLight/<object>"].set_property("intensity", 0.45)
+
+
+class Group(geometry.Object):  # type: ignore[misc]
+    """Objects that make one node of the tree, each with more of its attributes in three.js's object format."""
+
+    def __init__(self, *parts: tuple[geometry.Object, dict[str, Any]]) -> None:
+        geometry.SceneElement.__init__(self)
+        self.parts = parts
+
+    def lower(self) -> dict[str, Any]:
+        lowered = [part.lower() for part, _ in self.parts]
+        return {
+            "metadata": {"version": 4.5, "type": "Object"},
+            "geometries": _once(each for part in lowered for each in part["geometries"]),
+            "materials": _once(each for part in lowered for each in part["materials"]),
+            "object": {
+                "uuid": self.uuid,
+                "type": "Group",
+                "children": [
+                    _placed(part["object"], more) for part, (_, more) in zip(lowered, self.parts, strict=True)
+                ],
+            },
+        }
+
+
+def _placed(child: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
+    """meshcat gives every object a matrix, the identity for these, that would win over a position."""
+    return {key: value for key, value in child.items() if key != "matrix"} | more
+
+
+def _once(elements: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    return list({each["uuid"]: each for each in elements}.values())
+
+
+class _DotMaterial(geometry.GenericMaterial):  # type: ignore[misc]
+    _type = "PointsMaterial"
+
+
+class _Mesh(geometry.TriangularMeshGeometry):  # type: ignore[misc]
+    """meshcat's triangles, with normals."""
+
+    def __init__(self, vertices: Array, faces: NDArray[Any], normals: Array | None = None) -> None:
+        super().__init__(vertices, faces)
+        self.normals = normals
+
+    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
+        lowered: dict[str, Any] = super().lower(object_data)
+        if self.normals is not None:
+            lowered["data"]["attributes"]["normal"] = geometry.pack_numpy_array(self.normals.T)
+        return lowered
+
+
+def _skin(paint: int, flat: bool, **properties: Any) -> geometry.MeshPhongMaterial:
+    """Matt, and "transparent" even if opaque: three.js draws what is so called last, and in the order asked for."""
+    properties = {"color": paint, "transparent": True, "flatShading": flat, "specular": 0, "side": FRONT} | properties
+    return geometry.MeshPhongMaterial(**properties)
+
+
+def _lines(segments: Array) -> geometry.PointsGeometry:
+    """Segments (k, 2, 3), from and to."""
+    return _points(segments.reshape(-1, 3))
+
+
+def _points(points: Array) -> geometry.PointsGeometry:
+    return geometry.PointsGeometry(np.ascontiguousarray(points.T, dtype=np.float32))
+
+
+def matrix(placed: Placed) -> Array:
+    """The pose as a 4 x 4 matrix."""
+    x, y, z, w = placed.orientation
+    pose: Array = quaternion_matrix([w, x, y, z])
+    pose[:3, 3] = placed.position
+    return pose
+
+
+def rgb(color: Sequence[float] | Array) -> int:
+    """Red, green and blue in 0..1 as three.js's one number."""
+    red, green, blue = (round(255 * min(max(part, 0.0), 1.0)) for part in color[:3])
+    return red << 16 | green << 8 | blue

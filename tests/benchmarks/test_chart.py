@@ -1,0 +1,213 @@
+"""The chart of speed: its truths, its peers, and that a wrong volume of ours ends it while one of a peer is shown."""
+
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import exact
+import families
+import numpy as np
+import pytest
+from strategies import directions
+
+from overlapper import HalfSpace, Hull, Placed, Sphere, overlap, penetration_depth
+from overlapper.cli import app as cli
+
+ROOT = Path(__file__).parents[2]
+
+import chart  # noqa: E402
+import interleaved  # noqa: E402
+import paper_claims  # noqa: E402
+import speed_figures  # noqa: E402
+import speed_page  # noqa: E402
+import timed_peers  # noqa: E402
+import truth  # noqa: E402
+import workloads  # noqa: E402
+
+
+def row(family, name, setting=""):
+    pairs = workloads.pairs_of(family)
+    return interleaved.Row(family, len(pairs), name, setting, timed_peers.METHODS[name].quantity), pairs
+
+
+def test_the_sum_over_parts_is_the_exact_volume():
+    a, b = families.icosphere(1) * 1.25, families.icosphere(1) + [0.5, 0.25, 0.125]
+    assert len(truth.polytope(a).facets) == 80
+    assert truth.SMALL < 80 * 80
+    assert truth.common_volume(a, b) == exact.common(exact.hull(a), exact.hull(b)).volume
+
+
+def test_triangles_of_qhull_are_not_taken_unless_they_are_those_of_a_convex_surface():
+    cloud = [exact.point(p) for p in families.CORNERS]
+    triangles = {ring: exact.plane_through(*ring) for ring in truth.exact.first_simplex(cloud[:3] + cloud[4:5])}
+    assert not truth.is_convex(triangles, cloud)
+    assert truth.polytope(families.CORNERS).volume == 8
+
+
+def test_the_depth_is_that_of_the_exact_difference():
+    for seed in range(4):
+        a, b = families.make("general", seed).bodies
+        square = exact.depth_squared(exact.hull(a), exact.hull(b))
+        assert abs(truth.depth(a, b) ** 2 - square) < Fraction(1, 10**35)
+    assert truth.depth(families.CORNERS, families.CORNERS + 3) == 0
+
+
+@pytest.mark.parametrize(
+    "family", ["balls", "ball on ground", "ball at box corner", "crossing cylinders", "cylinder wedge"]
+)
+def test_round_shapes_have_the_volume_and_depth_of_their_closed_forms(family):
+    for pair in workloads.pairs_of(family)[:2]:
+        found = overlap(*pair.bodies)
+        assert abs(Fraction(found.volume) - pair.volume) <= found.volume_error < 1e-2 * found.volume
+        if pair.depth is not None:
+            assert penetration_depth(*pair.bodies) == pytest.approx(float(pair.depth), rel=1e-12)
+
+
+def test_points_are_counted_inside_of_every_kind_of_shape():
+    rng = np.random.default_rng(0)
+    for family in ("balls", "ball on ground", "crossing cylinders", "tetra"):
+        pair = workloads.pairs_of(family)[0]
+        lower, upper = timed_peers.box_of_both(pair)
+        where = lower[:, None] + (upper - lower)[:, None] * rng.random((3, 20))
+        for body in pair.bodies:
+            kept = timed_peers.inside_test(body)(where)
+            speck = Sphere(1e-9)
+            assert kept.shape[1] == sum(bool(overlap(Placed(speck, point), body)) for point in where.T)
+
+
+def test_estimates_come_near_with_samples_and_pitch():
+    pair = workloads.pairs_of("box deep")[0]
+    for name, setting in (("Monte Carlo", 100_000), ("voxels", 32)):
+        found = timed_peers.METHODS[name].prepare(pair, setting)()
+        assert found == pytest.approx(float(pair.volume), rel=2e-2)
+
+
+@pytest.mark.parametrize("name", ["auto", "auto, batch", "auto, warm batch", "paper", "clipping", "scipy"])
+def test_exact_methods_are_exact_on_a_family_of_polyhedra(name):
+    line, pairs = row("tetra", name)
+    setting = timed_peers.METHODS[name].settings[0]
+    assert float(interleaved.prepared(line, pairs[:3], setting).row.error) < 1e-9
+
+
+def test_a_peer_that_cannot_be_asked_says_why():
+    slanted = workloads.Pair(Placed(Sphere(1)), Placed(HalfSpace([1, 1, 1], 0)), Fraction(1))
+    with pytest.raises(timed_peers.Unfit, match="slanted"):
+        timed_peers.ground_as_box(slanted.b)
+    with pytest.raises(timed_peers.Unfit, match="round"):
+        timed_peers.clipping(slanted, None)
+
+
+def test_a_wrong_volume_of_ours_is_noticed():
+    pairs = workloads.pairs_of("box deep")[:1]
+    interleaved.check_ours("box deep", pairs)
+    pairs[0].__dict__["volume"] = pairs[0].volume * (1 + Fraction(1, 10**11))
+    with pytest.raises(interleaved.Wrong, match=r"box deep 0: .* truly"):
+        interleaved.check_ours("box deep", pairs)
+
+
+def test_a_wrong_volume_of_ours_ends_the_run_and_what_was_measured_is_kept(tmp_path, monkeypatch, capsys):
+    def rows_of(family, pairs, methods, seconds):
+        if family == "tetra":
+            raise interleaved.Wrong("tetra 3: 1.0, truly 2.0")
+        return [interleaved.Row(family, len(pairs), "auto", "", "volume", us="1.5", error="0.00e+00")]
+
+    monkeypatch.setattr(chart, "rows_of", rows_of)
+    monkeypatch.setattr(sys, "argv", ["chart.py", "--family=box deep", "--family=tetra", f"--out={tmp_path}"])
+    with pytest.raises(SystemExit) as ended:
+        chart.main()
+    assert ended.value.code == 1
+    assert capsys.readouterr().err.endswith("overlapper: wrong: tetra 3: 1.0, truly 2.0\n")
+    assert [row.family for row in chart.read(tmp_path / "speed.csv", interleaved.Row)[1]] == ["box deep"]
+
+
+def test_a_wrong_volume_of_a_peer_is_its_error():
+    line, pairs = row("box deep", "paper")
+    pairs[0].__dict__["volume"] = pairs[0].volume * 2
+    assert interleaved.prepared(line, pairs, None).row.error == "5.00e-01"
+
+
+def test_missing_slow_and_failing_peers_are_named(monkeypatch):
+    def is_not_installed(pair, setting):
+        import a_package_that_nobody_has  # noqa: F401
+
+    def raises(pair, setting):
+        raise ZeroDivisionError
+
+    for name, prepare in (("missing", is_not_installed), ("failing", raises)):
+        monkeypatch.setitem(timed_peers.METHODS, name, timed_peers.Method(prepare))
+    sent = []
+    pipe = type("Pipe", (), {"send": staticmethod(sent.append)})
+    pairs = workloads.pairs_of("box deep")[:1]
+    ended = {("paper", None): "crash SIGABRT"}
+    entries, rows = interleaved.first_answers(pipe, "box deep", pairs, ["missing", "failing", "paper", "auto"], ended)
+    notes = [row.note for row in rows if row.note]
+    assert notes == ["missing: a_package_that_nobody_has", "raises ZeroDivisionError", "crash SIGABRT"]
+    assert [entry.row.method for entry in entries] == ["auto"] * 3
+
+
+def test_the_command_writes_results_page_and_charts(tmp_path):
+    methods = ["auto", "auto, batch", "paper", "manifold3d"]
+    command = [sys.executable, "-m", "overlapper", "chart", "--family=box deep", "--seconds=0.01", f"--out={tmp_path}"]
+    command += [f"--method={name}" for name in methods]
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
+    notes, rows = chart.read(tmp_path / "speed.csv", interleaved.Row)
+    assert "overlapper" in notes[0]
+    assert {row.method for row in rows} == set(methods)
+    assert all(row.us or row.note.startswith("missing: ") for row in rows)
+    assert all(float(row.us) > 0 and float(row.error) < 1e-12 for row in rows if row.method.startswith("auto"))
+    page = (tmp_path / "speed.md").read_text(encoding="utf-8")
+    assert "speed_families.png" in page
+    hover = (tmp_path / "speed.html").read_text(encoding="utf-8")
+    assert 'data-words="box deep: auto at 0.001' in hover
+    assert "src=" not in hover and "@import" not in hover
+    written = {path.name for path in tmp_path.iterdir()}
+    assert {"speed.png", "speed.svg", "speed_families.png", "speed_families.svg"} <= written
+
+
+def test_time_over_size_names_its_power(tmp_path):
+    times = {80: 1.0, 320: 4.0, 1280: 32.0, 5120: 256.0}
+    rows = [interleaved.Row(f"i{n} deep", 1, "auto", "0.001", "volume", us=str(us)) for n, us in times.items()]
+    rows += [interleaved.Row("i80 shallow", 1, "paper", "", "volume", us="3")]
+    deep, shallow = (speed_page.sizes(rows, way) for way in ("deep", "shallow"))
+    assert deep.powers["auto"] == pytest.approx(1.5)
+    assert shallow.powers == {}
+    speed_figures.growth([deep, shallow], tmp_path / "sizes.png")
+    assert "auto, 1.50" in (tmp_path / "sizes.svg").read_text(encoding="utf-8")
+
+
+def test_one_hull_and_the_tree_find_what_many_bodies_share():
+    rng = np.random.default_rng(0)
+    clouds = [directions(rng, 12) + 0.2 * directions(rng, 1) for _ in range(5)]
+    volume = float(exact.common(*map(exact.hull, clouds)).volume)
+    bodies = [Placed(Hull(cloud)) for cloud in clouds]
+    walls, at = [timed_peers.planes(body) for body in bodies], paper_claims.middle(*bodies)
+    assert paper_claims.by_one_hull(walls, at) == pytest.approx(volume, rel=1e-9)
+    assert paper_claims.by_tree(walls, at) == pytest.approx(volume, rel=1e-9)
+
+
+def test_the_page_says_what_the_committed_results_say():
+    (path,) = (ROOT / "benchmarks" / "results").glob("*/speed.csv")
+    results = speed_page.Results(str(path.parent.relative_to(ROOT)), *chart.results_in(path.parent))
+    assert len(results.rows) > 100
+    assert {row.method for row in results.rows} == set(timed_peers.METHODS)
+    assert (ROOT / "docs" / "speed.md").read_text(encoding="utf-8") == speed_page.text(results)
+
+
+def test_the_page_says_what_the_claims_come_to():
+    def claim(kind, way, vertices, bodies, us):
+        return paper_claims.Claim(kind, way, vertices, bodies, f"{us:g}", "0.00e+00")
+
+    ways = {"paper": 1.0, "auto": 1.0, "cutting": 2.0, "duality": 1.0}
+    claims = [claim("pair", way, n, 2, n**power) for way, power in ways.items() for n in (50, 100, 200)]
+    claims += [claim("bodies", way, 32, m, m) for way in ("paper", "auto", "one hull", "tree") for m in (8, 16, 32)]
+    claims += [claim("cores", way, 32, 8, us) for way, us in (("1 cores", 3000), ("2 cores", 2000))]
+    said = speed_page.claims_text(claims, speed_page.of_pairs(claims), speed_page.of_groups(claims))
+    assert "grows with the power of 2.00" in said.replace("\n", " ")
+    assert "| 8 bodies of 32 vertices | 3 ms | 2 ms | 1.50 |" in said
+
+
+def test_without_a_checkout_the_command_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(cli, "__file__", str(tmp_path / "overlapper" / "cli" / "app.py"))
+    with pytest.raises(cli.Refused, match="chart needs a checkout"):
+        cli.chart()

@@ -1,0 +1,452 @@
+"""The command line: a table for people, JSON for programs, one sentence and exit code 2 for what the user can mend."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from overlapper.scenes.table_file import read_csv, read_table
+
+TWO_CUBES = '''
+"""A cube rests 2 cm deep in another."""
+import pybullet as p
+
+STEPS = 8
+PAIRS = "all"  # a filter keeps them where they are
+
+
+def build(client):
+    cube = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
+    p.createMultiBody(0, cube, physicsClientId=client)
+    upper = p.createMultiBody(1, cube, basePosition=[0, 0, 0.08], physicsClientId=client)
+    p.setCollisionFilterPair(0, upper, -1, -1, 0, physicsClientId=client)
+    print("a scene may talk")
+
+    def step(i):
+        assert i < STEPS, "no more"
+
+    return step
+'''
+
+BENT = """
+import pybullet as p
+STEPS = 2
+
+
+def build(client):
+    cube = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
+    p.createMultiBody(0, cube, physicsClientId=client)
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    bent = p.createCollisionShape(
+        p.GEOM_MESH, vertices=corners, indices=[0, 1, 2, 0, 2, 3], physicsClientId=client
+    )
+    p.createMultiBody(0, bent, physicsClientId=client)
+"""
+
+FAILS_LATE = TWO_CUBES.replace("i < STEPS", "i < 5")
+
+
+@pytest.fixture(autouse=True)
+def scene_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "two_cubes.py").write_text(TWO_CUBES)
+
+
+def overlapper(*arguments):
+    return subprocess.run([sys.executable, "-m", "overlapper", *arguments], capture_output=True, text=True, timeout=60)
+
+
+def refusal(*arguments):
+    """The sentence on stderr of a command that must fail with exit code 2 and nothing on stdout."""
+    done = overlapper(*arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    return done.stderr.removeprefix("a scene may talk\n")
+
+
+def test_the_version_is_that_of_the_package():
+    assert re.fullmatch(r"overlapper \d+\.\d+\.\d+\n", overlapper("--version").stdout)
+
+
+def test_help_shows_examples_and_is_what_a_bare_command_says():
+    assert "overlapper run franka_grasp" in overlapper().stdout
+    assert "--html my_scene.html" in overlapper("run", "--help").stdout
+
+
+def test_scenes_are_listed_with_what_happens_in_them():
+    assert re.search(r"^box_pile +Two hundred boxes", overlapper("scenes").stdout, re.MULTILINE)
+
+
+def test_a_scene_that_is_no_python_is_listed_as_such(tmp_path):
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "half.py").write_text("def build(")
+    assert re.search(r"^half +\(not a Python file\)$", overlapper("scenes").stdout, re.MULTILINE)
+
+
+def test_what_is_not_modelled_is_named_below_the_table(tmp_path):
+    (tmp_path / "bent.py").write_text(BENT)
+    done = overlapper("run", "bent.py")
+    assert done.returncode == 0
+    assert "Nothing overlaps in 2 steps." in done.stdout
+    assert "2 bodies, 1 of 2 shapes read" in done.stdout
+    assert re.search(r"^Not modelled: body 1/.*concave", done.stdout, re.MULTILINE)
+    assert done.stderr == ""
+
+
+CROSSES = '''
+"""Two crosses of three bars, 0.2 apart: in each, all bars lie over the middle."""
+import pybullet as p
+
+STEPS = 2
+PAIRS = "all"  # a filter keeps them where they are
+
+
+def build(client):
+    bars = [[0.3, 0.1, 0.1], [0.1, 0.3, 0.1], [0.1, 0.1, 0.3]]
+    for x in (0.0, 0.2):
+        cross = p.createCollisionShapeArray(
+            [p.GEOM_BOX] * 3, halfExtents=bars, collisionFramePositions=[[0, 0, 0]] * 3, physicsClientId=client
+        )
+        p.createMultiBody(x, cross, basePosition=[x, 0, 0], physicsClientId=client)
+    p.setCollisionFilterPair(0, 1, -1, -1, 0, physicsClientId=client)
+'''
+
+
+FILTERED = '''"""Two cubes that a pair filter keeps apart, and a third."""
+import pybullet as p
+STEPS = 1
+def build(client):
+    cube = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.5] * 3, physicsClientId=client)
+    for x in (0, 0.9, 1.8):
+        p.createMultiBody(1, cube, basePosition=[x, 0, 0], physicsClientId=client)
+    p.setCollisionFilterPair(0, 1, -1, -1, 0, physicsClientId=client)
+'''
+
+
+def test_pairs_are_those_that_the_scene_lets_collide_or_all(tmp_path):
+    (tmp_path / "filtered.py").write_text(FILTERED)
+    for options, count in (((), 1), (("--pairs", "all"), 2)):
+        answer = json.loads(overlapper("run", "filtered.py", "--json", *options).stdout)
+        assert len(answer["pairs"]) == answer["report"]["pairs_overlapping"] == count
+
+
+def test_links_as_a_whole_are_measured_where_their_shapes_overlap_each_other(tmp_path):
+    (tmp_path / "crosses.py").write_text(CROSSES)
+    done = overlapper("run", "crosses.py", "--json", "--out", "shapes.csv")
+    (pair,) = json.loads(done.stdout)["pairs"]
+    # Each middle lies in an arm of the other.
+    assert pair["largest_volume_m3"] == pytest.approx(2 * 0.2**3, rel=1e-6)
+    assert pair["volume_error_m3"] < 1e-12
+    overlapper("run", "crosses.py", "--per", "link", "--out", "links.csv")
+    shapes, links = (read_csv(tmp_path / name) for name in ("shapes.csv", "links.csv"))
+    assert [row["step"] for row in links] == [1, 2]
+    for row in links:
+        assert row["shapeA"] is row["shapeB"] is row["area_m2"] is None
+        assert (row["nameA"], row["nameB"], row["status"]) == ("body 0/link0", "body 1/link0", "overlapping")
+        assert row["volume_m3"] == pytest.approx(2 * 0.2**3, rel=1e-6)
+        step = [each for each in shapes if each["step"] == row["step"]]
+        assert sum(each["volume_m3"] for each in step) > 1.4 * row["volume_m3"]
+        assert row["depth_m"] == max(each["depth_m"] for each in step)
+
+
+CUP = '''
+"""A ball lies a centimetre deep in an open box that is one concave mesh."""
+import pybullet as p
+
+STEPS = 1
+PAIRS = "all"  # a filter keeps them where they are
+
+
+def build(client):
+    corners = [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    corners += [[x, y, z] for x in (-0.8, 0.8) for y in (-0.8, 0.8) for z in (-0.8, 1)]
+    bottom, well = [0, 2, 6, 4], [8, 12, 14, 10]
+    walls = [[0, 4, 5, 1], [4, 6, 7, 5], [6, 2, 3, 7], [2, 0, 1, 3]]
+    inside = [[8, 9, 13, 12], [12, 13, 15, 14], [14, 15, 11, 10], [10, 11, 9, 8]]
+    rim = [[1, 5, 13, 9], [5, 7, 15, 13], [7, 3, 11, 15], [3, 1, 9, 11]]
+    quads = [bottom, well, *walls, *inside, *rim]
+    indices = [corner for a, b, c, d in quads for corner in (a, b, c, a, c, d)]
+    cup = p.createCollisionShape(
+        p.GEOM_MESH, vertices=corners, indices=indices, meshScale=[0.1] * 3, physicsClientId=client
+    )
+    p.createMultiBody(0, cup, physicsClientId=client)
+    ball = p.createCollisionShape(p.GEOM_SPHERE, radius=0.03, physicsClientId=client)
+    p.createMultiBody(1, ball, basePosition=[0, 0, -0.06], physicsClientId=client)
+    p.setCollisionFilterPair(0, 1, -1, -1, 0, physicsClientId=client)
+    p.setGravity(0, 0, 0, physicsClientId=client)
+'''
+
+
+def test_a_concave_mesh_is_named_with_its_parts_and_where_they_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "cup.py").write_text(CUP)
+    first, second = (overlapper("run", "cup.py") for _ in range(2))
+    assert first.stdout == second.stdout
+    assert "CoACD decomposes a mesh of 28 triangles, once" in first.stderr and second.stderr == ""
+    words = (
+        r"^Concave: body 0/link0 is (\d+) convex parts of (\S+) m³ together, the mesh bounds (\S+) m³; kept in (.*)\.$"
+    )
+    parts, volume, mesh, path = re.search(words, first.stdout, re.MULTILINE).groups()
+    assert int(parts) >= 5
+    assert float(mesh) == pytest.approx(8e-3 - 0.16**2 * 0.18, rel=1e-3)
+    assert float(volume) == pytest.approx(float(mesh), rel=0.05)
+    assert (tmp_path / "cache") in Path(path).parents and Path(path).is_file()
+    (pair,) = json.loads(overlapper("run", "cup.py", "--json").stdout)["pairs"]
+    cap = 3.14159 * 0.01**2 * (0.09 - 0.01) / 3  # of a ball of 3 cm, 1 cm high
+    assert pair["largest_volume_m3"] == pytest.approx(cap, rel=0.05)
+    skipped = overlapper("run", "cup.py", "--concave", "skip")
+    assert "Not modelled: body 0/link0, a concave mesh is left out" in skipped.stdout
+
+
+def test_a_threshold_out_of_range_is_refused():
+    assert refusal("run", "two_cubes.py", "--concave-threshold", "2") == (
+        "overlapper: --concave-threshold must lie between 0.01 and 1, not 2.0\n"
+    )
+
+
+def test_a_run_prints_a_table_of_pairs_with_units():
+    done = overlapper("run", "two_cubes.py")
+    assert done.returncode == 0
+    lines = done.stdout.splitlines()
+    quantities, units, _, first, second = lines[next(k for k, line in enumerate(lines) if "volume" in line) :][:5]
+    assert quantities.split() == ["volume", "±", "depth", "normal", "at"]
+    assert units.split() == ["pair", "of", "links", "steps", "cm³", "cm³", "mm", "x,", "y,", "z", "step"]
+    assert first.split()[:2] == ["body", "0/link0"]
+    assert second.split() == ["body", "1/link0"]
+    steps, volume, _, depth, *normal, _ = first.split()[2:]
+    assert (steps, volume, depth, normal) == ("8", "200", "20", ["+0.00", "+0.00", "-1.00"])
+    assert "2 of 2 shapes read" in done.stdout
+    assert done.stderr == "a scene may talk\n"
+
+
+def test_json_is_all_there_is_on_stdout():
+    done = overlapper("run", "two_cubes.py", "--steps", "3", "--json", "--check", "fcl", "--out", "two.csv")
+    summary = json.loads(done.stdout)
+    (pair,) = summary["pairs"]
+    assert pair["links"] == {"bodyA": 0, "linkA": -1, "bodyB": 1, "linkB": -1}
+    assert pair["steps_overlapping"] == 3
+    assert pair["largest_volume_m3"] == pytest.approx(2e-4)
+    assert pair["largest_depth_m"] == pytest.approx(0.02)
+    assert pair["normal"] == pytest.approx([0, 0, -1])
+    assert summary["report"]["pairs_examined"] == 3
+    assert summary["fcl"] == {"agree": 3}
+    assert summary["out"] == "two.csv"
+
+
+def test_a_run_writes_its_table_and_its_recording():
+    done = overlapper("run", "two_cubes.py", "--out", "made/two.csv", "--html", "made/two.html", "--check", "fcl")
+    assert done.returncode == 0
+    rows = read_csv(Path("made/two.csv"))
+    assert [row["step"] for row in rows] == list(range(1, 9))
+    assert all(row["volume_m3"] == pytest.approx(2e-4) and row["fcl"] == "agree" for row in rows)
+    with open("made/two.html", encoding="utf-8") as page:
+        assert page.read(100).lstrip().lower().startswith("<!doctype html>")
+    assert "FCL on 8 pairs that overlap or touch: 8 agree." in done.stdout
+    assert "made/two.csv" in done.stdout and "made/two.html" in done.stdout
+
+
+@pytest.mark.parametrize("method", ["auto", "paper"])
+def test_both_methods_find_the_same_overlap(method):
+    summary = json.loads(overlapper("run", "two_cubes.py", "--steps", "1", "--method", method, "--json").stdout)
+    assert summary["method"] == method
+    assert summary["pairs"][0]["largest_volume_m3"] == pytest.approx(2e-4)
+
+
+def test_an_unknown_scene_is_refused_with_the_nearest():
+    assert re.fullmatch(
+        r"overlapper: there is no scene 'box_pil'; the nearest is 'box_pile' \(known scenes: .*\)\n",
+        refusal("run", "box_pil"),
+    )
+
+
+def test_a_broken_scene_is_refused_with_what_pybullet_said_of_it(tmp_path):
+    (tmp_path / "broken.py").write_text(
+        "import pybullet as p\nSTEPS = 1\ndef build(c):\n  p.loadURDF('no.urdf', physicsClientId=c)"
+    )
+    assert refusal("run", "broken.py") == (
+        "overlapper: the scene broken.py cannot be built at line 4: error: Cannot load URDF file. "
+        "(URDF file 'no.urdf' not found)\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--steps", "0"], "'--steps'"),
+        (["--steps", "many"], "'--steps'"),
+        (["--method", "guess"], "'auto', 'paper'"),
+        (["--check", "gut"], "'fcl'"),
+        (["--tolerance", "0"], "--tolerance must lie between 0 and 1, not 0.0"),
+        (["--tolerance", "nan"], "--tolerance must lie between 0 and 1, not nan"),
+        (["--out", "two.txt"], "--out must end in .csv, .parquet, .sqlite, not 'two.txt'"),
+        (["--out", "two_cubes.py/two.csv"], "cannot write two_cubes.py"),
+        (["--html", "."], "cannot write ."),
+        (["--colour"], "--colour"),
+    ],
+)
+def test_a_bad_option_is_refused_in_one_sentence(arguments, words):
+    sentence = refusal("run", "two_cubes.py", *arguments)
+    assert sentence.startswith("overlapper: ")
+    assert words in sentence
+    assert sentence.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments", "extra"),
+    [
+        ("typer", [], "cli"),
+        ("rich", [], "cli"),
+        ("pybullet", [], "sim"),
+        ("fcl", ["--check", "fcl"], "check"),
+        ("meshcat", ["--html", "two.html"], "view"),
+        ("pyarrow", ["--out", "two.parquet"], "cli"),
+    ],
+)
+def test_a_missing_extra_is_named(module, arguments, extra):
+    program = f"""
+import importlib.util, sys
+found = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *rest: None if name == {module!r} else found(name, *rest)
+sys.modules[{module!r}] = None
+sys.argv = ["overlapper", "run", "two_cubes.py", *{arguments!r}]
+from overlapper.cli import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("overlapper: ")
+    assert f"pip install 'overlapper[{extra}]'\n" in done.stderr
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
+def test_rows_before_a_failure_are_on_disk(tmp_path, ending):
+    (tmp_path / "fails.py").write_text(FAILS_LATE)
+    sentence = refusal("run", "fails.py", "--out", f"fails.{ending}", "--html", "fails.html")
+    assert "fails before step 6 at line 17: AssertionError: no more" in sentence
+    assert [row["step"] for row in read_table(tmp_path / f"fails.{ending}")] == [1, 2, 3, 4, 5]
+    assert (tmp_path / "fails.html").stat().st_size > 0
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
+def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
+    (tmp_path / "long.py").write_text(TWO_CUBES.replace("STEPS = 8", "STEPS = 1_000_000"))
+    command = [sys.executable, "-m", "overlapper", "run", "long.py", "--out", f"long.{ending}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "a scene may talk\n"
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=30)
+    assert process.returncode == 130
+    steps = [row["step"] for row in read_table(tmp_path / f"long.{ending}")]
+    assert steps == list(range(1, len(steps) + 1))
+    said = re.search(r"Interrupted after step (\d+)", output)
+    assert said is not None
+    assert len(steps) - int(said[1]) in (0, 1)
+
+
+def checked(*arguments):
+    """Exit code, stdout and stderr of `overlapper check`."""
+    done = overlapper("check", *arguments)
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.fixture
+def two_scenes(tmp_path):
+    """A folder of scenes that are as recorded."""
+    (tmp_path / "guarded" / "deeper").mkdir(parents=True)
+    for path in ("one.py", "deeper/two.py"):
+        (tmp_path / "guarded" / path).write_text(TWO_CUBES)
+    (tmp_path / "guarded" / "no_scene.py").write_text("STEPS = 8")
+    assert checked("guarded", "--record")[0] == 0
+    return tmp_path / "guarded"
+
+
+def test_scenes_as_recorded_are_checked_with_exit_code_0(two_scenes):
+    code, said, complaints = checked("guarded")
+    assert (code, complaints.replace("a scene may talk\n", "")) == (0, "")
+    assert said == "guarded/deeper/two.py: as recorded\nguarded/one.py: as recorded\n"
+
+
+def test_a_scene_that_has_moved_is_told_with_exit_code_1(two_scenes):
+    (two_scenes / "one.py").write_text(TWO_CUBES.replace("[0, 0, 0.08]", "[0, 0, 0.07]"))
+    code, said, _ = checked("guarded", "--out", "pages")
+    assert code == 1
+    assert said.startswith("guarded/deeper/two.py: as recorded\nguarded/one.py: moved\n    geometry  as recorded")
+    assert "    dynamics  4 moved" in said
+    assert "off by 0.01 where 0.0001 is allowed, 100 times its budget" in said
+    assert "before and after: pages/one.moved.html" in said
+    assert [path.name for path in Path("pages").iterdir()] == ["one.moved.html"]
+
+
+def test_a_new_scene_is_written_with_exit_code_1_once(two_scenes):
+    (two_scenes / "three.py").write_text(TWO_CUBES)
+    assert checked("guarded/three.py")[:2] == (
+        1,
+        "guarded/three.py: new\n    written: guarded/expected/three.csv\n"
+        "    look at it, commit it, and the scene is guarded from now on\n",
+    )
+    assert checked("guarded/three.py")[0] == 0
+
+
+def test_scenes_that_cannot_be_run_are_told_with_exit_code_2_after_all_others(two_scenes):
+    (two_scenes / "deeper" / "two.py").write_text(FAILS_LATE)
+    (two_scenes / "one.py").write_text(TWO_CUBES.replace("[0, 0, 0.08]", "[0, 0, 0.07]"))
+    code, said, complaints = checked("guarded")
+    assert code == 2
+    assert "guarded/one.py: moved" in said
+    assert "overlapper: the scene guarded/deeper/two.py fails before step 6 at line 17: AssertionError" in complaints
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda folder: folder / "nowhere", "there is no scene file"),
+        (lambda folder: folder / "expected", "there is no scene in"),
+        (lambda folder: (folder / "expected" / "one.csv").write_text("# steps") and folder, "must say `# steps"),
+    ],
+)
+def test_what_cannot_be_checked_is_refused(two_scenes, spoil, words):
+    code, _, complaints = checked(str(spoil(two_scenes)))
+    assert code == 2
+    assert words in complaints
+
+
+def test_tables_are_compared(two_scenes):
+    def diff(*tables):
+        done = overlapper("diff", *tables)
+        return done.returncode, done.stdout + done.stderr
+
+    overlapper("run", "two_cubes.py", "--out", "before.csv")
+    overlapper("run", "two_cubes.py", "--out", "same.sqlite")
+    Path("two_cubes.py").write_text(TWO_CUBES.replace("[0, 0, 0.08]", "[0, 0, 0.07]"))
+    overlapper("run", "two_cubes.py", "--out", "after.csv")
+    assert diff("before.csv", "same.sqlite") == (0, "poses     the same\noverlaps  the same\n")
+    code, said = diff("before.csv", "after.csv")
+    assert code == 1
+    assert "poses     8 moved" in said
+    assert "step 8, 0/-1/0 and 1/-1/0: volume_m3 is 0.0003, recorded as 0.0002: off by 0.0001" in said
+    assert diff("before.csv", "nowhere.csv") == (2, "overlapper: [Errno 2] No such file or directory: 'nowhere.csv'\n")
+    assert diff("two_cubes.py", "after.csv")[0] == 2
+
+
+def test_a_bar_is_drawn_on_a_terminal_only(tmp_path):
+    assert "two_cubes" not in overlapper("run", "two_cubes.py", "--json").stderr
+    pty = pytest.importorskip("pty")
+    mine, theirs = pty.openpty()
+    command = [sys.executable, "-m", "overlapper", "run", "two_cubes.py", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=theirs, env=os.environ | {"TERM": "xterm"}):
+        os.close(theirs)
+        seen = b""
+        try:
+            while part := os.read(mine, 4096):
+                seen += part
+        except OSError:  # Linux's way to say that the other end is closed
+            pass
+    os.close(mine)
+    assert b"two_cubes" in seen

@@ -1,0 +1,140 @@
+"""Mesh files, and the command for people who have polytopes and no simulator."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from overlapper import Hull, overlap, random_polytope, read_hull, write_mesh, write_polytopes
+from overlapper.polytopes.mesh_file import NotConvexWarning
+
+CUBE = np.array(np.meshgrid([0, 1], [0, 1], [0, 1.0])).reshape(3, 8).T
+L_SHAPE = """
+v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 1\nv 2 0 1\nv 2 1 1\nv 1 1 1\nv 1 2 1\nv 0 2 1
+f 4 3 2 1\nf 6 5 4 1\nf 7 8 9 10\nf 7 10 11 12
+f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12
+"""
+
+
+def without_a_facet(obj):
+    """The text of a mesh file less its last face."""
+    return "\n".join(obj.strip().splitlines()[:-1])
+
+
+# Mesh files
+
+
+@pytest.mark.parametrize(("ending", "error"), [("obj", 1e-15), ("stl", 1e-6), ("ply", 1e-6)])
+def test_a_written_mesh_is_closed_convex_and_read_as_it_was(tmp_path, ending, error):
+    hull = random_polytope(30, rng=2)
+    path = tmp_path / f"hull.{ending}"
+    write_mesh(path, hull)
+    found = read_hull(path)  # without a warning, which would fail the test
+    assert len(found.vertices) == len(hull.vertices)
+    assert found.volume == pytest.approx(hull.volume, rel=error)
+
+
+def test_what_bodies_share_is_written_with_its_facets_whole(tmp_path):
+    common = overlap(CUBE, CUBE + [0.5, 0.25, 0])
+    write_mesh(tmp_path / "common.obj", common)
+    found = read_hull(tmp_path / "common.obj")
+    assert_allclose(np.sort(found.vertices, axis=0), np.sort(common.vertices, axis=0), rtol=0, atol=1e-16)
+    assert len(found.facets) == 6
+
+
+def test_a_mesh_that_is_less_than_its_hull_is_told(tmp_path):
+    path = tmp_path / "shape.obj"
+    path.write_text(L_SHAPE)
+    with pytest.warns(NotConvexWarning, match=r"shape.obj is not convex: it fills 85\.7% of its convex hull"):
+        assert read_hull(path).volume == pytest.approx(3.5)
+    path.write_text(without_a_facet(L_SHAPE))
+    with pytest.warns(NotConvexWarning, match=r"shape.obj is not closed"):
+        assert read_hull(path).volume == pytest.approx(3.5)
+
+
+def test_what_is_no_mesh_is_refused(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        read_hull(tmp_path / "none.obj")
+    flat = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3"
+    for name, text in (("words.stl", "hello"), ("words.ply", "hello"), ("flat.obj", flat)):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(ValueError, match=f"{name} is not a mesh with a hull: "):
+            read_hull(tmp_path / name)
+
+
+def test_nothing_is_written_of_nothing(tmp_path):
+    with pytest.raises(ValueError, match="polytope is empty"):
+        write_mesh(tmp_path / "none.obj", overlap(CUBE, CUBE + 3))
+    with pytest.raises(ValueError, match=r"must end in \.obj, \.stl, \.ply, not 'cube\.step'"):
+        write_mesh(tmp_path / "cube.step", Hull(CUBE))
+    assert not (tmp_path / "none.obj").exists() and not (tmp_path / "cube.step").exists()
+
+
+# The command
+
+
+@pytest.fixture(autouse=True)
+def files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_mesh("one.stl", Hull(CUBE))
+    write_mesh("two.obj", Hull(CUBE + [0.5, 0.25, 0]))
+    write_mesh("far.ply", Hull(CUBE + [3, 0, 0]))
+    (tmp_path / "bent.obj").write_text(L_SHAPE)
+
+
+def intersect(*arguments):
+    command = [sys.executable, "-m", "overlapper", "intersect", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+
+
+def test_two_mesh_files_share_a_volume_and_a_mesh():
+    done = intersect("one.stl", "two.obj", "--out", "common.stl")
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
+    assert lines["status"] == "overlapping" and lines["depth"] == "0.5 m"
+    assert lines["volume"].startswith("0.375 ± ") and lines["volume"].endswith("e-14 m³")
+    assert lines["Written:"] == "common.stl"
+    assert read_hull("common.stl").volume == pytest.approx(0.375, rel=1e-6)
+
+
+def test_all_polytopes_of_a_database_and_of_files_meet_in_one():
+    write_polytopes("sqlite:///parts.db", [(i, CUBE + [0, 0, 0.125 * i]) for i in range(3)])
+    done = intersect("sqlite:///parts.db", "one.stl", "two.obj", "--json")
+    facts = json.loads(done.stdout)
+    assert facts["polytopes"] == 5 and facts["depth"] is None
+    assert abs(facts["volume"] - 0.375 * 0.75) <= facts["volume_error"] < 1e-13
+    query = "SELECT polytope_id, x, y, z FROM vertices WHERE polytope_id > 0 ORDER BY 1, corner"
+    fewer = json.loads(intersect("sqlite:///parts.db", "--query", query, "--json").stdout)
+    assert fewer["polytopes"] == 2 and abs(fewer["volume"] - 0.875) <= fewer["volume_error"]
+
+
+def test_no_overlap_is_an_answer():
+    done = intersect("one.stl", "far.ply", "--out", "none.obj")
+    assert done.returncode == 0
+    assert "status    separated" in done.stdout and "distance  2 m" in done.stdout
+    assert "Not written, as nothing is in common: none.obj" in done.stdout
+
+
+def test_a_mesh_that_is_not_convex_is_named_beside_the_answer():
+    done = intersect("one.stl", "bent.obj", "--json")
+    assert json.loads(done.stdout)["volume"] == pytest.approx(1.0)
+    assert "bent.obj is not convex: it fills 85.7% of its convex hull" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["one.stl"], "at least two polytopes are needed, not 1"),
+        (["one.stl", "none.stl"], "none.stl: No such file or directory"),
+        (["one.stl", "two.obj", "--out", "no/folder.stl"], "no/folder.stl: No such file or directory"),
+        (["one.stl", "two.obj", "--out", "common.step"], "a mesh must end in .obj, .stl, .ply, not 'common.step'"),
+        (["sqlite:///none.db"], "there is no database none.db"),
+        (["sqlite://"], "the database says: no such table: polytopes"),
+    ],
+)
+def test_what_the_user_can_mend_is_one_sentence(arguments, sentence):
+    done = intersect(*arguments)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", f"overlapper: {sentence}\n")

@@ -1,0 +1,711 @@
+"""Convex shapes and the polytopes they share."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, overload
+
+import numpy
+import numpy.typing
+from numpy.typing import NDArray
+
+
+class Sphere:
+    """A ball of the given radius (m) about the origin."""
+
+    def __init__(self, radius: float) -> None: ...
+
+    @property
+    def radius(self) -> float:
+        """m"""
+
+    @property
+    def volume(self) -> float:
+        """Volume in m³; infinite for a half-space."""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """
+        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        """
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
+
+class Box:
+    """A box about the origin with half extents (m) along x, y, z."""
+
+    def __init__(self, half_extents: numpy.typing.ArrayLike) -> None: ...
+
+    @property
+    def half_extents(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(3,) m"""
+
+    @property
+    def volume(self) -> float:
+        """Volume in m³; infinite for a half-space."""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """
+        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        """
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
+
+class Capsule:
+    """
+    All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.
+
+    As in pybullet, `length` lies between the centres of the caps; it may be 0.
+    """
+
+    def __init__(self, radius: float, length: float) -> None: ...
+
+    @property
+    def radius(self) -> float:
+        """m"""
+
+    @property
+    def length(self) -> float:
+        """m, between the centres of the caps"""
+
+    @property
+    def volume(self) -> float:
+        """Volume in m³; infinite for a half-space."""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """
+        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        """
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
+
+class Cylinder:
+    """
+    A cylinder of `radius` (m) and `length` (m) along local z, about the origin.
+    """
+
+    def __init__(self, radius: float, length: float) -> None: ...
+
+    @property
+    def radius(self) -> float:
+        """m"""
+
+    @property
+    def length(self) -> float:
+        """m"""
+
+    @property
+    def volume(self) -> float:
+        """Volume in m³; infinite for a half-space."""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """
+        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        """
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
+
+class HalfSpace:
+    """
+    The closed half-space { x : normal · x <= offset }.
+
+    `normal` may have any length but 0. The half-space is what the two say as given, without rounding; the attributes
+    `normal` and `offset` are both divided by the length, which rounds.
+    """
+
+    def __init__(self, normal: numpy.typing.ArrayLike, offset: float) -> None: ...
+
+    @property
+    def normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(3,) unit, out of the solid"""
+
+    @property
+    def offset(self) -> float:
+        """m along the unit normal"""
+
+    @property
+    def given_normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(3,) as given, of any length"""
+
+    @property
+    def given_offset(self) -> float:
+        """As given, along the normal as given."""
+
+    @property
+    def volume(self) -> float:
+        """Volume in m³; infinite for a half-space."""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """
+        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        """
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
+
+class Hull:
+    """
+    The convex hull of (n, 3) points (m).
+
+    Interior, duplicate and coplanar points are welcome; coplanar triangles become one facet. Raises
+    ValueError for fewer than four points, for points that are not finite and for points in one plane.
+    """
+
+    def __init__(self, vertices: numpy.typing.ArrayLike) -> None: ...
+
+    @property
+    def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (n, 3) the corners only, m; without those that mere rounding lifts off a facet
+        """
+
+    @property
+    def facets(self) -> list[numpy.typing.NDArray[numpy.int32]]:
+        """
+        Indices of the vertices around each facet, counter-clockwise from outside.
+        """
+
+    @property
+    def halfspaces(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (k, 4) rows [n, b], one per facet: n · x + b <= 0 inside, n unit (scipy's form).
+        """
+
+    @property
+    def corners(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (n, 3) all corners of the hull of the points as given, without rounding, m
+        """
+
+    @property
+    def triangles(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, None), writable=False)]:
+        """
+        (k, 3) indices of the corners of its surface before coplanar triangles are merged, counter-clockwise from outside.
+        """
+
+    @property
+    def volume(self) -> float:
+        """Volume in m³; infinite for a half-space."""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """
+        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        """
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+    def __getstate__(self) -> tuple[object, ...]: ...
+
+    def __setstate__(self, state: tuple[object, ...]) -> None: ...
+
+class RoundedHull:
+    """
+    All points within `radius` (m) of the convex hull of (n, 3) points (m).
+
+    The Minkowski sum of the hull and a ball: what Bullet collides with where a convex mesh has a margin. ValueError as
+    for Hull and Sphere. Method "paper" does not take it, and it has no certificate.
+    """
+
+    def __init__(self, vertices: numpy.typing.ArrayLike, radius: float) -> None: ...
+
+    @property
+    def core(self) -> Hull:
+        """The hull that is rounded."""
+
+    @property
+    def radius(self) -> float:
+        """m"""
+
+    @property
+    def volume(self) -> float:
+        """Volume in m³; infinite for a half-space."""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """
+        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        """
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+    def __getstate__(self) -> tuple[object, ...]: ...
+
+    def __setstate__(self, state: tuple[object, ...]) -> None: ...
+
+class Placed:
+    """
+    A shape and where it is in the world.
+
+    position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0.
+    """
+
+    def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
+
+    @property
+    def shape(self) -> Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace: ...
+
+    @property
+    def position(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(3,) m"""
+
+    @property
+    def orientation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(4,) unit quaternion x, y, z, w"""
+
+    @property
+    def volume(self) -> float:
+        """m³; infinite for a half-space"""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(3,) in the world, m"""
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """(2, 3) lower and upper corner of the box around it in the world, m"""
+
+    def __repr__(self) -> str: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+class Overlap:
+    """
+    What two or more convex shapes share. True only if they overlap.
+
+    Immutable; each quantity is computed when first asked for. SI units, world coordinates. For smooth shapes the
+    polytope contains the common set and could shrink into it by the fraction `tolerance`.
+    """
+
+    @property
+    def status(self) -> Literal['separated', 'touching', 'overlapping']:
+        """
+        'touching' if rounding cannot tell whether the common set has an inside.
+        """
+
+    def __bool__(self) -> bool: ...
+
+    @property
+    def shapes(self) -> tuple[Placed, ...]:
+        """The bodies in the order given."""
+
+    @property
+    def tolerance(self) -> float: ...
+
+    @property
+    def method(self) -> Literal['auto', 'paper']: ...
+
+    @property
+    def facets_touched(self) -> int:
+        """How many planes of the shapes took part in the measures."""
+
+    @property
+    def volume(self) -> float:
+        """m³, the best estimate; 0 unless overlapping."""
+
+    @property
+    def volume_error(self) -> float:
+        """
+        m³, certified: the true volume is within volume ± volume_error.
+
+        For polyhedra it bounds the rounding: every plane moved by 16 half-ulps of the coordinates' magnitude, times the
+        area. For smooth shapes it is the share of the volume between an outer and an inner polytope, plus that; or that
+        alone where a formula gives the measures: balls and ends of capsules with each other; a ball, capsule or cylinder that
+        at most one plane of a half-space, box or hull cuts. A pair that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
+        difference from what 'auto' finds, plus the error of that. 0 if separated.
+        """
+
+    @property
+    def widened(self) -> bool:
+        """
+        True if double arithmetic could not place the volume within 1e-12 of itself, and it was computed again in wider
+        arithmetic from the shapes' own numbers, as were centroid, area, inertia and gradient.
+        """
+
+    @property
+    def area(self) -> float:
+        """m², of the surface of the common set; 0 unless overlapping."""
+
+    @property
+    def centroid(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """(3,) centre of the common volume, m; None unless overlapping."""
+
+    @property
+    def inertia(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (3, 3) inertia tensor about the centroid at unit density, world axes, m⁵ (trimesh's moment_inertia); zeros unless overlapping.
+        """
+
+    @property
+    def gradient(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (m, 6) d volume / d (translation, rotation vector about the body's own position) of each body, world axes: the area vector
+        of the facets that the body owns, and its moment. m² and m³; zeros unless overlapping.
+        """
+
+    @property
+    def vertices(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """(n, 3) corners of the common polytope, m; empty unless overlapping."""
+
+    @property
+    def faces(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, None), writable=False)]:
+        """
+        (k, 3) the facets as triangles, counter-clockwise from outside: indices into vertices.
+        """
+
+    @property
+    def facets(self) -> list[numpy.typing.NDArray[numpy.int32]]:
+        """
+        Indices of the vertices around each facet, counter-clockwise from outside.
+        """
+
+    @property
+    def halfspaces(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (f, 4) rows [n, b], one per facet: n · x + b <= 0 inside, n unit (scipy's form).
+        """
+
+    @property
+    def owner(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None,), writable=False)]:
+        """(f,) which of the shapes each facet belongs to."""
+
+    @property
+    def patch(self) -> list[numpy.typing.NDArray[numpy.float64]]:
+        """
+        Closed polygons (k, 3) along the ridges where the owner changes, the first point not repeated. For a pair they go
+        counter-clockwise around a's part of the surface; for more bodies, around the part of each.
+        """
+
+    @property
+    def bounds(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (2, 3) lower and upper corner of the box around the common polytope; None unless overlapping.
+        """
+
+    @property
+    def normal(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (3,) unit, from b to a as pybullet's contactNormalOnB: moving a by depth * normal separates an overlapping
+        pair. Also given for pairs that touch or are apart. None for three or more bodies.
+        """
+
+    @property
+    def depth(self) -> float | None:
+        """
+        m, the least translation that separates the pair; 0 unless overlapping. None for three or more bodies.
+        """
+
+    @property
+    def distance(self) -> float | None:
+        """
+        m between the nearest points; 0 unless separated. None for three or more bodies.
+        """
+
+    @property
+    def witness_a(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (3,) the point of a nearest to b, with witness_a - witness_b = distance * normal. None if overlapping.
+        """
+
+    @property
+    def witness_b(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """(3,) the point of b nearest to a. None if overlapping."""
+
+    @property
+    def separating_plane(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (4,) [n, b] with n · x + b >= 0 on a and <= 0 on b, n the unit normal. None if overlapping.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def certificate(self) -> Any:
+        """
+        What proves the status, and bounds of the volume, to somebody who does not trust us: an overlapper.proof.claims.Certificate.
+
+        `verify()` of it checks everything in rational arithmetic without the core, and returns (lower, upper) bounds of the common
+        volume in m³. Raises CertificateError where there is none.
+        """
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+    def __getstate__(self) -> tuple[object, ...]: ...
+
+    def __setstate__(self, state: tuple[object, ...]) -> None: ...
+
+@overload
+def overlap(a: Placed, b: Placed, /) -> Overlap: ...
+
+@overload
+def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001, method: Literal['auto', 'paper'] = 'auto') -> Overlap:
+    """
+    The common set of two or more convex shapes.
+
+    Each is a Placed, a bare shape, or an (n, 3) array of points, which stands for their hull. `tolerance`, between 0 and 1,
+    is the fraction by which the polytope may have to shrink to fit inside smooth shapes; polyhedra are exact whatever it is.
+    No overlap is an answer, not an error. Raises ValueError if the common set is unbounded.
+
+    method 'auto' grows the hull of the dual points about a point well inside, in a frame in which the common set is round.
+    method 'paper' is that of Tereshchenko, Chevokin and Fisunenko, 'Algorithm for finding the domain intersection of a set of
+    polytopes' (ICCS 2013), step for step and with what it loses: GJK with witness points gives a common point; on a boundary
+    it is shifted by a minimal step (2^-26 of the smaller polytope) along one of 26 directions; the hull of the dual points of
+    all face planes, the dual of that hull's faces, and their hull follow; more than two bodies pairwise by divide and conquer.
+    It departs from the text in tessellating smooth shapes from inside, in replacing half-spaces by large boxes, and in
+    deciding by exact signs inside its hulls. Where no shift lands inside, it says 'touching'.
+    """
+
+def distance(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float:
+    """
+    Distance (m) of the nearest points of two shapes; 0 if they touch or overlap.
+    """
+
+def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float:
+    """
+    Length (m) of the least translation that separates two shapes; 0 if they do not overlap. Positive where pybullet's contact
+    distance is negative. Raises ValueError for two half-spaces.
+    """
+
+def iou(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001) -> float:
+    """
+    Intersection over union of two shapes: common volume over the volume of their union, from 0 to 1.
+    """
+
+class Overlaps:
+    """
+    What many pairs of shapes share: an array per quantity, a row per pair. SI units, world coordinates.
+
+    The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again
+    unless it took long and its Batch has not been asked since; `overlaps[mask]`, a slice or an array of indices picks rows.
+    """
+
+    @property
+    def pairs(self) -> numpy.typing.NDArray[numpy.int32]:
+        """(p, 2) indices of the shapes a and b of each row."""
+
+    @property
+    def status(self) -> numpy.typing.NDArray[numpy.int8]:
+        """(p,) Overlaps.SEPARATED (0), TOUCHING (1) or OVERLAPPING (2)."""
+
+    @property
+    def volume(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p,) m³; 0 unless overlapping."""
+
+    @property
+    def volume_error(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p,) m³, certified: the true volume is within volume ± volume_error."""
+
+    @property
+    def centroid(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 3) centre of the common volume, m; not a number unless overlapping.
+        """
+
+    @property
+    def area(self) -> numpy.typing.NDArray[numpy.float64]:
+        """(p,) m², of the surface of the common polytope."""
+
+    @property
+    def normal(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 3) unit, from b to a as pybullet's contactNormalOnB; 0 for pairs that are separated.
+        """
+
+    @property
+    def depth(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p,) m, the least translation that separates the pair, of a along normal; 0 unless overlapping.
+        """
+
+    @property
+    def gradient(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 2, 6) d volume / d (translation, rotation vector about the body's own position) of a and of b, m² and m³;
+        0 unless overlapping.
+        """
+
+    @property
+    def facets_touched(self) -> numpy.typing.NDArray[numpy.int32]:
+        """(p,) how many planes of the shapes took part in building the polytope."""
+
+    @property
+    def widened(self) -> numpy.typing.NDArray[numpy.bool_]:
+        """(p,) True where the volume was computed again in wider arithmetic."""
+
+    SEPARATED: int = 0
+
+    TOUCHING: int = 1
+
+    OVERLAPPING: int = 2
+
+    @property
+    def examined(self) -> int:
+        """How many pairs were looked at: those given, or those whose boxes meet."""
+
+    @property
+    def planes_asked(self) -> int:
+        """
+        How many planes of the shapes were asked for in that call: placed to be held against corners, or given by a shape
+        as an answer to where a ray leaves it or which of its planes is tightest about a point.
+        """
+
+    @property
+    def tolerance(self) -> float: ...
+
+    @property
+    def method(self) -> Literal['auto', 'paper']: ...
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, row: Any) -> Any: ...
+
+    def __repr__(self) -> str: ...
+
+class Batch:
+    """
+    Shapes that are asked for their overlaps again and again as they move.
+
+    `overlaps` is the function of that name for these shapes. What it finds is kept for its next call: pairs of which
+    neither has moved by a bit cost nothing, and pairs that are still apart along the same axis next to nothing. The
+    answers are those of a first call to the last bit. Threads that ask at the same time get their answers without waiting.
+    """
+
+    def __init__(self, shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace]) -> None: ...
+
+    def overlaps(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
+        """
+        What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
+        gradient as arrays.
+
+        `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs`
+        (p, 2) indexes them and has a row each in the answer, or with separated=False only those that overlap or touch; without
+        it there is a row for each pair that overlaps or touches, found by a tree of boxes and sorted. `tolerance` and `method`
+        are those of `overlap`, whose answers these are to the last bit. The work is spread over `threads`, None being all that
+        there are; their number does not change a bit of the answer.
+
+        Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
+        Raises ValueError naming an argument of the wrong shape, a pose that is not finite, or half-spaces whose common set is
+        unbounded.
+        """
+
+    def candidate_pairs(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
+        """
+        (p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
+        two half-spaces are no pair.
+        """
+
+def overlaps(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
+    """
+    What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
+    gradient as arrays.
+
+    `positions` (k, 3) in m and `orientations` (k, 4), quaternions xyzw of any length but 0, place the k `shapes`. `pairs`
+    (p, 2) indexes them and has a row each in the answer, or with separated=False only those that overlap or touch; without
+    it there is a row for each pair that overlaps or touches, found by a tree of boxes and sorted. `tolerance` and `method`
+    are those of `overlap`, whose answers these are to the last bit. The work is spread over `threads`, None being all that
+    there are; their number does not change a bit of the answer.
+
+    Ctrl-C ends the call early. The KeyboardInterrupt then has the rows that were finished, in an attribute `overlaps`.
+    Raises ValueError naming an argument of the wrong shape, a pose that is not finite, or half-spaces whose common set is
+    unbounded.
+    """
+
+def candidate_pairs(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
+    """
+    (p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
+    two half-spaces are no pair.
+    """
+
+def world_poses(frames: Sequence[Any], which: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    (k, 3) positions in m and (k, 4) unit quaternions xyzw in the world of what is fixed to moving frames.
+
+    `frames` begin with position and quaternion (of any length but 0), as pybullet's answers do; thing i is fixed to frame
+    `which[i]` at `positions[i]` and `orientations[i]` of it.
+    """

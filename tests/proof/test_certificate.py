@@ -1,0 +1,281 @@
+"""Every answer is proved in rational arithmetic, the proof bounds the volume, and no false proof passes."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import families
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from strategies import in_general_position, placed, polyhedra, quaternion, solids
+
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap
+from overlapper.proof.certificate import CertificateError, certificate
+from overlapper.proof.claims import Overlapping, OwnedPlane, Separated, Touching
+
+CUBE = Box([0.5, 0.5, 0.5])
+CLAIMS = {"separated": Separated, "touching": Touching, "overlapping": Overlapping}
+TURN = (0.1, -0.2, 0.3, 0.9)
+
+APART = {
+    "cubes": (Placed(CUBE), Placed(CUBE, (1.5, 0.2, 0.1))),
+    "balls": (Placed(Sphere(1.0)), Placed(Sphere(0.5), (1.0, 1.0, 1.0))),
+    "capsule_and_cylinder": (Placed(Capsule(0.3, 1.0)), Placed(Cylinder(0.2, 1.0), (0.8, 0.0, 0.3), TURN)),
+    "ball_over_a_slope": (Placed(Sphere(0.5), (0, 0, 2)), Placed(HalfSpace((0.1, 0, 1), 0.3), (0, 0, 0), TURN)),
+    "four_around_a_hole": tuple(
+        Placed(Sphere(1.0), 1.1 * np.array(corner)) for corner in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
+    ),
+    "half_spaces": (Placed(HalfSpace((1, 0, 0), -1.0)), Placed(HalfSpace((-1, 0, 0), -1.0)), Placed(CUBE)),
+}
+IN_CONTACT = {
+    "cubes_face_to_face": (Placed(CUBE), Placed(CUBE, (1.0, 0.2, 0.1))),
+    "cubes_corner_to_corner": (Placed(CUBE), Placed(CUBE, (1.0, 1.0, 1.0))),
+    "balls": (Placed(Sphere(1.0)), Placed(Sphere(0.5), (1.5, 0.0, 0.0))),
+    "ball_on_a_floor": (Placed(Sphere(0.5), (0, 0, 0.5)), Placed(HalfSpace((0, 0, 1), 0.0))),
+    "cylinder_on_a_cube": (Placed(Cylinder(0.25, 1.0)), Placed(CUBE, (0.0, 0.0, -1.0))),
+    "three_cubes_at_an_edge": (Placed(CUBE), Placed(CUBE, (1.0, 0.0, 0.0)), Placed(CUBE, (0.5, 0.0, 1.0))),
+}
+IN_COMMON = {
+    "cubes": (Placed(CUBE), Placed(CUBE, (0.5, 0.2, 0.1), TURN)),
+    "identical_cubes": (Placed(CUBE, orientation=TURN), Placed(CUBE, orientation=TURN)),
+    "balls": (Placed(Sphere(1.0)), Placed(Sphere(0.5), (0.8, 0.6, 0.0))),
+    "capsules": (Placed(Capsule(0.3, 1.0)), Placed(Capsule(0.3, 1.0), (0.1, 0.1, 0.2), TURN)),
+    "cylinder_and_cube": (Placed(Cylinder(0.5, 1.0)), Placed(CUBE, (0.4, 0.3, 0.2), TURN)),
+    "ball_in_a_floor": (Placed(Sphere(0.5), (0, 0, 0.2)), Placed(HalfSpace((0, 0, 1), 0.0))),
+    "three": (Placed(CUBE), Placed(Sphere(0.6), (0.2, 0, 0)), Placed(Capsule(0.3, 0.5), (0.3, 0.1, 0), TURN)),
+}
+
+
+def found(bodies):
+    return overlap(*bodies, tolerance=0.1)
+
+
+def proved(common):
+    """The bounds, after they are seen to lie within the error that the overlap states.
+
+    Or around it: a closed form knows the volume better than the polytope by which the proof bounds it."""
+    claim = certificate(common)
+    assert isinstance(claim, CLAIMS[common.status])
+    lower, upper = claim.verify()
+    volume, error = Fraction(common.volume), Fraction(common.volume_error)
+    assert 0 <= lower <= upper
+    closer = volume - error <= lower and upper <= volume + error
+    farther = lower <= volume - error and volume + error <= upper
+    assert closer or farther
+    return lower, upper
+
+
+@pytest.mark.parametrize("name", APART)
+def test_a_gap_is_proved(name):
+    assert found(APART[name]).status == "separated"
+    assert proved(found(APART[name])) == (0, 0)
+
+
+@pytest.mark.parametrize("name", IN_CONTACT)
+def test_contact_without_rounding_leaves_no_room_and_misses_no_point(name):
+    common = found(IN_CONTACT[name])
+    assert common.status == "touching"
+    assert proved(common) == (0, 0)
+    claim = certificate(common)
+    assert claim.inradius == 0
+    assert claim.miss <= 1e-15  # the rim of a cylinder is irrational
+
+
+@pytest.mark.parametrize("name", IN_COMMON)
+def test_a_common_volume_is_proved(name):
+    assert found(IN_COMMON[name]).status == "overlapping"
+    lower, _ = proved(found(IN_COMMON[name]))
+    assert lower > 0
+
+
+def test_the_bounds_of_polyhedra_meet():
+    lower, upper = proved(overlap(Placed(CUBE), Placed(CUBE, (0.75, 0.5, 0.25))))
+    assert lower == upper == Fraction(1, 4) * Fraction(1, 2) * Fraction(3, 4)
+
+
+def test_the_bounds_of_a_lens_hold_its_closed_form():
+    lower, upper = proved(overlap(Placed(Sphere(1.0)), Placed(Sphere(1.0), (1.0, 0.0, 0.0)), tolerance=0.03))
+    assert lower < 5 * np.pi / 12 < upper < lower * Fraction(11, 10)
+
+
+@settings(max_examples=15)
+@given(in_general_position(solids, 2, 2))
+def test_pairs_are_proved(bodies):
+    proved(found(bodies))
+
+
+@settings(max_examples=15)
+@given(in_general_position(polyhedra, 3, 6))
+def test_several_polyhedra_are_proved(bodies):
+    proved(found(bodies))
+
+
+@settings(max_examples=15)
+@given(placed(solids, 3.0), placed(solids, 3.0), placed(solids, 3.0))
+def test_three_bodies_somewhere_are_proved(a, b, c):
+    proved(found((a, b, c)))
+
+
+@pytest.mark.parametrize("name", [name for name in families.FAMILIES if "fine" not in name])
+def test_hard_families_are_proved(name):
+    for seed in range(3):
+        proved(overlap(*families.make(name, seed).placed, tolerance=0.1))
+
+
+def test_a_half_space_is_what_its_numbers_say_as_given():
+    """Its normal divided by its length is another one."""
+    case = families.make("half_spaces", 10008)
+    lower, upper = proved(overlap(*case.placed))
+    assert lower <= case.truth.volume <= upper
+
+
+def test_a_hull_has_the_corners_that_rounding_alone_lifts_off_a_facet():
+    case = families.make("nearly_touching", 10133)
+    hull = Hull(case.bodies[1])
+    assert len(hull.vertices) < len(hull.corners) == len(case.bodies[1])
+    lower, upper = proved(overlap(*case.placed))
+    assert lower <= case.truth.volume <= upper
+
+
+def test_what_the_paper_method_finds_is_bounded_by_the_certificate():
+    """That method may lose planes, never invent a common part."""
+    bodies = IN_COMMON["cubes"]
+    exactly, _ = certificate(overlap(*bodies)).verify()
+    lower, upper = certificate(overlap(*bodies, method="paper")).verify()
+    assert lower <= exactly * (1 + Fraction(1, 10**15)) and exactly <= upper * (1 + Fraction(1, 10**15))
+
+
+def test_bodies_far_from_the_origin_are_proved_as_well_as_near_it():
+    far = np.array([1e8, -3e8, 2e8])
+    pair = Placed(CUBE, far, TURN), Placed(CUBE, far + (0.75, 0.5, 0.25), TURN)
+    lower, upper = proved(overlap(*pair))
+    assert upper - lower <= upper * Fraction(1, 10**15)
+
+
+def test_coordinates_of_any_exponent_are_proved():
+    points = np.array([[0, 0, 1e-90], [1, 1e-70, 0], [1e-80, 1, 0], [0.1, 0.2, 1]])
+    lower, upper = proved(overlap(Placed(Hull(points)), Placed(Hull(points[:, ::-1]), (0.05, 0.05, 0.05))))
+    assert upper - lower <= upper * Fraction(1, 10**15)
+
+
+# False claims
+
+
+def shifted(plane, by):
+    return replace(plane, offset=plane.offset + Fraction(by))
+
+
+def rejected(claim, sentence, **changes):
+    with pytest.raises(CertificateError, match=sentence):
+        replace(claim, **changes).verify()
+
+
+def unlike(values, index, value):
+    values = values.copy()
+    values[index] = value
+    return values
+
+
+@pytest.mark.parametrize("name", APART)
+def test_a_false_gap_is_found(name):
+    claim = certificate(found(APART[name]))
+    first, *others = claim.planes
+    rejected(claim, "plane 0 must have all of body", planes=(shifted(first, -1e-9), *others))
+    rejected(claim, "offsets must add up", planes=(shifted(first, 10.0), *others))
+    tilted = replace(first, normal=first.normal * Fraction(1 + 2**-30), offset=first.offset + 1)
+    if not isinstance(claim.shapes[first.owner].shape, HalfSpace):
+        rejected(claim, "normals must add up", planes=(tilted, *others))
+    swapped = replace(first, owner=others[0].owner)
+    rejected(claim, "plane 0 must have all of body", planes=(swapped, *others))
+    rejected(claim, "one of the bodies", planes=(replace(first, owner=len(claim.shapes)), *others))
+    rejected(claim, "normals must add up", planes=())
+
+
+def test_a_gap_claimed_between_bodies_with_a_common_point_is_found():
+    a, b = IN_COMMON["cubes"]
+    claim = certificate(found(APART["cubes"]))
+    rejected(claim, "must have all of body", shapes=(a, b))
+
+
+@pytest.mark.parametrize("name", IN_CONTACT)
+def test_a_false_contact_is_found(name):
+    claim = certificate(found(IN_CONTACT[name]))
+    first, *others = claim.planes
+    rejected(claim, "plane 0 must have all of body", planes=(shifted(first, -1e-9), *others))
+    rejected(claim, "no room", planes=(shifted(first, 1e-9), *others))
+    rejected(claim, "no room", inradius=Fraction(-1, 10**9))
+    away = Fraction(3)
+    rejected(claim, "nearest point 1 must lie in body 1", nearest=unlike(claim.nearest, 1, claim.nearest[1] + away))
+    rejected(claim, "no farther off than the miss", point=claim.point + away)
+
+
+@pytest.mark.parametrize("name", IN_COMMON)
+def test_a_false_common_part_is_found(name):
+    claim = certificate(found(IN_COMMON[name]))
+    first, *others = claim.planes
+    rejected(claim, "plane 0 must have all of body", planes=(shifted(first, -1e-12), *others))
+    rejected(claim, "the ball about the point must lie in body", margin=3 * claim.margin + 1)
+    rejected(claim, "the ball about the point must lie in body", point=claim.point + Fraction(2))
+    rejected(claim, "margin must be greater", margin=Fraction(0))
+    rejected(claim, "pull must be", pull=unlike(claim.pull, 0, Fraction(0)))
+    rejected(claim, "pull must be", pull=unlike(claim.pull, 0, Fraction(2)))
+    outside = claim.point + 2 * (claim.vertices[0] - claim.point)
+    rejected(claim, "vertex 0 must lie in body", vertices=unlike(claim.vertices, 0, outside))
+    rejected(claim, "must form a closed surface", rings=claim.rings[1:], facet=claim.facet[1:])
+    rejected(claim, "every polygon must have a plane", facet=claim.facet[1:])
+    rejected(claim, "seen from behind", rings=tuple(ring[::-1] for ring in claim.rings))
+    rejected(claim, "wind about the point once", rings=claim.rings * 2, facet=np.tile(claim.facet, 2))
+    across = claim.planes[int(np.argmin([first.normal @ p.normal for p in claim.planes]))]
+    facet = np.where(claim.facet == 0, claim.planes.index(across), claim.facet)
+    rejected(claim, "must cut all edges", facet=facet)
+
+
+def test_a_facet_given_to_another_body_is_found():
+    claim = certificate(found(IN_COMMON["cubes"]))
+    for number, plane in enumerate(claim.planes):
+        planes = unlike(np.array(claim.planes), number, replace(plane, owner=1 - plane.owner))
+        rejected(claim, f"plane {number} must have all of body", planes=tuple(planes))
+
+
+@pytest.mark.parametrize("name", ["balls", "capsules", "cylinder_and_cube", "three"])
+def test_an_inner_scale_too_large_is_found(name):
+    claim = certificate(found(IN_COMMON[name]))
+    assert claim.inner_scale < 1
+    larger = np.maximum(claim.pull, claim.inner_scale * (1 + Fraction(1, 10**9)))
+    rejected(claim, "after its pull", pull=larger)
+
+
+def test_the_certificate_of_other_bodies_is_found():
+    claim = certificate(overlap(Placed(CUBE), Placed(CUBE, (0.75, 0.5, 0.25))))
+    first = claim.shapes[0]
+    rejected(claim, "ball about the point must lie in body 1", shapes=(first, Placed(CUBE, (1.5, 0.5, 0.25))))
+    rejected(claim, "must have all of body 1 below", shapes=(first, Placed(CUBE, (0.625, 0.5, 0.25))))
+
+
+def test_numbers_that_arithmetic_would_round_are_found():
+    claim = certificate(found(IN_COMMON["balls"]))
+    rejected(claim, "must be integers or fractions", margin=float("nan"))
+    rejected(claim, "must be integers or fractions", vertices=claim.vertices.astype(float))
+    plane = replace(claim.planes[0], offset=float("inf"))
+    rejected(claim, "must be integers or fractions", planes=(plane, *claim.planes[1:]))
+    claim = certificate(found(IN_CONTACT["balls"]))
+    rejected(claim, "must be integers or fractions", miss=float("inf"))
+
+
+def test_a_half_space_is_below_no_plane_but_its_own():
+    floor = Placed(HalfSpace((0, 0, 1), 0.0))
+    tilted = OwnedPlane(np.array([Fraction(1, 10**12), Fraction(0), Fraction(1)]), Fraction(10**6), 0)
+    opposite = OwnedPlane(-tilted.normal, Fraction(-1), 1)
+    ball = Placed(Sphere(0.5), (0, 0, 2e6))
+    with pytest.raises(CertificateError, match="plane 0 must have all of body 0"):
+        Separated((floor, ball), (tilted, opposite)).verify()
+
+
+def test_hulls_turned_in_doubles_are_proved_although_their_facets_are_not_flat():
+    rng = np.random.default_rng(7)
+    corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T.astype(float)
+    for _ in range(5):
+        turned = Placed(Hull(corners), orientation=quaternion(rng))
+        world = Hull(np.array([[*turned.position]]) + corners @ np.linalg.qr(rng.normal(size=(3, 3)))[0])
+        lower, upper = proved(overlap(turned, Placed(world, (0.3, 0.2, 0.1))))
+        assert upper - lower <= upper * Fraction(1, 10**15)

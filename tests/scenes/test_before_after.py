@@ -1,0 +1,94 @@
+"""The page of a scene that has moved shows the worst step twice, as it was and as it is, in headless Chromium."""
+
+import asyncio
+import json
+import re
+import shutil
+import subprocess
+import urllib.request
+from pathlib import Path
+
+import pytest
+from tornado.websocket import websocket_connect
+
+from overlapper.scenes import before_after
+from overlapper.scenes.expected import read_expected
+from overlapper.scenes.verdict import examine, load_scene, record
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+CUBES = '''
+"""A cube reaches into a table that is 20 cm thick."""
+import pybullet as p
+
+STEPS = 2
+
+
+def build(client):
+    table = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.5, 0.5, 0.1], physicsClientId=client)
+    p.createMultiBody(0, table, physicsClientId=client)
+    cube = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.1] * 3, physicsClientId=client)
+    p.createMultiBody(0, cube, basePosition=[0, 0, 0.15], physicsClientId=client)
+'''
+
+
+@pytest.fixture
+def verdict(tmp_path):
+    path = tmp_path / "cubes.py"
+    path.write_text(CUBES)
+    record(load_scene(path))
+    path.write_text(CUBES.replace("0.15]", "0.17]"))
+    scene = load_scene(path)
+    return examine(scene, read_expected(scene.expected))
+
+
+def test_the_page_tells_the_verdicts_and_holds_both_frames(verdict, tmp_path):
+    page = before_after.save(verdict, "cubes <of mine>", tmp_path / "made" / "page.html")
+    text = page.read_text(encoding="utf-8")
+    assert "<h1>cubes &lt;of mine&gt; has moved</h1>" in text
+    assert "<td>(0, 0, 0.15)</td><td>(0, 0, 0.17)</td><td>0.02</td><td>0.0001</td><td>200</td>" in text
+    assert (
+        "&from=1.45597,-1.6501,1.10418&at=0,0,0.085" in text
+    )  # of both frames: table and cubes reach from -0.1 to 0.27
+    assert re.search(r'(src|href)="http', text) is None
+    assert len(text) < 1_000_000
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not to be had here")
+def test_one_pane_shows_what_was_recorded_and_the_other_what_is_today(verdict, tmp_path):
+    page = before_after.save(verdict, "cubes", tmp_path / "page.html")
+    # A pane names its time together with its table, and after the tree of objects, which is there while both are empty.
+    panes = asyncio.run(asyncio.wait_for(texts_in_frames(page, tmp_path / "profile", until=".000 s"), timeout=120))
+    # 20 cm by 20 cm by 5 cm, and by 3 cm; the tree, which has the largest of both, comes after the table.
+    assert [re.search(r"\S+ dm³", pane)[0] for pane in panes] == ["2 dm³", "1.2 dm³"]
+
+
+async def texts_in_frames(page: Path, profile: Path, until: str) -> list[str]:
+    """The text of both frames, once they have the words awaited; through DevTools, to which a frame is a target."""
+    options = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--no-first-run"]
+    options += ["--enable-unsafe-swiftshader", "--disable-background-networking", "--remote-debugging-port=0"]
+    command = [CHROMIUM, *options, f"--user-data-dir={profile}", page.as_uri()]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as browser:
+        try:
+            host = next(filter(None, (re.search(r"listening on ws://([^/]+)", line) for line in browser.stderr)))[1]
+            frames: list[dict[str, str]] = []
+            while len(frames) < 2:
+                await asyncio.sleep(0.1)
+                with urllib.request.urlopen(f"http://{host}/json", timeout=60) as answer:
+                    frames = [each for each in json.load(answer) if each["type"] == "iframe"]
+            frames.sort(key=lambda frame: frame["url"])
+            return [await text_in(frame["webSocketDebuggerUrl"], until) for frame in frames]
+        finally:
+            browser.kill()
+
+
+async def text_in(frame: str, until: str) -> str:
+    connection = await websocket_connect(frame)
+    evaluate = {"id": 1, "method": "Runtime.evaluate", "params": {"expression": "document.body.innerText"}}
+    text = ""
+    while until not in text:
+        await asyncio.sleep(0.1)
+        await connection.write_message(json.dumps(evaluate))
+        text = json.loads(await connection.read_message())["result"]["result"].get("value", "")
+    connection.close()
+    return text

@@ -1,0 +1,92 @@
+"""`overlapper shapes` says what is modelled of a file, and lives longer than pybullet."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pybullet as p
+import pybullet_data
+import pytest
+
+from overlapper.simulation.inventory import NotRead, inventory
+
+DATA = Path(pybullet_data.getDataPath())
+FLAT = """<robot name="plate"><link name="top"><collision><geometry><mesh filename="flat.obj"/></geometry></collision>
+<collision><geometry><box size=".1 .2 .3"/></geometry></collision></link></robot>"""
+
+
+def command(*arguments):
+    run = subprocess.run([sys.executable, "-m", "overlapper", "shapes", *arguments], capture_output=True, text=True)
+    return run.returncode, run.stdout, run.stderr
+
+
+def test_every_link_is_listed_with_its_shapes_and_whom_it_meets():
+    found = inventory(DATA / "mjcf" / "humanoid.xml")  # of which getCollisionShapeData would die
+    assert (found.bodies, found.shapes, found.shapes_read, found.skipped) == (2, 20, 20, ())
+    floor, torso, *limbs = found.links
+    assert [shape.kind for shape in floor.shapes] == ["plane"] and floor.meets == 13
+    assert [shape.kind for shape in torso.shapes] == ["capsule", "sphere", "capsule"]
+    assert torso.shapes[1].size == "radius 0.09" and torso.meets == 1
+    assert {limb.meets for limb in limbs} == {1}
+    assert found.pairs == 19
+    listed = json.loads(json.dumps(found.as_dict(), allow_nan=False))["links"]
+    assert listed[0]["shapes"][0]["volume"] is None
+    assert listed[1]["shapes"][1]["volume"] == pytest.approx(4.18879 * 0.09**3, rel=1e-5)
+
+
+def test_self_collision_shows_in_whom_a_link_meets():
+    path = DATA / "TwoJointRobot_wo_fixedJoints.urdf"
+    alone, together = inventory(path), inventory(path, self_collision=True, surface="margin")
+    assert alone.pairs == 0 and {link.meets for link in alone.links} == {0}
+    assert together.pairs == sum(link.meets for link in together.links) // 2 > 0
+    sizes = [shape.size for link in together.links for shape in link.shapes if shape.kind == "hull"]
+    assert sizes and all(size.endswith("rounded by 0.001") for size in sizes)
+
+
+def test_what_is_skipped_is_named_with_its_reason_and_is_exit_code_1(tmp_path):
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
+    (tmp_path / "flat.obj").write_text(f"o flat\n{corners}f 1 2 3\nf 2 3 4\n")
+    (tmp_path / "plate.urdf").write_text(FLAT)
+    code, said, complaints = command(str(tmp_path / "plate.urdf"))
+    assert (code, complaints) == (1, "")
+    assert "plate/top" in said and "box" in said and "0.1 × 0.2 × 0.3" in said and "6,000" in said
+    assert "1 body, 1 of 2 shapes modelled, 0 pairs of shapes that pybullet lets collide." in said
+    assert "Not modelled: plate/top, 1 of 2 shapes: vertices are flat" in said
+
+
+def test_a_scene_that_was_saved_is_listed(tmp_path):
+    client = p.connect(p.DIRECT)
+    for x in range(3):
+        shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.1, 0.2, 0.3], physicsClientId=client)
+        p.createMultiBody(x % 2, shape, basePosition=[x, 0, 0], physicsClientId=client)
+    p.saveBullet(str(tmp_path / "scene.bullet"), physicsClientId=client)
+    p.disconnect(client)
+    found = inventory(tmp_path / "scene.bullet")
+    assert [link.name for link in found.links] == ["body 0/base", "body 1/base", "body 2/base"]
+    assert [shape.size for link in found.links for shape in link.shapes] == ["0.2 × 0.4 × 0.6"] * 3
+    assert (found.shapes, found.shapes_read, found.pairs, [link.meets for link in found.links]) == (3, 3, 2, [1, 2, 1])
+    (tmp_path / "cut.bullet").write_bytes((tmp_path / "scene.bullet").read_bytes()[:1000])
+    with pytest.raises(NotRead, match="cut short"):
+        inventory(tmp_path / "cut.bullet")
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("gripper/wsg50_one_motor_gripper_free_base.sdf", "pybullet dies of .*free_base.sdf with signal SIGSEGV"),
+        ("kuka_iiwa/model_for_sdf.urdf", "model_for_sdf.urdf cannot be read: pybullet says 'Cannot load URDF file'"),
+        ("no_such.urdf", "there is no file .*no_such.urdf"),
+        ("plane.obj", r"must end in \.urdf, \.sdf, \.xml, \.bullet, and 'plane.obj' does not"),
+    ],
+)
+def test_what_pybullet_does_not_load_is_told_in_a_sentence(name, sentence, monkeypatch):
+    monkeypatch.setenv("ASAN_OPTIONS", os.environ.get("ASAN_OPTIONS", "") + ":handle_segv=0")
+    with pytest.raises(NotRead, match=sentence):
+        inventory(DATA / name)
+
+
+def test_a_file_that_is_not_loaded_is_exit_code_2():
+    code, said, complaints = command("no_such.urdf")
+    assert (code, said, complaints) == (2, "", "overlapper: there is no file no_such.urdf\n")

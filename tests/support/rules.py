@@ -1,0 +1,297 @@
+"""What must hold for `auto`, whatever the case: rules that take a case of families.py with the core's answer and return
+a complaint, or nothing if they are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from math import isqrt
+
+import exact
+import numpy as np
+from families import CORNERS, Below, Case, mapped
+from strategies import quaternion, rotation
+
+from overlapper import Overlap, overlap
+from overlapper.proof.certificate import certificate
+
+HALF_ULP = 2.0**-53
+NEGLIGIBLE = 1e-12  # of the size of the smallest body: what is nearer or thinner may be called touching
+TOLERANCE = 1e-2  # of round bodies, whose closed form must lie in the bracket whatever it is
+
+Rule = Callable[[Case, Overlap], str]
+
+
+def answer(bodies) -> Overlap:
+    return overlap(*bodies, tolerance=TOLERANCE)
+
+
+# What is exactly true of a case
+
+
+def holds_a_ball(case: Case, radius: float) -> bool:
+    """Whether the common part surely holds a ball of that radius. A solid's inradius is between V / A and 3 V / A."""
+    if case.truth.dimension < 3:
+        return False
+    least = float(case.truth.volume) / case.truth.area
+    return least > radius or (3 * least > radius and moved_planes_leave_something(case, -Fraction(radius)))
+
+
+def apart_by(case: Case, gap: float) -> bool:
+    """Whether no point is as near as `gap` to every body, seen by moving out all planes; by the distance for pairs."""
+    if not moved_planes_leave_something(case, Fraction(gap)):
+        return True
+    if len(case.solids) == len(case.bodies) == 2 and np.prod([len(s.vertices) for s in case.solids]) < 400:
+        return exact.distance_squared(*case.solids) > Fraction(gap) ** 2
+    return False
+
+
+def moved_planes_leave_something(case: Case, outwards: Fraction) -> bool:
+    planes = [plane for solid in case.solids for plane in solid.planes]
+    planes += [exact.halfspace(*body) for body in case.bodies if isinstance(body, Below)]
+    part = exact.hull(CORNERS * 4 * max(1.0, *(float(np.abs(box).max()) for box in case.boxes), 0.0))
+    for a, b, c, d in planes:
+        # The length rounded away from the smaller movement, which keeps "surely" true.
+        length = isqrt(a * a + b * b + c * c) + 1
+        normal = (Fraction(a), Fraction(b), Fraction(c))
+        part = exact.clipped(part, exact.halfspace(normal, length * outwards - d), 0)
+        if part.dimension < 0:
+            return False
+    return True
+
+
+def conditioning(case: Case) -> float:
+    """Four times the relative change of the volume when all planes move by half an ulp of the extent."""
+    return 4 * HALF_ULP * case.truth.area * case.extent / float(case.truth.volume)
+
+
+def diameter(part: exact.Polytope) -> float:
+    corners = np.array([exact.subtract(exact.coordinates(p), part.centroid) for p in part.vertices], float)
+    return float(np.linalg.norm(corners.max(0) - corners.min(0)))
+
+
+def only_hulls(case: Case) -> bool:
+    """Whether the doubles that the core gets are the vertices themselves."""
+    return all(isinstance(body, np.ndarray) for body in case.bodies)
+
+
+def only_polytopes(case: Case) -> bool:
+    """Whether the vertices are doubles, or doubles at an exact pose."""
+    return not case.round and not any(isinstance(body, Below) for body in case.bodies)
+
+
+# Single answers
+
+
+def figures_are_finite(case: Case, found: Overlap) -> str:
+    figures = [found.volume, found.volume_error, found.area, *found.inertia.ravel(), *found.gradient.ravel()]
+    if found:
+        figures += [*found.centroid, *found.vertices.ravel(), *found.bounds.ravel()]
+    if len(case.bodies) == 2:
+        figures += [found.depth, found.distance, *found.normal]
+    return "" if np.isfinite(figures).all() else "a figure is not finite"
+
+
+def sizes_are_not_negative(case: Case, found: Overlap) -> str:
+    return "" if min(found.volume, found.volume_error, found.area) >= 0 else "a volume, area or error is negative"
+
+
+def the_way_out_agrees_with_the_status(case: Case, found: Overlap) -> str:
+    if len(case.bodies) != 2:
+        return ""
+    signs = {"separated": (True, False), "touching": (False, False), "overlapping": (False, True)}[found.status]
+    return (
+        ""
+        if (found.distance > 0, found.depth > 0) == signs
+        else (f"{found.status}, at distance {found.distance} and depth {found.depth}")
+    )
+
+
+def an_overlap_has_a_volume_and_a_surface(case: Case, found: Overlap) -> str:
+    return "" if (found.volume > 0 and found.area > 0) == bool(found) else f"{found.status}, with volume {found.volume}"
+
+
+def a_ball_in_common_is_an_overlap(case: Case, found: Overlap) -> str:
+    if case.round:
+        return f"{found.status}, with a volume in common" if case.closed_form and not found else ""
+    if not found and holds_a_ball(case, NEGLIGIBLE * case.size):
+        return f"{found.status}, with a ball in common"
+    return ""
+
+
+def bodies_apart_are_separated(case: Case, found: Overlap) -> str:
+    if case.round or case.truth.dimension >= 0 or found.status == "separated":
+        return ""
+    return f"{found.status}, with a gap" if apart_by(case, NEGLIGIBLE * case.size) else ""
+
+
+def exact_contact_touches(case: Case, found: Overlap) -> str:
+    if case.round or not 0 <= case.truth.dimension < 3 or found.status == "touching":
+        return ""
+    return f"{found.status}, with a {exact.NAMES[case.truth.dimension]} in common"
+
+
+def the_error_holds_the_volume(case: Case, found: Overlap) -> str:
+    if case.closed_form is not None:
+        off, allowed = abs(found.volume - case.closed_form), found.volume_error + 4 * HALF_ULP * case.closed_form
+        return "" if off <= allowed else f"the closed form is off by {off / allowed:.2g} stated errors"
+    if case.round:
+        return ""
+    off, error = volume_off(case, found), Fraction(found.volume_error)
+    return "" if off <= error else f"the volume is off by {float(off / error) if error else np.inf:.2g} stated errors"
+
+
+def volume_is_as_right_as_its_conditioning(case: Case, found: Overlap) -> str:
+    if not measured(case, found):
+        return ""
+    off, allowed = volume_off(case, found) / case.truth.volume, max(1e-12, conditioning(case))
+    return "" if off <= allowed else f"the volume is off by {float(off):.2g} of itself, not {allowed:.2g}"
+
+
+def volume_of_hulls_is_right_to_twelve_digits(case: Case, found: Overlap) -> str:
+    if not measured(case, found) or not only_polytopes(case):
+        return ""
+    off = float(volume_off(case, found) / case.truth.volume)
+    return "" if off <= 1e-12 else f"the volume is off by {off:.2g} of itself"
+
+
+def centroid_is_as_right_as_its_conditioning(case: Case, found: Overlap) -> str:
+    if not measured(case, found):
+        return ""
+    off = np.array([Fraction(x) - y for x, y in zip(found.centroid.tolist(), case.truth.centroid)], float)
+    size, world = diameter(case.truth), np.linalg.norm(np.spacing(np.abs(found.centroid)))
+    beyond = float(np.linalg.norm(off) - world) / size
+    allowed = max(1e-12, conditioning(case))
+    return "" if beyond <= allowed else f"the centroid is off by {beyond:.2g} of the size, not {allowed:.2g}"
+
+
+def measured(case: Case, found: Overlap) -> bool:
+    return bool(found) and not case.round and case.truth.dimension == 3
+
+
+def volume_off(case: Case, found: Overlap) -> Fraction:
+    exactly = case.truth.volume if case.truth.dimension == 3 else Fraction(0)
+    return abs(Fraction(found.volume) - exactly)
+
+
+def the_certificate_is_proved(case: Case, found: Overlap) -> str:
+    """Within what is stated; of round bodies, which the proof encloses by other planes, beside it and as narrow."""
+    lower, upper = certificate(found).verify()
+    volume, error = Fraction(found.volume), Fraction(found.volume_error)
+    within = volume - error <= lower <= upper <= volume + error
+    beside = case.round and lower <= volume + error and volume - error <= upper
+    narrow = upper - lower <= 3 * max(2 * error, Fraction(TOLERANCE) * volume)
+    return "" if within or (beside and narrow) else "the proved bounds are not within the stated ones"
+
+
+# The same case once more
+
+
+def the_order_of_bodies_keeps_the_status(case: Case, found: Overlap) -> str:
+    again = answer(case.placed[::-1])
+    return same_status(found, again) or volumes_agree(found, again)
+
+
+def the_order_of_bodies_keeps_every_bit(case: Case, found: Overlap) -> str:
+    return same_bits(found, answer(case.placed[::-1]), 1.0)
+
+
+def a_power_of_two_scales_every_bit(case: Case, found: Overlap) -> str:
+    if not only_hulls(case):
+        return ""
+    scale = 2.0 ** (case.seed % 41 - 20)
+    again = answer([points * scale for points in case.bodies])
+    return same_status(found, again) or same_bits(found, again, scale)
+
+
+def mirror_image_and_turns_of_the_axes_keep_the_status(case: Case, found: Overlap) -> str:
+    if not only_hulls(case):
+        return ""
+    changes = ("mirrored", lambda p: p * [-1, 1, 1]), ("turned", lambda p: p[:, [1, 2, 0]])
+    for name, change in changes:
+        again = answer([change(points) for points in case.bodies])
+        if complaint := same_status(found, again) or volumes_agree(found, again):
+            return f"{name}: {complaint}"
+    return ""
+
+
+def rigid_motion_keeps_the_status(case: Case, found: Overlap) -> str:
+    """Unless its rounding may have moved planes by as much as the bodies are deep or apart."""
+    if not only_hulls(case):
+        return ""
+    rng = np.random.default_rng(case.seed)
+    matrix, shift = rotation(quaternion(rng)), case.extent * rng.normal(size=3)
+    far = case.extent + max(float(np.abs(box).max()) for box in case.boxes) + float(np.linalg.norm(shift))
+    moved = NEGLIGIBLE * case.size + 16 * HALF_ULP * far
+    if moved > case.size / 16:
+        return ""  # it may have flattened a body
+    again = answer([mapped(points, matrix) + shift for points in case.bodies])
+    if again.status == found.status:
+        return ""
+    return same_status(found, again) if holds_a_ball(case, moved) or apart_by(case, moved) else ""
+
+
+def the_volume_moves_no_faster_than_the_bodies(case: Case, found: Overlap) -> str:
+    """By less than the area of the smaller body times the way of its fastest point, and the stated errors."""
+    if case.moved is None:
+        return ""
+    after = answer([*case.placed[:-1], case.moved])
+    area = min(exact.hull(points).area for points in case.bodies)
+    way = float(np.linalg.norm(case.moved - case.bodies[-1], axis=1).max())
+    change, errors = abs(after.volume - found.volume), after.volume_error + found.volume_error
+    return (
+        ""
+        if change <= area * way * (1 + 1e-9) + errors
+        else f"the volume jumps by {change:.3g} over a way of {way:.3g}"
+    )
+
+
+def same_status(one: Overlap, other: Overlap) -> str:
+    return "" if one.status == other.status else f"{one.status} becomes {other.status}"
+
+
+def same_bits(one: Overlap, other: Overlap, scale: float) -> str:
+    powers = {"volume": 3, "volume_error": 3, "area": 2, "centroid": 1}
+    for name, power in powers.items():
+        before, after = getattr(one, name), getattr(other, name)
+        if before is not None and np.any(np.asarray(before) * scale**power != after):
+            return f"{name} {before!r} becomes {np.asarray(after) / scale**power!r}"
+    return ""
+
+
+def volumes_agree(one: Overlap, other: Overlap) -> str:
+    agree = abs(one.volume - other.volume) <= one.volume_error + other.volume_error
+    return "" if agree else f"volume {one.volume} becomes {other.volume}"
+
+
+UNPROVED: tuple[Rule, ...] = (
+    figures_are_finite,
+    sizes_are_not_negative,
+    the_way_out_agrees_with_the_status,
+    an_overlap_has_a_volume_and_a_surface,
+    a_ball_in_common_is_an_overlap,
+    bodies_apart_are_separated,
+    exact_contact_touches,
+    the_error_holds_the_volume,
+    volume_is_as_right_as_its_conditioning,
+    volume_of_hulls_is_right_to_twelve_digits,
+    centroid_is_as_right_as_its_conditioning,
+    the_order_of_bodies_keeps_the_status,
+    the_order_of_bodies_keeps_every_bit,
+    a_power_of_two_scales_every_bit,
+    mirror_image_and_turns_of_the_axes_keep_the_status,
+    rigid_motion_keeps_the_status,
+    the_volume_moves_no_faster_than_the_bodies,
+)
+RULES: tuple[Rule, ...] = (*UNPROVED, the_certificate_is_proved)
+
+
+def complaints(case: Case, found: Overlap, rules: tuple[Rule, ...] = RULES) -> Iterator[tuple[str, str]]:
+    """The rules that are broken, by name, and how. An exception breaks a rule too."""
+    for rule in rules:
+        try:
+            complaint = rule(case, found)
+        except Exception as error:
+            complaint = f"{type(error).__name__}: {error}"
+        if complaint:
+            yield rule.__name__, complaint
