@@ -12,7 +12,7 @@ import pytest
 from strategies import directions
 
 from overlapper import HalfSpace, Hull, Placed, Sphere, overlap, penetration_depth
-from overlapper.cli import app as cli
+from overlapper.cli import bench
 
 ROOT = Path(__file__).parents[2]
 
@@ -208,6 +208,6 @@ def test_the_page_says_what_the_claims_come_to():
 
 
 def test_without_a_checkout_the_command_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr(cli, "__file__", str(tmp_path / "overlapper" / "cli" / "app.py"))
-    with pytest.raises(cli.Refused, match="chart needs a checkout"):
-        cli.chart()
+    monkeypatch.setattr(bench, "__file__", str(tmp_path / "overlapper" / "cli" / "bench.py"))
+    with pytest.raises(bench.Refused, match="chart needs a checkout"):
+        bench.chart()

@@ -7,7 +7,7 @@ import pytest
 import scene_steps
 import typer
 
-from overlapper.cli import app as cli
+from overlapper.cli import bench
 
 
 @pytest.fixture
@@ -56,9 +56,9 @@ def test_the_charts_of_pairs_and_of_steps_are_made_by_one_command(asked, code, s
         commands.append(command)
         return subprocess.CompletedProcess(command, code)
 
-    monkeypatch.setattr(cli.subprocess, "run", run)
+    monkeypatch.setattr(bench.subprocess, "run", run)
     with pytest.raises(typer.Exit) as end:
-        cli.chart(**asked, seconds=1.0, out=tmp_path, page=True)
+        bench.chart(**asked, seconds=1.0, out=tmp_path, page=True)
     assert end.value.exit_code == code
     assert [Path(command[1]).name for command in commands] == started
     assert all(command[-2:] == [f"--out={tmp_path}", "--page"] for command in commands)

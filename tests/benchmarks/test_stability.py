@@ -12,7 +12,7 @@ import families
 import numpy as np
 import pytest
 
-from overlapper.cli import app as cli
+from overlapper.cli import bench
 
 ROOT = Path(__file__).parents[2]
 
@@ -162,9 +162,9 @@ def test_the_command_writes_results_page_and_pictures(tmp_path):
 
 
 def test_without_a_checkout_the_command_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr(cli, "__file__", str(tmp_path / "overlapper" / "cli" / "app.py"))
-    with pytest.raises(cli.Refused, match="needs a checkout"):
-        cli.stability()
+    monkeypatch.setattr(bench, "__file__", str(tmp_path / "overlapper" / "cli" / "bench.py"))
+    with pytest.raises(bench.Refused, match="needs a checkout"):
+        bench.stability()
 
 
 def test_a_missing_package_is_named_in_one_sentence():

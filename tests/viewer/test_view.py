@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from overlapper import Box, HalfSpace, Placed, RoundedHull, Sphere, overlap
-from overlapper.cli import app as cli
+from overlapper.cli import view as cli
 from overlapper.scenes.playback import largest, play
 from overlapper.scenes.verdict import load_scene, record
 from overlapper.viewer import picture

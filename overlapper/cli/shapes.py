@@ -1,17 +1,66 @@
-"""An inventory for a person to read: a line per link and kind of shape, and what is left out."""
+"""`overlapper shapes`: what is modelled of a file, a line per link and kind of shape, and what is left out."""
 
 from __future__ import annotations
 
+import json
+import sys
 from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
+import typer
 from rich.box import SIMPLE_HEAD
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from overlapper.simulation.inventory import Inventory, ListedShape
+from overlapper.cli.options import ConcaveOption, SurfaceOption, ThresholdOption
+from overlapper.cli.refusals import Refused
+
+if TYPE_CHECKING:
+    from overlapper.simulation.inventory import Inventory, ListedShape
 
 
-def shapes_table(found: Inventory) -> Table:
+def shapes(
+    file: Annotated[
+        Path, typer.Argument(help="A model or a scene: .urdf, .sdf, .xml (MJCF), .bullet.", show_default=False)
+    ],
+    surface: SurfaceOption = "nominal",
+    concave: ConcaveOption = "decompose",
+    concave_threshold: ThresholdOption = 0.05,
+    self_collision: Annotated[
+        bool, typer.Option("--self-collision", help="Load it with pybullet's URDF_USE_SELF_COLLISION.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, of every shape, instead.")] = False,
+) -> None:
+    """List what is modelled of a file that pybullet loads: shapes by link, sizes, who may collide, what is skipped.
+
+    The exit code is 0 if all of it is modelled, 1 if something is skipped, and 2 if pybullet cannot load it.
+
+    Examples:
+
+    [bold]overlapper shapes robot.urdf[/bold]
+
+    [bold]overlapper shapes humanoid.xml --self-collision --json[/bold]
+    """
+    from overlapper.simulation.inventory import NotRead, inventory
+
+    try:
+        found = inventory(file, self_collision, surface=surface, concave=concave, concave_threshold=concave_threshold)
+    except (NotRead, ImportError) as error:
+        raise Refused(str(error)) from error
+    if as_json:
+        print(json.dumps(found.as_dict()))
+    else:
+        console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
+        if found.links:
+            console.print(_table(found))
+        for line in _remarks(found):
+            console.print(line, markup=False, soft_wrap=True)
+    raise typer.Exit(1 if found.skipped else 0)
+
+
+def _table(found: Inventory) -> Table:
     """The links that have shapes."""
     table = Table(
         caption="Sizes in m. Volume: of each shape by itself, added up. Meets: how many other links in the file "
@@ -40,7 +89,7 @@ def shapes_table(found: Inventory) -> Table:
     return table
 
 
-def remarks(found: Inventory) -> list[str]:
+def _remarks(found: Inventory) -> list[str]:
     """What there is to say below the table."""
     bodies = f"{found.bodies:,} bodies" if found.bodies != 1 else "1 body"
     lines = [

@@ -1,0 +1,113 @@
+"""`overlapper intersect`: what polytopes of files and databases have in common."""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from overlapper.cli.options import MethodOption
+from overlapper.cli.refusals import Refused, input_refusals
+
+if TYPE_CHECKING:
+    from overlapper import Hull, Overlap
+
+UNITS = {"volume": " m³", "area": " m²", "centroid": " m", "depth": " m", "distance": " m"}
+
+
+def intersect(
+    sources: Annotated[
+        list[str],
+        typer.Argument(metavar="FILE_OR_URL...", help="Mesh files, and databases of polytopes.", show_default=False),
+    ],
+    query: Annotated[
+        str | None, typer.Option(help="SQL that returns id, x, y, z, one row per point, ordered by id.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Mesh of what is common: .obj, .stl, .ply.")] = None,
+    method: MethodOption = "auto",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the lines.")] = False,
+) -> None:
+    """Measure what convex polytopes have in common, all of them together, without a simulator.
+
+    A mesh file gives the convex hull of its points; a database, named by its SQLAlchemy URL, every polytope that
+    --query returns, or that overlapper.write_polytopes has put there. Lengths are taken for m.
+
+    Examples:
+
+    [bold]overlapper intersect bolt.stl plate.stl --out clash.stl[/bold]
+
+    [bold]overlapper intersect sqlite:///parts.db[/bold]
+
+    [bold]overlapper intersect postgresql+psycopg://me@host/db --query "SELECT part, x, y, z FROM p ORDER BY 1"[/bold]
+    """
+    from overlapper import overlap
+
+    with input_refusals():
+        if out:
+            from overlapper.polytopes.mesh_file import check_ending, write_mesh
+
+            check_ending(out)
+        hulls = [hull for source in sources for hull in _hulls(source, query)]
+    if len(hulls) < 2:
+        raise Refused(f"at least two polytopes are needed, not {len(hulls)}")
+    common = overlap(*hulls, method=method)
+    written = out if common else None
+    if written:
+        with input_refusals():
+            write_mesh(written, common)
+    facts = _facts(common) | {"method": method, "out": str(written) if written else None}
+    if as_json:
+        print(json.dumps(facts))
+        return
+    for name, fact in facts.items():
+        if name == "volume" or (fact and name not in ("volume_error", "method", "out")):
+            error = f" ± {common.volume_error:.1g}" if name == "volume" else ""
+            print(f"{name:10}{_digits(fact)}{error}{UNITS.get(name, '')}")
+    if out:
+        print(f"Written: {out}" if written else f"Not written, as nothing is in common: {out}")
+
+
+def _hulls(source: str, query: str | None) -> Iterator[Hull]:
+    """The polytopes of one argument; what has been taken for them that is more than they are is named on stderr."""
+    if "://" in source:
+        from overlapper.polytopes.database import read_polytopes
+
+        yield from (hull for _, hull in read_polytopes(source, query))
+        return
+    from overlapper.polytopes.mesh_file import NotConvexWarning, read_hull
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", NotConvexWarning)
+        hull = read_hull(source)
+    for warning in caught:
+        if issubclass(warning.category, NotConvexWarning):
+            print(f"overlapper: {warning.message}", file=sys.stderr)
+    yield hull
+
+
+def _facts(common: Overlap) -> dict[str, Any]:
+    centroid, normal = common.centroid, common.normal
+    return {
+        "polytopes": len(common.shapes),
+        "status": common.status,
+        "volume": common.volume,
+        "volume_error": common.volume_error,
+        "area": common.area,
+        "centroid": None if centroid is None else centroid.tolist(),
+        "depth": common.depth,
+        "distance": common.distance,
+        "normal": None if normal is None else normal.tolist(),
+        "corners": len(common.vertices),
+        "facets": len(common.facets),
+    }
+
+
+def _digits(fact: Any) -> str:
+    if isinstance(fact, list):
+        return ", ".join(map(_digits, fact))
+    return f"{fact:.9g}" if isinstance(fact, float) else str(fact)

@@ -1,0 +1,85 @@
+"""What the user can mend, as one sentence; and stdout kept for the answer."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import tempfile
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from typing import BinaryIO, NoReturn
+
+from overlapper.scenes.scene import SceneError
+
+LIBC = ctypes.CDLL(None)
+
+
+class Refused(Exception):
+    """What was asked for cannot be done; the message is one sentence for the person who asked."""
+
+
+def give_up(sentence: str) -> NoReturn:
+    print(f"overlapper: {sentence}", file=sys.stderr)
+    sys.exit(2)
+
+
+@contextmanager
+def input_refusals() -> Iterator[None]:
+    """Turns what is wrong with files and databases into one sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise Refused(f"{error.filename}: {error.strerror}" if error.filename else str(error)) from error
+    except (ImportError, ValueError) as error:
+        raise Refused(str(error)) from error
+    except Exception as error:
+        # SQLAlchemy may not be there to name the class; its message goes on for lines about itself.
+        if not type(error).__module__.startswith("sqlalchemy."):
+            raise
+        raise Refused(f"the database says: {str(getattr(error, 'orig', None) or error).splitlines()[0]}") from error
+
+
+@contextmanager
+def scene_refusals(noise: BinaryIO) -> Iterator[None]:
+    """Turns what the user can mend into one sentence, to which the last line that C has printed may add the cause."""
+    try:
+        yield
+    except ImportError as error:
+        raise Refused(str(error)) from error
+    except OSError as error:
+        raise Refused(f"cannot write {error.filename or 'the results'}: {error.strerror}") from error
+    except SceneError as error:
+        LIBC.fflush(None)
+        noise.seek(0)
+        last_words = noise.read().decode(errors="replace").strip().rpartition("\n")[2]
+        raise Refused(f"{error} ({last_words})" if last_words else str(error)) from error
+
+
+@contextmanager
+def quiet() -> Iterator[BinaryIO]:
+    """Keeps stdout for the answer: what Python prints goes to stderr, what C prints (as pybullet) to the file given."""
+    with tempfile.TemporaryFile() as noise, redirect_stdout(sys.stderr), warnings.catch_warnings(), diverted(1, noise):
+        warnings.simplefilter("ignore", UserWarning)  # of shapes left out: the summary names them
+        yield noise
+
+
+@contextmanager
+def diverted(descriptor: int, file: BinaryIO) -> Iterator[None]:
+    """Whatever goes to a file descriptor goes to `file` meanwhile, whoever writes it."""
+    kept = os.dup(descriptor)
+    os.dup2(file.fileno(), descriptor)
+    try:
+        yield
+    finally:
+        LIBC.fflush(None)  # or what C still holds would follow later
+        os.dup2(kept, descriptor)
+        os.close(kept)
+
+
+@contextmanager
+def without_banner() -> Iterator[None]:
+    """What goes to stderr is lost meanwhile: pybullet says on import when it was built."""
+    with open(os.devnull, "wb") as nowhere, diverted(2, nowhere):
+        yield

@@ -1,0 +1,150 @@
+"""`overlapper run`: a scene simulated and measured, as a table, a recording and a summary."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+
+from overlapper.cli.options import ConcaveOption, MethodOption, SurfaceOption, ThresholdOption
+from overlapper.cli.recorded import recorder, with_progress
+from overlapper.cli.refusals import Refused, quiet, scene_refusals, without_banner
+from overlapper.scenes.scene import load_scene
+
+if TYPE_CHECKING:
+    from overlapper.cli.summary import Summary
+
+
+def run(
+    scene: Annotated[str, typer.Argument(help="Name of a scene, or path of a scene file (.py).", show_default=False)],
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Steps to simulate; by default as many as the scene says.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Table of all pairs in all steps: .csv, .parquet, .sqlite.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Recording to look at in a browser, one file.")] = None,
+    check: Annotated[
+        Literal["fcl"] | None, typer.Option(help="Ask FCL about every pair, too, and explain what differs.")
+    ] = None,
+    method: MethodOption = "auto",
+    tolerance: Annotated[float, typer.Option(help="Relative accuracy of smooth shapes; polyhedra are exact.")] = 1e-3,
+    per: Annotated[
+        Literal["shape", "link"],
+        typer.Option(help="What the rows of --out are of: two shapes, or two links as a whole."),
+    ] = "shape",
+    concave: ConcaveOption = "decompose",
+    concave_threshold: ThresholdOption = 0.05,
+    surface: SurfaceOption = "nominal",
+    pairs: Annotated[
+        Literal["simulated", "all"] | None,
+        typer.Option(help="Pairs that the simulator lets collide, or all of different bodies; by default PAIRS."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
+) -> None:
+    """Simulate a scene and measure what its bodies have in common in every step.
+
+    A scene is a Python file with STEPS, the number of steps, and build(client), which fills a pybullet client and may
+    return a function step(i) that is called before each step. PAIRS in it may be "all", or a list of pairs of bodies.
+
+    Examples:
+
+    [bold]overlapper run franka_grasp[/bold]  a table of the overlaps
+
+    [bold]overlapper run box_pile --steps 120 --out pile.csv[/bold]  and every pair of every step
+
+    [bold]overlapper run my_scene.py --html my_scene.html[/bold]  and a recording with a time slider
+
+    [bold]overlapper run kuka_jenga --check fcl --json[/bold]  compared with FCL, for a program to read
+    """
+    from overlapper.scenes.table_file import TABLES
+
+    if not 0 < tolerance < 1:
+        raise Refused(f"--tolerance must lie between 0 and 1, not {tolerance}")
+    if out and out.suffix not in TABLES:
+        raise Refused(f"--out must end in {', '.join(TABLES)}, not {out.name!r}")
+    if not 0.01 <= concave_threshold <= 1:
+        raise Refused(f"--concave-threshold must lie between 0.01 and 1, not {concave_threshold}")
+    geometry = {
+        "tolerance": tolerance,
+        "method": method,
+        "concave": concave,
+        "concave_threshold": concave_threshold,
+        "surface": surface,
+        "pairs": pairs,
+    }
+    summary, finished = _measure(scene, steps, out, html, check is not None, per, geometry)
+    files = {name: str(path) for name, path in (("out", out), ("html", html)) if path}
+    if as_json:
+        print(json.dumps(geometry | summary.as_dict() | {"finished": finished} | files))
+    else:
+        _show(summary, finished, files)
+    if not finished:
+        raise typer.Exit(130)
+
+
+def _measure(
+    name: str,
+    steps: int | None,
+    out: Path | None,
+    html: Path | None,
+    check: bool,
+    per: Literal["shape", "link"],
+    geometry: Mapping[str, Any],
+) -> tuple[Summary, bool]:
+    """The run, with its files; False if it was interrupted, and then both have what was done until then."""
+    with quiet() as noise, scene_refusals(noise), ExitStack() as stack:
+        with without_banner():
+            from overlapper.scenes.verdict import run as frames_of
+            from overlapper.simulation import link_contacts
+        from overlapper.cli.summary import Summary
+        from overlapper.reference import Fcl
+        from overlapper.scenes.table import link_rows, rows
+        from overlapper.scenes.table_file import TABLES, origin
+
+        scene = load_scene(name)
+        fcl = stack.enter_context(Fcl()) if check else None
+        for path in filter(None, (out, html)):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        settings = {
+            "scene": scene.name,
+            "steps": str(steps or scene.steps),
+            "per": per,
+            **{setting: str(value) for setting, value in geometry.items()},
+        }
+        table = stack.enter_context(closing(TABLES[out.suffix](out, origin() | settings))) if out else None
+        record = stack.enter_context(recorder(html)) if html else None
+        frames = stack.enter_context(closing(frames_of(scene, steps, **geometry)))
+        summary = Summary(scene.name)
+        try:
+            for frame in with_progress(frames, scene.name, steps or scene.steps):
+                opinions = fcl.compare_many(contact.overlap for contact in frame.contacts) if fcl else []
+                if table:
+                    where = frame.step, frame.time, frame.bodies
+                    if per == "link":
+                        table.write(link_rows(*where, link_contacts(frame.contacts)))
+                    else:
+                        table.write(rows(*where, frame.contacts, opinions))
+                summary.add(frame, opinions)
+                if record:
+                    record(frame)
+        except KeyboardInterrupt:
+            return summary, False
+    return summary, True
+
+
+def _show(summary: Summary, finished: bool, files: dict[str, str]) -> None:
+    from overlapper.cli.summary import overlaps_table, remarks
+
+    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
+    console.print(overlaps_table(summary) if summary.pairs else f"Nothing overlaps in {summary.steps} steps.")
+    for line in remarks(summary):
+        console.print(line, markup=False, soft_wrap=True)
+    if not finished:
+        console.print(f"Interrupted after step {summary.steps}; what came before is kept.")
+    for path in files.values():
+        console.print(f"Written: {path}", markup=False, soft_wrap=True)

@@ -1,0 +1,141 @@
+"""`overlapper view`: a scene, or the table of one, as a page, as a picture, or live."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import closing, redirect_stdout, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from overlapper.cli.recorded import PICTURES_PER_SECOND, recorder, with_progress
+from overlapper.cli.refusals import Refused, input_refusals, quiet, scene_refusals, without_banner
+
+if TYPE_CHECKING:
+    from overlapper.scenes.playback import Playback
+    from overlapper.viewer.look import Look
+
+
+def view(
+    source: Annotated[
+        str, typer.Argument(help="A scene, by name or path, or a table of one that was written.", show_default=False)
+    ],
+    html: Annotated[Path | None, typer.Option(help="Write a page for any browser; out/<name>.html by default.")] = None,
+    png: Annotated[Path | None, typer.Option(help="Draw a picture instead, without a browser.")] = None,
+    live: Annotated[bool, typer.Option("--live", help="Watch it in meshcat while it is simulated instead.")] = False,
+    steps: Annotated[int | None, typer.Option(min=1, help="Steps of a scene; by default as many as it says.")] = None,
+    step: Annotated[
+        int | None, typer.Option(min=1, help="Of the picture; by default the one in which most is shared.")
+    ] = None,
+    close: Annotated[bool, typer.Option("--close", help="The picture is of the largest overlap.")] = False,
+    overlaps: Annotated[
+        str, typer.Option(help="What is drawn of overlaps: faces, edges, vertices, marks.")
+    ] = "faces,marks",
+    overlaps_opacity: Annotated[float, typer.Option(help="From 0 to 1.")] = 1.0,
+    overlaps_front: Annotated[str | None, typer.Option(help="Colour from outside; the owners' if not given.")] = None,
+    overlaps_back: Annotated[str | None, typer.Option(help="Colour from inside, seen if opacity is below 1.")] = None,
+    bodies: Annotated[str, typer.Option(help="What is drawn of bodies: faces, edges, vertices.")] = "faces,edges",
+    bodies_opacity: Annotated[float, typer.Option(help="From 0 to 1.")] = 0.35,
+    bodies_front: Annotated[str | None, typer.Option(help="Colour from outside; their own if not given.")] = None,
+    bodies_back: Annotated[str | None, typer.Option(help="Colour from inside; not drawn if not given.")] = None,
+) -> None:
+    """See a scene, or a table of one: as a page with a time slider, as a picture, or live.
+
+    An expected file has all that is needed. Of any other table the scene is run again, as the table says it was, and
+    what is not as in the table is told.
+
+    Examples:
+
+    [bold]overlapper view franka_grasp[/bold]  a page to play, click and measure in: out/franka_grasp.html
+
+    [bold]overlapper view scenes/expected/box_pile.csv --png pile.png --close[/bold]  a picture for a report
+
+    [bold]overlapper view my_scene.py --live --bodies edges --overlaps-opacity 0.6[/bold]
+    """
+    if sum(map(bool, (html, png, live))) > 1:
+        raise Refused("--html, --png and --live do not go together: one at a time")
+    looks = (
+        _look("bodies", bodies, bodies_opacity, bodies_front, bodies_back),
+        _look("overlaps", overlaps, overlaps_opacity, overlaps_front, overlaps_back),
+    )
+    page = html or Path("out") / f"{Path(source).stem}.html"
+    with quiet() as noise, scene_refusals(noise), input_refusals():
+        with without_banner():
+            from overlapper.scenes.playback import play
+        playback = play(source, steps)
+        with closing(playback.views):
+            if live:
+                _live(playback, looks)
+            elif png:
+                _picture(playback, png, step, close, looks)
+            else:
+                _film(playback, page, looks)
+    for remark in playback.remarks:
+        print(f"overlapper: {remark}", file=sys.stderr)
+    if not live:
+        print(f"Written: {png or page}")
+    if not live and not png:
+        _open(page.resolve().as_uri())
+
+
+def _film(playback: Playback, html: Path, looks: Sequence[Look]) -> None:
+    html.parent.mkdir(parents=True, exist_ok=True)
+    rate = math.inf if playback.sparse else PICTURES_PER_SECOND
+    with recorder(html, looks, rate) as record, suppress(KeyboardInterrupt):
+        for view in with_progress(playback.views, playback.name, playback.total):
+            record(view)
+
+
+def _picture(playback: Playback, png: Path, step: int | None, close: bool, looks: tuple[Look, Look]) -> None:
+    from overlapper.scenes.playback import at_step, largest
+    from overlapper.viewer import picture
+
+    views = with_progress(playback.views, playback.name, playback.total)
+    view = at_step(views, step) if step else largest(views)
+    png.parent.mkdir(parents=True, exist_ok=True)
+    title = f"{playback.name}, step {view.step}, {view.time:.3f} s"
+    picture.save(png, view.bodies, view.contacts, title, close, looks)
+
+
+def _live(playback: Playback, looks: Sequence[Look]) -> None:
+    """As fast as the simulation is in the world, or as it can be; stays until it is interrupted, on a terminal."""
+    from overlapper.viewer import Viewer
+
+    with redirect_stdout(io.StringIO()):  # meshcat says where it is, too
+        viewer = Viewer(None, *looks)
+    with viewer, suppress(KeyboardInterrupt):
+        print(f"overlapper: {viewer.url} (Ctrl-C ends it)", file=sys.stderr, flush=True)
+        _open(viewer.url)
+        start, shown = time.monotonic(), 0
+        for view in playback.views:
+            if view.time * PICTURES_PER_SECOND >= shown or playback.sparse:
+                time.sleep(max(0.0, start + view.time - time.monotonic()))
+                viewer.show(view.bodies, view.contacts)
+                shown += 1
+        while sys.stderr.isatty():
+            time.sleep(3600)
+
+
+def _open(address: str) -> None:
+    """In a browser, for somebody who sits at a screen."""
+    if sys.stderr.isatty() and (sys.platform != "linux" or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ):
+        typer.launch(address)
+
+
+def _look(kind: str, parts: str, opacity: float, front: str | None, back: str | None) -> Look:
+    from overlapper.viewer.look import PARTS, Look
+
+    wanted = [part.strip() for part in parts.split(",") if part.strip()]
+    for part in wanted:
+        if part not in PARTS:
+            raise Refused(f"--{kind} must name some of {','.join(PARTS)}, not {part!r}")
+    try:
+        return Look(opacity=opacity, front=front, back=back, **{part: part in wanted for part in PARTS})
+    except ValueError as error:
+        raise Refused(f"--{kind}-{error}") from error
