@@ -42,8 +42,8 @@ void add(Mat3& m, double s, const Mat3& other) {
 
 }  // namespace
 
-Measures measure(const Polytope& polytope) {
-  Measures sum;
+Moments moments(const Polytope& polytope) {
+  Moments sum;
   sum.cone_volume.reserve(polytope.facets());
   sum.facet_centroid.reserve(polytope.facets());
   for (int f = 0; f < polytope.facets(); ++f) {
@@ -65,26 +65,6 @@ Measures measure(const Polytope& polytope) {
     sum.cone_volume.push_back(cone);
     sum.facet_centroid.push_back(cone > 0 ? weighted / (3 * cone) : a);
   }
-  return sum;
-}
-
-HullMeasures measure(const HullData& hull) {
-  Vec3 inside;
-  for (Vec3 v : hull.vertices) inside += v / static_cast<double>(hull.vertices.size());
-  HullMeasures sum;
-  Vec3 moment;
-  for (int f = 0; f + 1 < static_cast<int>(hull.ring_start.size()); ++f) {
-    const auto ring = hull.facet(f);
-    const Vec3 a = hull.vertices[ring[0]] - inside;
-    for (size_t i = 1; i + 1 < ring.size(); ++i) {
-      const Vec3 b = hull.vertices[ring[i]] - inside, c = hull.vertices[ring[i + 1]] - inside;
-      const double tetrahedron = dot(a, cross(b, c)) / 6;
-      sum.volume += tetrahedron;
-      sum.area += norm(cross(b - a, c - a)) / 2;
-      moment += tetrahedron / 4 * (a + b + c);
-    }
-  }
-  sum.centroid = inside + moment / sum.volume;
   return sum;
 }
 

@@ -5,7 +5,6 @@
 
 #include "geometry/expanding_hull.h"
 #include "geometry/vec.h"
-#include "shapes/shape.h"
 
 namespace overlapper {
 
@@ -32,7 +31,7 @@ inline Vec3 polar_dual(const Plane& plane, Vec3 origin) { return plane.normal / 
 Polytope polar_dual(const ExpandingHull& hull);
 
 /// Integrals over a solid that has the origin inside.
-struct Measures {
+struct Moments {
   double volume = 0;
   Vec3 first_moment;                                    ///< ∫ x dV
   Mat3 second_moment{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};  ///< ∫ x xᵀ dV
@@ -41,12 +40,6 @@ struct Measures {
 };
 
 /// Sums tetrahedra from the origin to the fans of the facets. All are positive, so nothing cancels.
-Measures measure(const Polytope& polytope);
-
-struct HullMeasures {
-  double volume = 0, area = 0;
-  Vec3 centroid;
-};
-HullMeasures measure(const HullData& hull);
+Moments moments(const Polytope& polytope);
 
 }  // namespace overlapper

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <future>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 #include <unordered_set>
 
@@ -10,9 +11,54 @@
 #include "geometry/expanding_hull.h"
 #include "geometry/polytope.h"
 #include "geometry/predicates.h"
+#include "shapes/limits.h"
 
 namespace overlapper {
 namespace {
+
+/// Vertices and facets of a polytope that approximates a smooth shape from inside, its volume short by the fraction
+/// `tolerance` or less; a polytope's own. Half-spaces and rounded hulls have none: std::invalid_argument.
+Hull tessellated(const Shape& shape, double tolerance) {
+  if (const Hull* hull = std::get_if<Hull>(&shape)) return *hull;
+  require(!std::holds_alternative<RoundedHull>(shape), "shapes must not be rounded hulls for method 'paper'");
+  std::vector<Vec3> points;
+  const auto circle = [&](double radius, double z, int n) {
+    for (int i = 0; i < n; ++i) {
+      const double angle = 2 * std::numbers::pi * i / n;
+      points.push_back({radius * std::cos(angle), radius * std::sin(angle), z});
+    }
+  };
+  if (const Box* box = std::get_if<Box>(&shape)) {
+    for (double x : {-1.0, 1.0})
+      for (double y : {-1.0, 1.0})
+        for (double z : {-1.0, 1.0})
+          points.push_back({x * box->half_extents.x, y * box->half_extents.y, z * box->half_extents.z});
+  } else if (const Cylinder* cylinder = std::get_if<Cylinder>(&shape)) {
+    // An inscribed n-gon lacks 2/3 (π/n)² of its disc.
+    require(tolerance >= 1e-11, "tolerance must be 1e-11 or more where method 'paper' tessellates a cylinder");
+    const int n = std::max(8, static_cast<int>(std::ceil(std::numbers::pi * std::sqrt(2 / (3 * tolerance)))));
+    circle(cylinder->radius, -cylinder->length / 2, n);
+    circle(cylinder->radius, cylinder->length / 2, n);
+  } else if (bounded(shape)) {
+    // A grid of latitudes and longitudes with the same step s lacks at most about s²/2 of the ball.
+    const double radius = core_radius(shape), half = shape.index() == 0 ? 0 : std::get<Capsule>(shape).length / 2;
+    // Two latitudes' worth of points per band: beyond a million or so their hull is out of reach.
+    require(tolerance >= 1e-5, "tolerance must be 1e-5 or more where method 'paper' tessellates a round shape");
+    const int bands = std::max(4, static_cast<int>(std::ceil(std::numbers::pi / std::sqrt(2 * tolerance))));
+    points.push_back({0, 0, radius + half});
+    points.push_back({0, 0, -radius - half});
+    for (int band = 1; band < bands; ++band) {
+      const double latitude = std::numbers::pi * (static_cast<double>(band) / bands - 0.5);
+      const double r = radius * std::cos(latitude), z = radius * std::sin(latitude);
+      const int around = std::max(6, static_cast<int>(std::ceil(2 * bands * std::cos(latitude))));
+      if (z <= 0) circle(r, z - half, around);
+      if (z >= 0) circle(r, z + half, around);
+    }
+  } else {
+    throw std::invalid_argument("a half-space is unbounded and has no vertices");
+  }
+  return make_hull(points);
+}
 
 /// The minimal step of the 26 shifts, as a fraction of the smaller polytope's extent. The text gives no number. Half of
 /// a double's digits are spent on getting off the boundary, half are left to the dual points.

@@ -6,8 +6,7 @@
 #include <variant>
 #include <vector>
 
-#include "geometry/vec.h"
-#include "shapes/hull_graph.h"
+#include "shapes/hull.h"
 
 namespace overlapper {
 
@@ -80,49 +79,6 @@ struct HalfSpace {
   Plane tightest(Vec3) const { return plane; }
 };
 
-/// A ridge of a polytope: from vertex `from` to vertex `to`, the facet `left` on the left hand seen from outside.
-struct Edge {
-  int from, to, left, right;
-};
-
-/// What a convex polytope is made of. Facet f is the polygon ring[ring_start[f] .. ring_start[f + 1]) of vertices,
-/// counter-clockwise from outside, in the plane planes[f]. Coordinates are relative to `origin`: subtracting it lost no
-/// bit, and it keeps the digits of a hull that lies far from where its points are counted from.
-struct HullData {
-  Vec3 origin;
-  std::vector<Vec3> vertices;
-  std::vector<Plane> planes;
-  std::vector<int> ring, ring_start{0};
-  /// The surface as it is before coplanar triangles are merged and what rounding moved is forgotten, for wider
-  /// arithmetic.
-  std::vector<Vec3> corners;
-  std::vector<std::array<int, 3>> triangles;
-  /// Per facet: three corners whose plane holds all corners of its triangles without any rounding; -1 if there are
-  /// none.
-  std::vector<std::array<int, 3>> facet_corners;
-  double volume = 0;
-  Vec3 centroid;
-  std::shared_ptr<const HullGraph> graph;  ///< for climbing; null where rounding left no closed convex surface
-
-  std::vector<Edge> edges;                      ///< none if merging facets has left a ridge without its other side
-  std::vector<std::array<int, 3>> facets_meet;  ///< per vertex: three of its facets, as far from a common line as any
-  double radius = 0;                            ///< of a ball about the coordinates' origin that holds all vertices
-  double flatness = 0;  ///< m: how far vertices of a facet lie inside its plane, or those beside it outside, at most
-
-  std::span<const int> facet(int f) const {
-    return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
-  }
-};
-
-/// The convex hull of points; shared, never changed once built.
-struct Hull {
-  std::shared_ptr<const HullData> data;
-
-  Vec3 support(Vec3 direction) const;
-  Plane ray_exit(Vec3 origin, Vec3 direction) const;
-  Plane tightest(Vec3 point) const;
-};
-
 /// All points within `radius` of a polytope: its Minkowski sum with a ball.
 struct RoundedHull {
   Hull core;
@@ -146,15 +102,7 @@ Box make_box(Vec3 half_extents);
 Capsule make_capsule(double radius, double length);
 Cylinder make_cylinder(double radius, double length);
 HalfSpace make_half_space(Vec3 normal, double offset);
-/// Interior, duplicate, collinear and coplanar points are welcome; coplanar triangles become one facet.
-Hull make_hull(std::span<const Vec3> points);
 RoundedHull make_rounded_hull(std::span<const Vec3> points, double radius);
-/// The hull of finite points, or null if they are flat; `source[i]` becomes the index of vertex i among the points.
-std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source = nullptr);
-
-/// Fills in what follows from vertices, planes and rings.
-void complete(HullData& data);
-
 /// m³; infinite for a half-space.
 double volume(const Shape& shape);
 Vec3 centroid(const Shape& shape);
@@ -202,9 +150,5 @@ struct Bounds {
 };
 /// The box around a placed shape, from six supports; infinite for a half-space.
 Bounds bounds(const Placed& placed);
-
-/// Vertices and facets of a polytope that approximates a smooth shape from inside, its volume short by the fraction
-/// `tolerance` or less; a polytope's own. Half-spaces and rounded hulls have none: std::invalid_argument.
-Hull tessellated(const Shape& shape, double tolerance);
 
 }  // namespace overlapper

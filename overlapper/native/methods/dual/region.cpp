@@ -198,7 +198,7 @@ Mat3 inertia_tensor(const Mat3& s) {
 }  // namespace
 
 Quantities measure(const Region& region) {
-  const Measures in_frame = measure(region.polytope);
+  const Moments in_frame = moments(region.polytope);
   const Mat3& axes = region.frame.axes;
   const double scale = determinant(axes);
   Quantities q;

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "geometry/vec.h"
+
+namespace overlapper {
+
+enum class Status { kSeparated, kTouching, kOverlapping };
+
+/// The way an answer came. methods/choose.h says which is tried when; kWayNames has them as users read them.
+enum class Way {
+  kSeparation,      ///< doubles prove a gap
+  kClipping,        ///< corners of each body held against the planes of the other
+  kTracing,         ///< the seam of two surfaces followed from facet to facet
+  kClosedForm,      ///< a formula
+  kDual,            ///< the convex hull of dual points
+  kWideSeparation,  ///< double-doubles prove a gap where doubles do not
+  kWideClipping,    ///< as kClipping, with corners placed in double-doubles
+  kWideDual,        ///< as kDual, with planes placed in double-doubles
+  kDoubt,           ///< neither doubles nor double-doubles tell whether there is an inside: the bodies touch
+  kPaper,           ///< the article's method, as asked for
+};
+inline constexpr std::array<const char*, 10> kWayNames{
+    "separation",      "clipping",      "tracing",        "closed form", "dual hull",
+    "wide separation", "wide clipping", "wide dual hull", "doubt",       "paper"};
+inline const char* name(Way way) { return kWayNames[static_cast<size_t>(way)]; }
+
+/// Doubles were not enough for the volume, and it was computed again in wider arithmetic.
+inline bool widened(Way way) { return way == Way::kWideClipping || way == Way::kWideDual; }
+
+/// What the common volume changes by as a body moves.
+template <class Vector>
+struct PullOf {
+  Vector force;   ///< d volume / d translation: the area vector of the facets that the body owns
+  Vector moment;  ///< d volume / d rotation vector about some point, which whoever has a pull names
+};
+using Pull = PullOf<Vec3>;
+
+/// A pull whose moment is about `from`, about `to`.
+inline Pull about(const Pull& pull, Vec3 from, Vec3 to) {
+  return {pull.force, pull.moment + cross(from - to, pull.force)};
+}
+
+/// What an edge adds to the pull of the patch that it borders on its left, about the origin: the area vector of a
+/// patch, and the integral of x × n over it, are integrals along its border (Stokes).
+template <class Vector>
+inline PullOf<Vector> pull_along_border(const Vector& from, const Vector& to) {
+  return {cross(from, to) / 2.0, (norm2(from) + dot(from, to) + norm2(to)) / 6.0 * (from - to)};
+}
+
+/// The relative error of a volume beyond which it is worth computing in another way.
+inline constexpr double kEnough = 1e-12;
+
+/// What is known of the common set of some bodies, in world coordinates and SI units; zeros unless overlapping.
+struct Measures {
+  Status status = Status::kSeparated;
+  Way way = Way::kSeparation;
+  /// Overlapping, and the figures below are as good as any way gives them; otherwise only the status counts.
+  bool measured = false;
+  int facets_touched = 0;       ///< planes of the bodies that took part
+  double volume = 0, area = 0;  ///< m³, m²
+  double volume_error = 0;      ///< m³: the true volume is within volume ± volume_error
+  Vec3 centroid;
+  std::array<Pull, 2> pulls{};       ///< on the bodies of a pair, each about its body's position
+  std::vector<Pull> pulls_of_group;  ///< likewise, on more than two
+};
+
+/// Measures in the coordinates of the first body of a pair, until they are said in the world's.
+struct LocalMeasures {
+  Measures measures;
+  Pull on_first;  ///< about the centroid; the second body has the opposite
+};
+
+/// Three times the mean of the area on the way, over the area at its beginning, while the planes of a polytope move out
+/// by `moved`: what they reach then lies inside the polytope scaled by 1 + moved / least_slack about the point from
+/// which the nearest plane is `least_slack` away.
+inline double growth(double moved, double least_slack) {
+  const double grown = 1 + moved / least_slack;
+  return grown * grown + grown + 1;
+}
+
+}  // namespace overlapper

@@ -1,0 +1,339 @@
+#include "shapes/hull.h"
+
+#include <algorithm>
+#include <cfloat>
+#include <limits>
+#include <string>
+
+#include "geometry/expanding_hull.h"
+#include "geometry/predicates.h"
+#include "geometry/wide.h"
+#include "shapes/limits.h"
+
+namespace overlapper {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// The plane among `planes` with the largest `value(plane)`.
+template <class Value>
+Plane best_plane(const std::vector<Plane>& planes, Value value) {
+  int best = 0;
+  double largest = -kInfinity;
+  for (int i = 0; i < static_cast<int>(planes.size()); ++i) {
+    const double v = value(planes[i]);
+    if (v > largest) largest = v, best = i;
+  }
+  return planes[best];
+}
+
+}  // namespace
+
+Vec3 Hull::support(Vec3 direction) const {
+  const std::vector<Vec3>& vertices = data->vertices;
+  if (data->graph) return vertices[data->graph->farthest_vertex(*data, direction)];
+  int best = 0;
+  double largest = -kInfinity;
+  for (int i = 0; i < static_cast<int>(vertices.size()); ++i) {
+    const double value = dot(vertices[i], direction);
+    if (value > largest) largest = value, best = i;
+  }
+  return vertices[best];
+}
+
+Plane Hull::ray_exit(Vec3 origin, Vec3 direction) const {
+  double rate;
+  if (data->graph) return data->planes[data->graph->ray_exit(*data, origin, direction, rate)];
+  return best_plane(data->planes,
+                    [&](const Plane& p) { return dot(p.normal, direction) / -signed_distance(p, origin); });
+}
+
+Plane Hull::tightest(Vec3 point) const {
+  return best_plane(data->planes, [&](const Plane& p) { return signed_distance(p, point); });
+}
+
+namespace {
+
+/// Subtracting it is exact: Sterbenz' lemma holds for coordinates within a factor of two of the middle, so the middle
+/// is used on an axis only where the points keep farther from zero than that.
+Vec3 lossless_origin(Vec3 lower, Vec3 upper) {
+  const auto middle = [](double low, double high) {
+    const double centre = low / 2 + high / 2;
+    return std::abs(centre) >= 2 * (high - low) ? centre : 0;
+  };
+  return {middle(lower.x, upper.x), middle(lower.y, upper.y), middle(lower.z, upper.z)};
+}
+
+/// Which facet each triangle of a hull belongs to. A triangle joins its neighbour's facet if it lies within rounding of
+/// the facet's plane, that of its largest triangle.
+struct CoplanarRegions {
+  const ExpandingHull& hull;
+  double rounding;
+  std::vector<int> region;  ///< per triangle of the hull, -1 for removed ones
+  std::vector<int> first;   ///< per region: its largest triangle
+
+  Plane plane_of(int triangle) const {
+    const auto& [a, b, c] = hull.facets[triangle].vertex;
+    const Vec3 normal = unit(accurate_normal(hull.points[a], hull.points[b], hull.points[c]));
+    return {normal, dot(normal, hull.points[a])};
+  }
+
+  void grow(int triangle) {
+    const int id = static_cast<int>(first.size());
+    first.push_back(triangle);
+    const Plane plane = plane_of(triangle);
+    std::vector<int> stack{triangle};
+    region[triangle] = id;
+    while (!stack.empty()) {
+      const int t = stack.back();
+      stack.pop_back();
+      for (int other : hull.facets[t].neighbour) {
+        if (region[other] >= 0) continue;
+        // The far side of a plate thinner than rounding is another facet.
+        bool flat = dot(plane_of(other).normal, plane.normal) >= 0;
+        for (int v : hull.facets[other].vertex) flat &= std::abs(signed_distance(plane, hull.points[v])) <= rounding;
+        if (!flat) continue;
+        region[other] = id;
+        stack.push_back(other);
+      }
+    }
+  }
+};
+
+CoplanarRegions merge_coplanar(const ExpandingHull& hull, double rounding) {
+  CoplanarRegions regions{hull, rounding, std::vector<int>(hull.facets.size(), -1), {}};
+  std::vector<int> by_area;
+  for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t)
+    if (!hull.facets[t].removed()) by_area.push_back(t);
+  std::sort(by_area.begin(), by_area.end(),
+            [&](int a, int b) { return norm2(hull.facets[a].normal) > norm2(hull.facets[b].normal); });
+  for (int t : by_area)
+    if (regions.region[t] < 0) regions.grow(t);
+  return regions;
+}
+
+/// The directed ridges that leave each region, chained into one loop of point indices per region.
+std::vector<std::vector<int>> region_loops(const CoplanarRegions& regions) {
+  const ExpandingHull& hull = regions.hull;
+  struct Ridge {
+    int from, to;
+  };
+  std::vector<std::vector<Ridge>> border(regions.first.size());
+  for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t) {
+    if (hull.facets[t].removed()) continue;
+    for (int i = 0; i < 3; ++i)
+      if (regions.region[hull.facets[t].neighbour[i]] != regions.region[t])
+        border[regions.region[t]].push_back({hull.facets[t].vertex[i], hull.facets[t].vertex[(i + 1) % 3]});
+  }
+  std::vector<std::vector<int>> loops(border.size());
+  std::vector<int> next(hull.points.size(), -1);
+  for (int r = 0; r < static_cast<int>(border.size()); ++r) {
+    if (border[r].empty()) continue;
+    for (const Ridge& ridge : border[r]) next[ridge.from] = ridge.to;
+    const int begin = border[r][0].from;
+    int v = begin;
+    do {
+      loops[r].push_back(v);
+      v = next[v];
+    } while (v != begin && loops[r].size() < border[r].size());
+  }
+  return loops;
+}
+
+/// Points in the middle of an edge lie on two facets only: they are no vertices of the solid.
+void drop_edge_points(std::vector<std::vector<int>>& loops, int points) {
+  std::vector<int> facets_at(points, 0);
+  for (const auto& loop : loops)
+    for (int v : loop) ++facets_at[v];
+  for (auto& loop : loops) {
+    std::erase_if(loop, [&](int v) { return facets_at[v] < 3; });
+    if (loop.size() < 3) loop.clear();
+  }
+}
+
+/// Newell's normal of a polygon, taken about its first corner; the offset is that of its outermost corner.
+Plane supporting_plane(const std::vector<Vec3>& vertices, std::span<const int> ring) {
+  const Vec3 apex = vertices[ring[0]];
+  Vec3 normal;
+  if (ring.size() == 3) {
+    normal = unit(accurate_normal(apex, vertices[ring[1]], vertices[ring[2]]));
+  } else {
+    // On a slender facet the products of doubles nearly cancel.
+    WideVector sum;
+    for (size_t i = 1; i + 1 < ring.size(); ++i)
+      sum = sum + wide_cross(wide_difference(vertices[ring[i]], apex), wide_difference(vertices[ring[i + 1]], apex));
+    normal = unit(rounded(sum));
+  }
+  double offset = -kInfinity;
+  for (int v : ring) offset = std::max(offset, dot(normal, vertices[v]));
+  return {normal, offset};
+}
+
+/// Per region: the corners of its largest triangle, unless rounding alone has merged others with that.
+std::vector<std::array<int, 3>> exact_corners(const CoplanarRegions& regions) {
+  const ExpandingHull& hull = regions.hull;
+  std::vector<std::array<int, 3>> corners;
+  for (int t : regions.first) corners.push_back(hull.facets[t].vertex);
+  for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t) {
+    if (hull.facets[t].removed() || regions.first[regions.region[t]] == t) continue;
+    std::array<int, 3>& corner = corners[regions.region[t]];
+    if (corner[0] < 0) continue;
+    const auto [a, b, c] = corner;
+    for (int v : hull.facets[t].vertex)
+      if (orientation(hull.points[a], hull.points[b], hull.points[c], hull.points[v]) != 0) corner = {-1, -1, -1};
+  }
+  return corners;
+}
+
+HullData hull_data(const CoplanarRegions& regions, const std::vector<std::vector<int>>& loops, Vec3 origin,
+                   std::vector<int>* source) {
+  const ExpandingHull& hull = regions.hull;
+  HullData data;
+  data.origin = origin;
+  std::vector<int> index(hull.points.size(), -1);
+  for (const auto& loop : loops) {
+    if (loop.empty()) continue;
+    for (int p : loop) {
+      if (index[p] < 0) {
+        index[p] = static_cast<int>(data.vertices.size());
+        data.vertices.push_back(hull.points[p]);
+        if (source) source->push_back(p);
+      }
+      data.ring.push_back(index[p]);
+    }
+    data.ring_start.push_back(static_cast<int>(data.ring.size()));
+  }
+  std::vector<int> corner(hull.points.size(), -1);
+  for (const ExpandingHull::Facet& facet : hull.facets) {
+    if (facet.removed()) continue;
+    std::array<int, 3> triangle;
+    for (int i = 0; i < 3; ++i) {
+      const int p = facet.vertex[i];
+      if (corner[p] < 0) {
+        corner[p] = static_cast<int>(data.corners.size());
+        data.corners.push_back(hull.points[p]);
+      }
+      triangle[i] = corner[p];
+    }
+    data.triangles.push_back(triangle);
+  }
+  const std::vector<std::array<int, 3>> exact = exact_corners(regions);
+  for (int r = 0; r < static_cast<int>(loops.size()); ++r) {
+    if (loops[r].empty()) continue;
+    const auto& [a, b, c] = exact[r];
+    data.facet_corners.push_back(a < 0 ? exact[r] : std::array{corner[a], corner[b], corner[c]});
+    data.planes.push_back(supporting_plane(data.vertices, data.facet(static_cast<int>(data.planes.size()))));
+  }
+  return data;
+}
+
+std::vector<Edge> edges_of(const HullData& data) {
+  struct Side {
+    int from, to, facet;
+  };
+  std::vector<Side> sides;
+  for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
+    const auto ring = data.facet(f);
+    for (size_t i = 0; i < ring.size(); ++i) sides.push_back({ring[i], ring[(i + 1) % ring.size()], f});
+  }
+  const auto ends = [](const Side& s) { return std::minmax(s.from, s.to); };
+  std::stable_sort(sides.begin(), sides.end(), [&](const Side& a, const Side& b) { return ends(a) < ends(b); });
+  std::vector<Edge> edges;
+  for (size_t i = 0; i < sides.size(); i += 2) {
+    const bool paired = i + 1 < sides.size() && sides[i].from == sides[i + 1].to && sides[i].to == sides[i + 1].from;
+    if (!paired || (i + 2 < sides.size() && ends(sides[i + 2]) == ends(sides[i]))) return {};
+    edges.push_back({sides[i].from, sides[i].to, sides[i].facet, sides[i + 1].facet});
+  }
+  return edges;
+}
+
+/// Of the facets around a vertex: the first, the one at the largest angle to it, and the one that with these spans
+/// most.
+std::array<int, 3> well_spread(std::span<const int> around, const std::vector<Plane>& planes) {
+  const auto most = [&](auto spread) {
+    return *std::max_element(around.begin(), around.end(), [&](int f, int g) { return spread(f) < spread(g); });
+  };
+  const Vec3 a = planes[around[0]].normal;
+  const int second = most([&](int f) { return norm2(cross(a, planes[f].normal)); });
+  const Vec3 ab = cross(a, planes[second].normal);
+  return {around[0], second, most([&](int f) { return std::abs(dot(ab, planes[f].normal)); })};
+}
+
+}  // namespace
+
+void complete(HullData& data) {
+  data.edges = edges_of(data);
+  std::vector<std::vector<int>> around(data.vertices.size());
+  for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
+    for (int v : data.facet(f)) {
+      around[v].push_back(f);
+      data.flatness = std::max(data.flatness, -signed_distance(data.planes[f], data.vertices[v]));
+    }
+  }
+  for (const Edge& e : data.edges)
+    for (const auto& [facet, beside] : {std::pair(e.left, e.right), std::pair(e.right, e.left)})
+      for (int v : data.facet(beside))
+        data.flatness = std::max(data.flatness, signed_distance(data.planes[facet], data.vertices[v]));
+  for (const auto& facets : around) data.facets_meet.push_back(well_spread(facets, data.planes));
+  for (Vec3 v : data.vertices) data.radius = std::max(data.radius, norm(v));
+}
+
+std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source) {
+  Vec3 lower = points[0], upper = points[0];
+  for (Vec3 p : points) lower = min(lower, p), upper = max(upper, p);
+  const Vec3 origin = lossless_origin(lower, upper);
+  ExpandingHull hull;
+  hull.points.reserve(points.size());
+  for (Vec3 p : points) hull.points.push_back(p - origin);
+  if (!hull.build()) return nullptr;
+
+  // Corners computed by a user as centre plus rotated half extents carry a few roundings each, relative to the extent;
+  // a plane through three of them misses a fourth by up to about eight of those.
+  const double rounding = 16 * DBL_EPSILON * max_component(max(abs(lower - origin), abs(upper - origin)));
+  const CoplanarRegions regions = merge_coplanar(hull, rounding);
+  std::vector<std::vector<int>> loops = region_loops(regions);
+  drop_edge_points(loops, static_cast<int>(hull.points.size()));
+  auto data = std::make_shared<HullData>(hull_data(regions, loops, origin, source));
+  if (data->planes.size() < 4) return nullptr;
+  const HullMeasures measures = measure(*data);
+  data->volume = measures.volume;
+  data->centroid = measures.centroid;
+  complete(*data);
+  // A solid thinner than the rounding of its corners has no inside to speak of.
+  if (!(data->volume > rounding * measures.area / 2)) return nullptr;
+  return data;
+}
+
+Hull make_hull(std::span<const Vec3> points) {
+  require(points.size() >= 4, "vertices must hold at least four points, not " + std::to_string(points.size()));
+  for (Vec3 p : points) require(finite(p), "vertices must be finite");
+  double largest = 0;
+  for (Vec3 p : points) largest = std::max(largest, max_component(abs(p)));
+  require(largest < kLargest, "vertices must be closer to the origin than 1e100 m");
+  auto data = hull_of(points);
+  require(data != nullptr, "vertices are flat: they all lie in one plane");
+  data->graph = graph_of(*data);
+  return {std::move(data)};
+}
+
+HullMeasures measure(const HullData& hull) {
+  Vec3 inside;
+  for (Vec3 v : hull.vertices) inside += v / static_cast<double>(hull.vertices.size());
+  HullMeasures sum;
+  Vec3 moment;
+  for (int f = 0; f + 1 < static_cast<int>(hull.ring_start.size()); ++f) {
+    const auto ring = hull.facet(f);
+    const Vec3 a = hull.vertices[ring[0]] - inside;
+    for (size_t i = 1; i + 1 < ring.size(); ++i) {
+      const Vec3 b = hull.vertices[ring[i]] - inside, c = hull.vertices[ring[i + 1]] - inside;
+      const double tetrahedron = dot(a, cross(b, c)) / 6;
+      sum.volume += tetrahedron;
+      sum.area += norm(cross(b - a, c - a)) / 2;
+      moment += tetrahedron / 4 * (a + b + c);
+    }
+  }
+  sum.centroid = inside + moment / sum.volume;
+  return sum;
+}
+
+}  // namespace overlapper

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "geometry/vec.h"
+#include "shapes/hull_graph.h"
+
+namespace overlapper {
+
+/// A ridge of a polytope: from vertex `from` to vertex `to`, the facet `left` on the left hand seen from outside.
+struct Edge {
+  int from, to, left, right;
+};
+
+/// What a convex polytope is made of. Facet f is the polygon ring[ring_start[f] .. ring_start[f + 1]) of vertices,
+/// counter-clockwise from outside, in the plane planes[f]. Coordinates are relative to `origin`: subtracting it lost no
+/// bit, and it keeps the digits of a hull that lies far from where its points are counted from.
+struct HullData {
+  Vec3 origin;
+  std::vector<Vec3> vertices;
+  std::vector<Plane> planes;
+  std::vector<int> ring, ring_start{0};
+  /// The surface as it is before coplanar triangles are merged and what rounding moved is forgotten, for wider
+  /// arithmetic.
+  std::vector<Vec3> corners;
+  std::vector<std::array<int, 3>> triangles;
+  /// Per facet: three corners whose plane holds all corners of its triangles without any rounding; -1 if there are
+  /// none.
+  std::vector<std::array<int, 3>> facet_corners;
+  double volume = 0;
+  Vec3 centroid;
+  std::shared_ptr<const HullGraph> graph;  ///< for climbing; null where rounding left no closed convex surface
+
+  std::vector<Edge> edges;                      ///< none if merging facets has left a ridge without its other side
+  std::vector<std::array<int, 3>> facets_meet;  ///< per vertex: three of its facets, as far from a common line as any
+  double radius = 0;                            ///< of a ball about the coordinates' origin that holds all vertices
+  double flatness = 0;  ///< m: how far vertices of a facet lie inside its plane, or those beside it outside, at most
+
+  std::span<const int> facet(int f) const {
+    return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
+  }
+};
+
+/// The convex hull of points; shared, never changed once built.
+struct Hull {
+  std::shared_ptr<const HullData> data;
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+};
+
+/// Interior, duplicate, collinear and coplanar points are welcome; coplanar triangles become one facet. Throws
+/// std::invalid_argument with one sentence that names the argument.
+Hull make_hull(std::span<const Vec3> points);
+/// The hull of finite points, or null if they are flat; `source[i]` becomes the index of vertex i among the points.
+std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source = nullptr);
+
+/// Fills in what follows from vertices, planes and rings.
+void complete(HullData& data);
+
+struct HullMeasures {
+  double volume = 0, area = 0;
+  Vec3 centroid;
+};
+HullMeasures measure(const HullData& hull);
+
+}  // namespace overlapper
