@@ -16,7 +16,7 @@ Facets = Sequence[NDArray[np.integer[Any]]]
 
 
 @dataclass(frozen=True)
-class Surface:
+class Outline:
     """Triangles `faces` (k, 3), counter-clockwise from outside, over `vertices` (n, 3).
 
     `normals` (n, 3) are the directions to shade by, None if the triangles are meant flat. `edges` (m, 2, 3) are lines
@@ -31,7 +31,7 @@ class Surface:
     wires: Array
 
 
-def surface(shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull) -> Surface:
+def outline(shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull) -> Outline:
     """The surface of a bounded shape; round ones within 0.3 % of the radius, rounded hulls with bevelled edges."""
     if isinstance(shape, RoundedHull):
         core = shape.core
@@ -39,7 +39,7 @@ def surface(shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull) -> Su
         shape = Hull(np.concatenate(outward))
     if isinstance(shape, Box | Hull):
         vertices, facets = _box(shape) if isinstance(shape, Box) else (shape.vertices, shape.facets)
-        return Surface(vertices, triangles(facets), None, _creases(vertices, facets), vertices[polytope_edges(facets)])
+        return Outline(vertices, triangles(facets), None, _creases(vertices, facets), vertices[polytope_edges(facets)])
     if isinstance(shape, Cylinder):
         half = shape.length / 2
         slopes = np.deg2rad([-90, -90, 0, 0, 90, 90])
@@ -51,7 +51,7 @@ def surface(shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull) -> Su
     return _revolved(shape.radius * np.cos(slopes), heights, slopes, circles=(4, 8, 12, 13, 17, 21))
 
 
-def plate(shape: HalfSpace, center: Array, size: float) -> Surface:
+def plate(shape: HalfSpace, center: Array, size: float) -> Outline:
     """The part of the boundary plane around `center` that reaches `size` metres, with a grid 1, 0.1, ... m wide."""
     basis = rotation_from_z(shape.normal)
     step = 10 ** np.floor(np.log10(size / 2))
@@ -63,10 +63,10 @@ def plate(shape: HalfSpace, center: Array, size: float) -> Surface:
     vertices, grid = (
         np.insert(flat, 2, shape.offset, axis=-1) @ basis.T for flat in (corners, np.array(across + along))
     )
-    return Surface(vertices, np.array([[0, 1, 2], [0, 2, 3]]), None, grid, grid)
+    return Outline(vertices, np.array([[0, 1, 2], [0, 2, 3]]), None, grid, grid)
 
 
-def cone(radius: float, bottom: float, top: float) -> Surface:
+def cone(radius: float, bottom: float, top: float) -> Outline:
     """A cone about z, its base at height `bottom`, its tip at `top`."""
     return _revolved(np.array([0, radius, 0]), np.array([bottom, bottom, top]), np.zeros(3))
 
@@ -110,7 +110,7 @@ def _creases(vertices: Array, facets: Facets) -> Array:
 
 def _revolved(
     radii: Array, heights: Array, slopes: Array, rims: Sequence[int] = (), circles: Sequence[int] = ()
-) -> Surface:
+) -> Outline:
     """A profile turned about z: radius, height, and how far its normal points above the horizon.
 
     Of its points, `rims` are turned into edges, and `circles` into wires, which meridians join.
@@ -124,7 +124,7 @@ def _revolved(
     faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
     edges, wires = (_polylines(rings[list(rows)]) for rows in (rims, circles))
     wires = np.concatenate([wires, _polylines(rings[:, :-1:4].swapaxes(0, 1))])
-    return Surface(rings.reshape(-1, 3), faces, normals.reshape(-1, 3), edges, wires)
+    return Outline(rings.reshape(-1, 3), faces, normals.reshape(-1, 3), edges, wires)
 
 
 def _polylines(points: Array) -> Array:

@@ -36,7 +36,7 @@ from overlapper.viewer.look import (
     to_draw,
     volume_text,
 )
-from overlapper.viewer.outline import Surface, plate, polytope_edges, surface
+from overlapper.viewer.outline import Outline, outline, plate, polytope_edges
 
 try:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -132,7 +132,7 @@ class _Picture:
 
     def add_body(self, placed: Placed, color: Array, look: Look) -> None:
         endless = isinstance(placed.shape, HalfSpace)
-        drawn = self._surface(placed)
+        drawn = self._outline(placed)
         vertices = _in_world(placed, drawn.vertices)
         opacity = look.opacity * (0.4 if endless else 1.0)
         if look.faces:
@@ -147,9 +147,9 @@ class _Picture:
         if look.vertices:
             self.dots.append((self.seen(vertices)[0], color, 4.0))
 
-    def _surface(self, placed: Placed) -> Surface:
+    def _outline(self, placed: Placed) -> Outline:
         if not isinstance(placed.shape, HalfSpace):
-            return surface(placed.shape)
+            return outline(placed.shape)
         back = np.append(-placed.orientation[:3], placed.orientation[3])
         return plate(placed.shape, rotated(back, self.center - placed.position), self.size)
 

@@ -25,7 +25,7 @@ from overlapper.viewer.look import (
     channels,
     to_draw,
 )
-from overlapper.viewer.outline import Surface, cone, plate, polytope_edges, rotation_from_z, surface, triangles
+from overlapper.viewer.outline import Outline, cone, outline, plate, polytope_edges, rotation_from_z, triangles
 
 try:
     from meshcat import geometry
@@ -67,10 +67,10 @@ class Stage:
             _Mesh(head.vertices, head.faces), geometry.MeshBasicMaterial(**through_everything)
         )
 
-    def surface(self, placed: Placed) -> Surface:
+    def outline(self, placed: Placed) -> Outline:
         """What to draw a shape by, in its own frame; a half-space is a plate as large as the scene."""
         if not isinstance(placed.shape, HalfSpace):
-            return surface(placed.shape)
+            return outline(placed.shape)
         center = np.linalg.inv(matrix(placed)) @ [*self.center, 1]
         return plate(placed.shape, center[:3], self.size)
 
@@ -99,7 +99,7 @@ class Stage:
         """Whether faces are flat; faces, edges and wires, which are the same for the same shape."""
         shape = pickle.dumps(placed.shape)
         if shape not in self._known or isinstance(placed.shape, HalfSpace):
-            drawn = self.surface(placed)
+            drawn = self.outline(placed)
             mesh = _Mesh(drawn.vertices, drawn.faces, drawn.normals)
             self._known[shape] = drawn.normals is None, mesh, _lines(drawn.edges), _lines(drawn.wires)
         return self._known[shape]
