@@ -6,26 +6,16 @@ a C++ exception that no `except` in Python can catch.
 
 from __future__ import annotations
 
-import contextlib
-import os
-import pickle
-import queue
-import re
-import signal
-import subprocess
-import sys
-import tempfile
-import threading
-import weakref
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from types import TracebackType
-from typing import IO, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, RoundedHull, Shape, Sphere
+from overlapper.process import Ended, Worker
 from overlapper.proof.signed_distance import signed_distance_bounds
 
 try:
@@ -46,10 +36,8 @@ FCL_TOLERANCE = 1e-6
 # The exact value is sought to this fraction of what the two sides differ by: enough to say who is nearer, and to print.
 RESOLUTION = 1e-3
 
-# In s, for a new Python to import FCL on a machine that is busy.
-START_LIMIT = 60.0
-
-END = object()
+# What FCL says before it aborts, and else Python.
+CAUSE = r"Original error message: .*?\): (.*)|^(\w*(?:Error|Exception): .*)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +83,7 @@ class Fcl:
         if fcl is None:
             raise ImportError("overlapper.reference needs python-fcl: pip install 'overlapper[check]'")
         self.time_limit = time_limit
-        self._worker: _Worker | None = None
+        self._worker: Worker | None = None
 
     def __enter__(self) -> Fcl:
         return self
@@ -132,119 +120,39 @@ class Fcl:
             while len(answers) < len(requests):
                 if self._worker is None or not self._worker.alive():
                     self.close()
-                    self._worker = _Worker()
+                    self._worker = self._started()
                 self._worker.send(requests[len(answers) :])
                 end = None
                 while end is None and len(answers) < len(requests):
-                    figures, end = self._worker.answer(self.time_limit)
+                    figures, end = self._answer(self._worker)
                     answers.append((figures, end))
         except BaseException:
             self.close()  # or answers still on their way would be taken for those of later pairs
             raise
         return answers
 
-
-class _Worker:
-    """A process that runs `serve`, and a thread that reads from it: waiting with a limit works so on every system."""
-
-    def __init__(self) -> None:
-        # Not `multiprocessing`, which imports the user's main module once more in the new process.
-        program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.reference import serve; serve()"
-        self.last_words = tempfile.TemporaryFile()  # noqa: SIM115, closed with the process
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.last_words
-        )
-        assert self.process.stdin and self.process.stdout
-        self.requests, self.replies = self.process.stdin, self.process.stdout
-        self.arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        reader = threading.Thread(target=_forward, args=(self.replies, self.arrived), daemon=True)
-        reader.start()
-        # Also when the worker is forgotten and when Python exits, so that nothing is left behind.
-        self.close = weakref.finalize(self, _end, self.process, reader, (self.requests, self.replies, self.last_words))
+    def _started(self) -> Worker:
         try:
-            self._next(START_LIMIT)
-        except _Ended as ended:
-            self.close()
+            return Worker(_answers, CAUSE)
+        except Ended as ended:
             raise RuntimeError(f"overlapper.reference cannot start FCL: its process {ended}") from None
 
-    def alive(self) -> bool:
-        return self.process.poll() is None
-
-    def send(self, requests: list[Request]) -> None:
-        with contextlib.suppress(BrokenPipeError):  # the missing reply will tell
-            pickle.dump(requests, self.requests)
-            self.requests.flush()
-
-    def answer(self, time_limit: float) -> tuple[Figures | None, str | None]:
+    def _answer(self, worker: Worker) -> tuple[Figures | None, str | None]:
         figures = None
         try:
-            figures = Figures(self._next(time_limit), None)
-            return Figures(figures.overlapping, self._next(time_limit)), None
-        except _Ended as ended:
+            figures = Figures(worker.receive(self.time_limit), None)
+            return Figures(figures.overlapping, worker.receive(self.time_limit)), None
+        except Ended as ended:
             return figures, str(ended)
 
-    def _next(self, time_limit: float) -> Any:
-        try:
-            reply = self.arrived.get(timeout=time_limit)
-        except queue.Empty:
-            self.process.kill()
-            self.process.wait()
-            raise _Ended(f"gave no answer within {time_limit:g} s") from None
-        if reply is END:
-            raise _Ended(self._cause())
-        return reply
 
-    def _cause(self) -> str:
-        """How the process ended: the signal or exit code, and what FCL said."""
-        code = self.process.wait()
-        how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-        self.last_words.seek(0)
-        words = self.last_words.read().decode(errors="replace")
-        said = re.findall(r"Original error message: .*?\): (.*)|^(\w*(?:Error|Exception): .*)", words, re.MULTILINE)
-        return f"ended with {how}" + (f" ({''.join(said[0]).rstrip('.')})" if said else "")
-
-
-class _Ended(Exception):
-    """The process says no more; the text tells why, as the end of a sentence."""
-
-
-def _forward(replies: IO[bytes], arrived: queue.SimpleQueue[Any]) -> None:
-    with contextlib.suppress(EOFError, pickle.UnpicklingError):
-        while True:
-            arrived.put(pickle.load(replies))
-    arrived.put(END)
-
-
-def _end(process: subprocess.Popen[bytes], reader: threading.Thread, files: Iterable[IO[bytes]]) -> None:
-    process.kill()
-    process.wait()
-    reader.join()
-    for file in files:
-        with contextlib.suppress(BrokenPipeError):  # of a request that was still in the buffer
-            file.close()
-
-
-def serve() -> None:
-    """The process in which FCL runs: batches of requests on standard input, two replies a pair on standard output."""
-    replies = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever else gets printed must not mix with the replies
-    with contextlib.suppress(ImportError):
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an abort is an answer here, not a reason to fill the disk
-
-    def say(reply: Any) -> None:
-        pickle.dump(reply, replies)
-        replies.flush()
-
-    say("ready")
-    with contextlib.suppress(EOFError):
-        while True:
-            for request in pickle.load(sys.stdin.buffer):
-                bodies = [fcl.CollisionObject(_geometry(model), fcl.Transform(*pose)) for model, pose in request]
-                contacts = fcl.CollisionResult()
-                say(fcl.collide(*bodies, fcl.CollisionRequest(enable_contact=True), contacts) > 0)
-                say(_signed_distance(request, bodies, contacts))
+def _answers(requests: list[Request]) -> Iterator[Any]:
+    """In the process in which FCL runs: for each pair whether FCL finds contact, then its signed distance."""
+    for request in requests:
+        bodies = [fcl.CollisionObject(_geometry(model), fcl.Transform(*pose)) for model, pose in request]
+        contacts = fcl.CollisionResult()
+        yield fcl.collide(*bodies, fcl.CollisionRequest(enable_contact=True), contacts) > 0
+        yield _signed_distance(request, bodies, contacts)
 
 
 def _signed_distance(request: Request, bodies: list[Any], contacts: Any) -> float | None:

@@ -14,12 +14,11 @@ import importlib.util
 import io
 import math
 import os
-import re
 import signal
-import subprocess
 import sys
 import tempfile
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from overlapper import Hull, Placed
+from overlapper.process import Ended, Worker
 from overlapper.union import union_volume
 
 Vertices = NDArray[np.float64]
@@ -190,15 +190,12 @@ def _kept_or_made(vertices: Vertices, faces: Faces, threshold: float, time_limit
             return path, parts
     words = f"overlapper: CoACD decomposes a mesh of {len(faces):,} triangles, once; the parts are kept in {path}"
     print(words, file=sys.stderr, flush=True)
-    data = _coacd(key, vertices, faces, threshold, time_limit)
-    parts = unpacked(key, data)
-    if parts is None:
-        raise NotDecomposed("CoACD's process was cut off in the middle of its answer")
+    made = _coacd(vertices, faces, threshold, time_limit)
     try:
-        _write(path, data)
+        _write(path, packed(key, made))
     except OSError as error:
         warnings.warn(f"the parts of a mesh cannot be kept in {path}: {error.strerror}", stacklevel=2)
-    return path, parts
+    return path, made
 
 
 def _write(path: Path, data: bytes) -> None:
@@ -233,43 +230,27 @@ def unpacked(key: str, data: bytes) -> list[Vertices] | None:
     return np.split(corners, np.cumsum(counts)[:-1]) if len(counts) else []
 
 
-def _coacd(key: str, vertices: Vertices, faces: Faces, threshold: float, time_limit: float) -> bytes:
-    """What `serve` answers, from a process of its own. NotDecomposed says how that ended otherwise."""
-    request = io.BytesIO()
-    np.savez(request, vertices=vertices, faces=faces, threshold=threshold, key=key, seconds=math.ceil(time_limit) + 1)
-    # Not `multiprocessing`, which imports the user's main module once more in the new process.
-    program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.polytopes.decomposition import serve; serve()"
-    command = [sys.executable, "-c", program]
+def _coacd(vertices: Vertices, faces: Faces, threshold: float, time_limit: float) -> list[Vertices]:
+    """CoACD's parts, from a process of its own. NotDecomposed says how that ended otherwise."""
     try:
-        done = subprocess.run(command, input=request.getvalue(), capture_output=True, timeout=time_limit)
-    except subprocess.TimeoutExpired:
-        raise NotDecomposed(f"CoACD did not decompose the concave mesh within {time_limit:g} s") from None
-    if done.returncode:
-        raise NotDecomposed(f"CoACD failed on the concave mesh: {_cause(done.returncode, done.stderr)}")
-    return done.stdout
+        with Worker(_answers) as worker:
+            worker.send((vertices, faces, float(threshold), math.ceil(time_limit) + 1))
+            parts: list[Vertices] = worker.receive(time_limit)
+            return parts
+    except Ended as ended:
+        if ended.limit is not None:
+            raise NotDecomposed(f"CoACD did not decompose the concave mesh within {ended.limit:g} s") from None
+        if ended.code == 0:
+            raise NotDecomposed("CoACD's process was cut off in the middle of its answer") from None
+        raise NotDecomposed(f"CoACD failed on the concave mesh: its process {ended}") from None
 
 
-def _cause(code: int, stderr: bytes) -> str:
-    how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-    words = stderr.decode(errors="replace")
-    said = re.findall(r"what\(\): *(.*)|^(\w*(?:Error|Exception): .*)", words, re.MULTILINE)
-    return f"its process ended with {how}" + (f" ({''.join(said[-1]).strip().rstrip('.')})" if said else "")
-
-
-def serve() -> None:
-    """The process in which CoACD runs: a mesh on standard input, its parts on standard output."""
-    answer = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what CoACD prints must not mix with the answer
-    with contextlib.suppress(ImportError):
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an abort is an answer here, not a reason to fill the disk
-    request = np.load(io.BytesIO(sys.stdin.buffer.read()))
-    signal.alarm(int(request["seconds"]))  # for when nobody waits any more
+def _answers(request: tuple[Vertices, Faces, float, int]) -> Iterator[list[Vertices]]:
+    """In the process in which CoACD runs: the parts of a mesh."""
+    vertices, faces, threshold, seconds = request
+    signal.alarm(seconds)  # for when nobody waits any more
     import coacd
 
     coacd.set_log_level("error")
-    mesh = coacd.Mesh(request["vertices"], request["faces"].astype(np.int32))
-    parts = coacd.run_coacd(mesh, threshold=float(request["threshold"]))
-    answer.write(packed(str(request["key"]), [np.asarray(vertices, dtype=float) for vertices, _ in parts]))
-    answer.close()
+    parts = coacd.run_coacd(coacd.Mesh(vertices, faces.astype(np.int32)), threshold=threshold)
+    yield [np.asarray(part, dtype=float) for part, _ in parts]

@@ -5,13 +5,9 @@ It is read in a process of its own, as pybullet dies of some files.
 
 from __future__ import annotations
 
-import json
-import os
 import signal
-import subprocess
-import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere
+from overlapper.process import Ended, Worker
 from overlapper.quaternion import composed, rotated
 
 if TYPE_CHECKING:
@@ -90,44 +87,25 @@ def inventory(path: Path, self_collision: bool = False, **settings: Any) -> Inve
         raise NotRead(f"the name must end in {', '.join(ENDINGS)}, and {path.name!r} does not")
     if not path.is_file():
         raise NotRead(f"there is no file {path}")
-    request = json.dumps([str(path), self_collision, settings])
-    program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.simulation.inventory import serve; serve()"
-    done = subprocess.run(
-        [sys.executable, "-c", program], input=request, capture_output=True, text=True, errors="replace"
-    )
-    if done.returncode < 0:
-        raise NotRead(f"pybullet dies of {path} with signal {signal.Signals(-done.returncode).name}")
-    if done.returncode:
-        raise RuntimeError(f"the process that reads {path} failed:\n{done.stderr}")
-    answer = json.loads(done.stdout)
-    if isinstance(answer, str):
-        raise NotRead(f"{path} cannot be read: {answer}")
-    return _of_answer(answer)
-
-
-def serve() -> None:
-    """The process in which pybullet reads the file: a request on standard input, then an answer or a reason."""
-    answer = os.dup(1)
-    os.dup2(2, 1)  # what pybullet prints must not mix with it
-    path, self_collision, settings = json.load(sys.stdin)
-    found: dict[str, Any] | str
     try:
-        found = asdict(_read(Path(path), self_collision, settings))
+        with Worker(_answers) as worker:
+            worker.send((path, self_collision, settings))
+            found: Inventory | str = worker.receive()
+    except Ended as ended:
+        if ended.code is not None and ended.code < 0:
+            raise NotRead(f"pybullet dies of {path} with signal {signal.Signals(-ended.code).name}") from None
+        raise RuntimeError(f"the process that reads {path} {ended}:\n{ended.words}") from None
+    if isinstance(found, str):
+        raise NotRead(f"{path} cannot be read: {found}")
+    return found
+
+
+def _answers(request: tuple[Path, bool, dict[str, Any]]) -> Iterator[Inventory | str]:
+    """In the process in which pybullet reads the file: what is in it, or the reason why it cannot be read."""
+    try:
+        yield _read(*request)
     except (NotRead, ValueError) as error:
-        found = str(error)
-    with open(answer, "w") as out:
-        json.dump(found, out)
-
-
-def _of_answer(answer: dict[str, Any]) -> Inventory:
-    links = tuple(
-        ListedLink(
-            **link | {"shapes": tuple(ListedShape(**each | {"box": tuple(each["box"])}) for each in link["shapes"])}
-        )
-        for link in answer["links"]
-    )
-    pairs = {name: tuple((first, second) for first, second in answer[name]) for name in ("skipped", "decomposed")}
-    return Inventory(**answer | {"links": links} | pairs)
+        yield str(error)
 
 
 def _read(path: Path, self_collision: bool, settings: dict[str, Any]) -> Inventory:
