@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 from overlapper.face import lazily
 
 if TYPE_CHECKING:
-    from overlapper.simulation.bodies import Among, Bodies, Report, SkippedShapeWarning
+    from overlapper.simulation.asked_pairs import Among
+    from overlapper.simulation.bodies import Bodies, SkippedShapeWarning
     from overlapper.simulation.contacts import Contact, Contacts
-    from overlapper.simulation.extraction import Concave, Decomposed, Skipped, Surface
+    from overlapper.simulation.extraction.model import Concave, Decomposed, Skipped, Surface
     from overlapper.simulation.links import LinkContact, link_contacts
     from overlapper.simulation.recorder import Recorder
+    from overlapper.simulation.report import Report
 
 __all__ = [
     "Among",
@@ -36,11 +38,13 @@ __all__ = [
 __getattr__ = lazily(
     __name__,
     {
-        "bodies": ("Among", "Bodies", "Report", "SkippedShapeWarning"),
+        "asked_pairs": ("Among",),
+        "bodies": ("Bodies", "SkippedShapeWarning"),
         "contacts": ("Contact", "Contacts"),
-        "extraction": ("Concave", "Decomposed", "Skipped", "Surface"),
+        "extraction.model": ("Concave", "Decomposed", "Skipped", "Surface"),
         "links": ("LinkContact", "link_contacts"),
         "recorder": ("Recorder",),
+        "report": ("Report",),
     },
     needs="pybullet: pip install 'overlapper[sim]'",
 )

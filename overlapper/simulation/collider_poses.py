@@ -7,8 +7,9 @@ from itertools import repeat
 
 import pybullet
 
-from overlapper.simulation.bullet_file import SavedBody
-from overlapper.simulation.extraction import BASE, save
+from overlapper.simulation.extraction.bullet_file import SavedBody
+from overlapper.simulation.extraction.model import BASE
+from overlapper.simulation.extraction.saved_scene import save
 
 Frame = Sequence[Sequence[float]]  # begins with position and quaternion xyzw
 

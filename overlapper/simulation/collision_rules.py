@@ -1,8 +1,8 @@
-"""Which pairs of shapes are asked for: those that a pybullet simulation lets collide, or those of a list."""
+"""Which links a pybullet simulation lets collide."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -11,12 +11,11 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from overlapper.simulation.known_bodies import KnownBodies
+from overlapper.simulation.layout import Layout
 from overlapper.simulation.recorder import Link, Recorder
 
-Key = tuple[int, int, int]  # body, link, shape
-Who = int | tuple[int, int] | Key  # a body, a link or a shape
 Indices = NDArray[np.intp]
-Codes = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
@@ -126,25 +125,29 @@ def _ancestors(link: int, parents: Mapping[int, int]) -> set[int | None]:
     return found
 
 
-def pair_codes(asked: Sequence[tuple[Who, Who]], keys: Sequence[Key], links: Mapping[int, Collection[int]]) -> Codes:
-    """The pairs of shapes that a list stands for, each as one number: i * len(keys) + j for keys[i] and keys[j], i < j.
+class RulesInForce:
+    """`rules` as they are at this step: of groups and masks, read again if they may have changed, and a recorder."""
 
-    A body stands for all of its shapes, and so does a link; two shapes of one link are a pair only if both are named as
-    shapes. `links` are those of each body. ValueError if a body or link is not there.
-    """
-    places: dict[Who, Codes] = {}
-    for who in {each for pair in asked for each in pair}:
-        named = (who,) if isinstance(who, int) else tuple(who)
-        if named[0] not in links:
-            raise ValueError(f"pairs names body {named[0]}, which is not in the simulation")
-        if len(named) > 1 and named[1] not in links[named[0]]:
-            raise ValueError(f"pairs names link {named[1]} of body {named[0]}, which it does not have")
-        places[who] = np.array([i for i, key in enumerate(keys) if key[: len(named)] == named], dtype=np.int64)
-    found = [np.empty(0, dtype=np.int64)]
-    collider = np.unique(np.array(keys).reshape(-1, 3)[:, :2], axis=0, return_inverse=True)[1].reshape(-1)
-    for a, b in asked:
-        first, second = (each.reshape(-1) for each in np.meshgrid(places[a], places[b]))
-        both_shapes = isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b) == 3
-        apart = first != second if both_shapes else collider[first] != collider[second]
-        found.append((np.minimum(first, second) * len(keys) + np.maximum(first, second))[apart])
-    return np.unique(np.concatenate(found))
+    def __init__(self, recorder: Recorder | None) -> None:
+        self._recorder = recorder
+        self._static: list[bool] = []
+        self._noted = (0, 0)  # of the recorder, changes and masks set
+        nobody = np.empty(0, dtype=int)
+        self.rules = CollisionRules(Colliders({}, nobody, nobody, nobody, {}), recorder)
+
+    def follow(self, known: KnownBodies, layout: Layout, fresh: bool) -> None:
+        """Take over what has changed since the last step; `fresh` filters have just been read."""
+        # changeDynamics gives a base the group of static or of moving bodies as it becomes one.
+        static = layout.poses.static.copy()
+        noted = (self._recorder.changes, self._recorder.masks_set) if self._recorder else (0, 0)
+        changed = static != self._static or noted[1] != self._noted[1]
+        if changed and not fresh:
+            known.read_filters()
+        if changed or fresh or noted != self._noted:
+            filters = [known.filters.get(each, (1, -1)) for each in layout.collider_rows]
+            group, mask = np.array(filters, dtype=int).reshape(-1, 2).T
+            owners = np.array([id for id, _ in layout.collider_rows], dtype=int)
+            parents = {id: body.parents for id, body in known.by_id.items()}
+            colliders = Colliders(layout.collider_rows, owners, group, mask, parents)
+            self.rules = CollisionRules(colliders, self._recorder)
+        self._static, self._noted = static, noted

@@ -19,7 +19,7 @@ from overlapper.process import Ended, Worker
 from overlapper.quaternion import composed, rotated
 
 if TYPE_CHECKING:
-    from overlapper.simulation.extraction import Concave, Surface
+    from overlapper.simulation.extraction.model import Concave, Surface
 
 Listed = dict[tuple[int, int], list[Placed]]
 
@@ -141,9 +141,10 @@ def _of_bullet_file(
     path: Path, surface: Surface = "nominal", concave: Concave = "decompose", concave_threshold: float = 0.05
 ) -> Inventory:
     """Of what saveBullet wrote; loadBullet would not load all of it. Bodies have numbers, and no names."""
-    from overlapper.simulation.bullet_file import BulletFile
     from overlapper.simulation.collision_rules import Colliders, CollisionRules
-    from overlapper.simulation.extraction import Settings, modelled, summary
+    from overlapper.simulation.extraction.bullet_file import BulletFile
+    from overlapper.simulation.extraction.model import Settings
+    from overlapper.simulation.extraction.modelling import modelled, summary
 
     file, settings = BulletFile(path), Settings(concave, concave_threshold, surface)
     colliders = {

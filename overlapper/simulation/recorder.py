@@ -9,7 +9,7 @@ from typing import Any
 
 import pybullet
 
-from overlapper.simulation.height_field import HeightField
+from overlapper.simulation.extraction.height_field import HeightField
 
 # The calls that are noted, with their parameters in pybullet's order, as far as they are needed.
 CALLS: dict[str, tuple[str, ...]] = {

@@ -6,7 +6,7 @@ import pybullet_data
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from overlapper.simulation.bullet_file import BulletFile
+from overlapper.simulation.extraction.bullet_file import BulletFile
 
 CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 POSITION, ORIENTATION = [0.1, -0.2, 0.3], p.getQuaternionFromEuler([0.3, -0.5, 0.7])

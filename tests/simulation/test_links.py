@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from overlapper.polytopes import decomposition
-from overlapper.simulation import Bodies, SkippedShapeWarning, extraction, link_contacts
+from overlapper.simulation import Bodies, SkippedShapeWarning, link_contacts
+from overlapper.simulation.extraction import modelling
 
 PROFILE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]
 CORNERS = [[x, y, z] for z in (0, 1) for x, y in PROFILE]
@@ -17,7 +18,7 @@ FACES = [end[::-1] for end in ENDS] + [[k + 6 for k in end] for end in ENDS] + S
 @pytest.fixture(autouse=True)
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    extraction._decomposition.cache_clear()
+    modelling._decomposition.cache_clear()
 
 
 def body(client, *shape, position=(0, 0, 0), mass=1, **figures):
@@ -141,7 +142,7 @@ def test_shapes_after_a_concave_mesh_are_counted_on(client, tmp_path):
 
 def test_equal_meshes_are_decomposed_once_and_share_their_parts(client, monkeypatch):
     asked = []
-    monkeypatch.setattr(extraction, "decompose", lambda *a: asked.append(a) or decomposition.decompose(*a))
+    monkeypatch.setattr(modelling, "decompose", lambda *a: asked.append(a) or decomposition.decompose(*a))
     bent(client)
     bent(client, position=[0.5, 0, 0.5])
     bodies = Bodies(client, concave_threshold=0.1)
@@ -164,7 +165,7 @@ def test_a_failure_of_coacd_is_named_and_not_repeated(client, monkeypatch, tmp_p
     bent(client)
     with pytest.warns(SkippedShapeWarning, match="CoACD failed on the concave mesh: its process ended with signal"):
         bodies = Bodies(client)
-    monkeypatch.setattr(extraction, "decompose", None)
+    monkeypatch.setattr(modelling, "decompose", None)
     bent(client)
     with pytest.warns(SkippedShapeWarning, match="CoACD failed"):
         bodies.update()

@@ -14,8 +14,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, distance
-from overlapper.simulation import Bodies, Recorder, SkippedShapeWarning, extraction
-from overlapper.simulation.bullet_file import Leaf
+from overlapper.simulation import Bodies, Recorder, SkippedShapeWarning
+from overlapper.simulation.extraction.bullet_file import Leaf
+from overlapper.simulation.extraction.model import Settings
+from overlapper.simulation.extraction.modelling import modelled
 
 DATA = Path(pybullet_data.getDataPath())
 CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -431,7 +433,7 @@ def test_the_rest_of_a_link_with_a_flat_hull_is_modelled(client, tmp_path):
 def test_the_hull_of_unequal_spheres_is_not_taken_for_a_capsule():
     spheres = np.array([[0, 0, 0, 0.1], [0, 0, 1, 0.2]])
     leaf = Leaf("multisphere", np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), spheres)
-    found = extraction.modelled(0, (leaf,), extraction.Settings("skip", 0.05, "nominal"))
+    found = modelled(0, (leaf,), Settings("skip", 0.05, "nominal"))
     assert found == ([], ["the hull of unequal spheres is not modelled"], [])
 
 

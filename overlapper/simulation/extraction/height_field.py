@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from overlapper import Hull
-from overlapper.quaternion import composed, rotated
-
-if TYPE_CHECKING:
-    from overlapper.simulation.extraction import Ground
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -82,29 +77,3 @@ class HeightField:
         flat = [((u - (rows - 1) / 2) * self.spacing[0], (v - (columns - 1) / 2) * self.spacing[1]) for u, v in corners]
         tops = [self.heights[v, u] for u, v in corners]
         return Hull([(*at, z) for at, top in zip(flat, tops) for z in (top, self.base)])
-
-
-class GroundBelow:
-    """Which triangles of a height field shapes are near; shapes that have hardly moved are not asked about again."""
-
-    def __init__(self, ground: Ground) -> None:
-        self._ground = ground
-        self._slack = min(ground.field.spacing) / 2
-        self._asked = np.empty((0, 3))
-
-    def reached(self, position: Array, orientation: Array, centres: Array, reach: Array, meets: Mask) -> set[int]:
-        """Of the shapes that `meets` picks, which lie within `reach` (n,) of `centres` (n, 3) in the world.
-
-        The field's collider is at `position` and `orientation`, xyzw.
-        """
-        turn = composed(orientation, self._ground.orientation)
-        origin = position + rotated(orientation, self._ground.position)
-        local = rotated(turn * [-1.0, -1.0, -1.0, 1.0], centres - origin)
-        if self._asked.shape != local.shape:
-            self._asked = np.full(local.shape, np.inf)
-        moved = meets & np.isfinite(reach) & ~(np.abs(local - self._asked).max(axis=1) <= self._slack)
-        self._asked[moved] = local[moved]
-        found: set[int] = set()
-        for centre, radius in zip(local[moved], reach[moved] + self._slack):
-            found.update(self._ground.field.under(centre - radius, centre + radius).tolist())
-        return found

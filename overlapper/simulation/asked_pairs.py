@@ -1,0 +1,79 @@
+"""Which pairs of shapes are asked for: those that the simulator lets collide, all, or those of a list."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper.simulation.collision_rules import CollisionRules, Mask
+from overlapper.simulation.layout import Layout
+
+Key = tuple[int, int, int]  # body, link, shape
+Who = int | tuple[int, int] | Key  # a body, a link or a shape
+Codes = NDArray[np.int64]
+
+Among = Literal["simulated", "all"] | Iterable[tuple[Who, Who]]
+
+
+class AskedPairs:
+    """The choice among the pairs of a layout, whose bodies have these `links`; a list is kept for the next step."""
+
+    def __init__(self, layout: Layout, links: Mapping[int, Collection[int]]) -> None:
+        self._layout, self._links = layout, links
+        self._listed: tuple[list[tuple[Who, Who]], Codes] | None = None
+
+    def chosen(self, pairs: NDArray[np.int32], among: Among, rules: CollisionRules) -> Mask:
+        """Which of these pairs of shapes are asked for."""
+        first, second = pairs.T
+        if among == "all":
+            return np.asarray(self._layout.owners[first] != self._layout.owners[second])
+        if among != "simulated":
+            return np.isin(first * np.int64(len(self._layout.keys)) + second, self._codes(among))
+        a, b = self._layout.colliders[first], self._layout.colliders[second]
+        return np.asarray((a != b) & rules.allow(a, b))
+
+    def possible(self, among: Among, rules: CollisionRules) -> int:
+        """How many pairs of shapes are asked for, wherever they are."""
+        if among == "simulated":
+            layout = self._layout
+            return rules.count(np.bincount(layout.colliders, minlength=len(layout.collider_rows)))
+        if among != "all":
+            return len(self._codes(among))
+        of_each = np.unique(self._layout.owners, return_counts=True)[1]
+        return int(len(self._layout.owners) ** 2 - (of_each**2).sum()) // 2
+
+    def _codes(self, among: Iterable[tuple[Who, Who]]) -> Codes:
+        """The pairs of a list, as `pair_codes` has them."""
+        if isinstance(among, str):
+            raise ValueError(f"pairs must be 'simulated', 'all' or a list of pairs, not {among!r}")
+        asked = list(among)
+        if not self._listed or self._listed[0] != asked:
+            self._listed = asked, pair_codes(asked, self._layout.keys, self._links)
+        return self._listed[1]
+
+
+def pair_codes(asked: Sequence[tuple[Who, Who]], keys: Sequence[Key], links: Mapping[int, Collection[int]]) -> Codes:
+    """The pairs of shapes that a list stands for, each as one number: i * len(keys) + j for keys[i] and keys[j], i < j.
+
+    A body stands for all of its shapes, and so does a link; two shapes of one link are a pair only if both are named as
+    shapes. `links` are those of each body. ValueError if a body or link is not there.
+    """
+    places: dict[Who, Codes] = {}
+    for who in {each for pair in asked for each in pair}:
+        named = (who,) if isinstance(who, int) else tuple(who)
+        if named[0] not in links:
+            raise ValueError(f"pairs names body {named[0]}, which is not in the simulation")
+        if len(named) > 1 and named[1] not in links[named[0]]:
+            raise ValueError(f"pairs names link {named[1]} of body {named[0]}, which it does not have")
+        places[who] = np.array([i for i, key in enumerate(keys) if key[: len(named)] == named], dtype=np.int64)
+    found = [np.empty(0, dtype=np.int64)]
+    collider = np.unique(np.array(keys).reshape(-1, 3)[:, :2], axis=0, return_inverse=True)[1].reshape(-1)
+    for a, b in asked:
+        first, second = (each.reshape(-1) for each in np.meshgrid(places[a], places[b]))
+        both_shapes = isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b) == 3
+        apart = first != second if both_shapes else collider[first] != collider[second]
+        found.append((np.minimum(first, second) * len(keys) + np.maximum(first, second))[apart])
+    return np.unique(np.concatenate(found))

@@ -1,0 +1,159 @@
+"""A body read: its shapes as a temporary .bullet file has them, with the digits that pybullet's own report adds.
+
+The file has all shapes, in single precision; the report does not have all of them.
+"""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pybullet
+
+from overlapper.simulation.extraction.bullet_file import BulletFile, Leaf, SavedBody
+from overlapper.simulation.extraction.height_field import HeightField
+from overlapper.simulation.extraction.model import BASE, Body, Color, Decomposed, Ground, Part, Settings, Skipped
+from overlapper.simulation.extraction.modelling import modelled, summary
+from overlapper.simulation.extraction.saved_scene import MULTIBODY, SOFT_BODY, body_type
+
+REPORTED = {  # by getCollisionShapeData
+    pybullet.GEOM_MESH: "hull",
+    pybullet.GEOM_BOX: "box",
+    pybullet.GEOM_SPHERE: "sphere",
+    pybullet.GEOM_CAPSULE: "capsule",
+    pybullet.GEOM_CYLINDER: "cylinder",
+    pybullet.GEOM_PLANE: "plane",
+}
+MESHES = ("hull", "concave mesh")  # both reported as GEOM_MESH
+
+
+def read_body(
+    client: int,
+    id: int,
+    file: BulletFile,
+    saved: SavedBody | None,
+    settings: Settings,
+    field: HeightField | None = None,
+) -> Body:
+    """A body as it is in a .bullet file, and in pybullet; `field` is the height field that it is known to be."""
+    base, name = (text.decode(errors="replace") for text in pybullet.getBodyInfo(id, client))
+    name = name or f"body {id}"
+    joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
+    link_names = {BASE: base or "base"} | {joint[0]: joint[12].decode(errors="replace") for joint in joints}
+    parents = {joint[0]: joint[16] for joint in joints}
+    leaves = _leaves(client, id, file, saved) if saved else {}
+    parts: list[Part] = []
+    skipped: list[Skipped] = []
+    decomposed: list[Decomposed] = []
+    shape_count = 0 if saved else 1
+    ground = None
+    if field and [leaf.kind for leaf in leaves.get(BASE, ())] == ["height field"]:
+        (leaf,) = leaves.pop(BASE)
+        ground = Ground(field, leaf.position, leaf.orientation)
+        shape_count += field.count
+    for link, each in leaves.items():
+        shapes, reasons, meshes = modelled(link, each, settings)
+        parts += shapes
+        count = len(shapes) + len(reasons)
+        shape_count += count
+        label = f"{name}/{link_names[link]}"
+        if reasons:
+            skipped.append(Skipped(id, link, label, summary(reasons, count)))
+        decomposed += [
+            Decomposed(id, link, label, numbers, mesh.volume, mesh.mesh_volume, mesh.path) for numbers, mesh in meshes
+        ]
+    if not saved:
+        soft = body_type(client, id) == SOFT_BODY
+        skipped.append(Skipped(id, BASE, name, "a soft body is not modelled" if soft else "saveBullet leaves it out"))
+    colors = _colors(client, id, link_names)
+    margin = pybullet.getDynamicsInfo(id, BASE, client)[11]
+    return Body(
+        name,
+        link_names,
+        colors,
+        parents,
+        margin,
+        shape_count,
+        tuple(parts),
+        tuple(skipped),
+        tuple(decomposed),
+        ground,
+    )
+
+
+def _colors(client: int, id: int, links: Mapping[int, str]) -> dict[int, Color]:
+    seen: dict[int, Color] = {}
+    for visual in pybullet.getVisualShapeData(id, physicsClientId=client):
+        seen.setdefault(visual[1], visual[7])
+    # Hues a golden ratio apart stay distinct however many bodies there are.
+    own = (*colorsys.hsv_to_rgb(id * 0.618034 % 1, 0.5, 0.9), 1.0)
+    fallback = next(iter(seen.values()), own)
+    return {link: seen.get(link, fallback) for link in links}
+
+
+def _leaves(client: int, id: int, file: BulletFile, saved: SavedBody) -> dict[int, tuple[Leaf, ...]]:
+    leaves = {link: file.leaves(collider.shape) for link, collider in sorted(saved.colliders.items())}
+    kinds = {leaf.kind for each in leaves.values() for leaf in each}
+    # getCollisionShapeData refuses maximal coordinates, and kills the process on a multi-sphere.
+    if body_type(client, id) != MULTIBODY or "multisphere" in kinds:
+        return leaves
+    return {link: _in_double_precision(client, id, link, each) for link, each in leaves.items()}
+
+
+def _in_double_precision(client: int, id: int, link: int, leaves: tuple[Leaf, ...]) -> tuple[Leaf, ...]:
+    """The leaves of a link with the frames and dimensions that pybullet reports in full precision.
+
+    As they came if pybullet does not report all of them, or would print complaints.
+    """
+    if not leaves or any(leaf.kind not in (*REPORTED.values(), *MESHES) for leaf in leaves):
+        return leaves
+    reported = _reported(client, id, link)
+    frames = [leaf for leaf in reported if leaf.kind == "hull"]
+    primitives = (leaf for leaf in reported if leaf.kind != "hull")
+    exact: list[Leaf] = []
+    for leaf in leaves:
+        if leaf.kind in MESHES:
+            # A mesh file of many hulls is reported once.
+            frame = min(frames, key=lambda other: sum(_gaps(leaf, other)), default=leaf)
+            other = replace(frame, kind=leaf.kind, figures=leaf.figures, margin=leaf.margin)
+        else:
+            other = next(primitives, leaf)
+        exact.append(other if _alike(leaf, other) else leaf)
+    return tuple(exact)
+
+
+def _reported(client: int, id: int, link: int) -> list[Leaf]:
+    """What getCollisionShapeData lists, in the order of the file; hulls without their points."""
+    leaves = []
+    for _, _, number, size, _, position, orientation in pybullet.getCollisionShapeData(id, link, client):
+        kind, dimensions = REPORTED[number], np.array(size)
+        figures = {
+            "box": dimensions / 2,
+            "sphere": dimensions[:1],
+            "capsule": dimensions[1::-1],
+            "cylinder": dimensions[1::-1],
+            "plane": np.append(dimensions, 0.0),
+            "hull": np.empty(0),
+        }
+        leaves.append(Leaf(kind, np.array(position), np.array(orientation), figures[kind]))
+    return leaves
+
+
+def _alike(saved: Leaf, reported: Leaf) -> bool:
+    """Whether two leaves are the same but for single precision."""
+    if saved.kind != reported.kind or saved.figures.shape != reported.figures.shape:
+        return False
+    shift, turn = _gaps(saved, reported)
+    size = max(np.abs(reported.figures).max(), np.abs(reported.position).max())
+    change = np.abs(saved.figures - reported.figures).max()
+    # Single precision is 6e-8; a few nested frames add up.
+    return bool(max(shift, change) <= 1e-5 * size and turn <= 1e-5)
+
+
+def _gaps(a: Leaf, b: Leaf) -> tuple[float, float]:
+    """How far apart the frames of two leaves are, in metres and as quaternions."""
+    shift = np.abs(a.position - b.position).max()
+    turn = min(np.abs(a.orientation - b.orientation).max(), np.abs(a.orientation + b.orientation).max())
+    return float(shift), float(turn)

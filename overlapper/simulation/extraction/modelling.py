@@ -1,0 +1,110 @@
+"""The shapes of a link as convex ones: what each is modelled as, or why it is not."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Shape, Sphere
+from overlapper.polytopes.decomposition import Decomposition, NotDecomposed, decompose
+from overlapper.quaternion import composed, rotated
+from overlapper.simulation.extraction.bullet_file import Leaf
+from overlapper.simulation.extraction.model import Part, Settings
+
+
+def modelled(
+    link: int, leaves: tuple[Leaf, ...], settings: Settings
+) -> tuple[list[Part], list[str], list[tuple[range, Decomposition]]]:
+    """The leaves of a link as shapes, a reason for each that has none, and which shapes are parts of a concave mesh."""
+    parts: list[Part] = []
+    reasons: list[str] = []
+    meshes: list[tuple[range, Decomposition]] = []
+    for saved in leaves:
+        leaf = _capsule(saved) if saved.kind == "multisphere" else saved
+        first = len(parts) + len(reasons)
+        try:
+            shapes: Sequence[Shape]
+            if leaf.kind == "concave mesh":
+                mesh = _solid(leaf.figures.tobytes(), settings)
+                shapes = mesh.parts
+                meshes.append((range(first, first + len(shapes)), mesh))
+            else:
+                margin = leaf.margin if settings.surface == "margin" else 0.0
+                shapes = [_shape(leaf.kind, leaf.figures.tobytes(), margin)]
+        except ValueError as error:
+            reasons.append(str(error))
+        else:
+            parts += [
+                Part(link, index, shape, leaf.position, leaf.orientation) for index, shape in enumerate(shapes, first)
+            ]
+    return parts, reasons, meshes
+
+
+def _solid(data: bytes, settings: Settings) -> Decomposition:
+    """A concave mesh as convex parts. NotDecomposed says why there are none."""
+    if settings.concave == "skip":
+        raise NotDecomposed("a concave mesh is left out, as concave='skip' asks")
+    found = _decomposition(data, settings.concave == "enclose", settings.threshold)
+    if isinstance(found, NotDecomposed):
+        raise NotDecomposed(str(found))
+    return found
+
+
+@lru_cache(maxsize=64)
+def _decomposition(data: bytes, enclose: bool, threshold: float) -> Decomposition | NotDecomposed:
+    """Of a mesh that many bodies may have; also the failure is kept, as it may have taken minutes."""
+    try:
+        return decompose(np.frombuffer(data).reshape(-1, 3, 3), threshold, enclose)
+    except NotDecomposed as error:
+        return error
+
+
+def _capsule(leaf: Leaf) -> Leaf:
+    """The capsule that a multi-sphere of two equal spheres is; any other multi-sphere as it came."""
+    centres, radii = leaf.figures[:, :3], leaf.figures[:, 3]
+    if len(radii) != 2 or radii[0] != radii[1]:
+        return leaf
+    axis = centres[1] - centres[0]
+    length = float(np.linalg.norm(axis))
+    if axis[2] < 0:
+        axis = -axis
+    # The shortest turn of z into the axis is (z × axis, length + z·axis).
+    turn = np.array([-axis[1], axis[0], 0.0, length + axis[2]]) if length else np.array([0.0, 0.0, 0.0, 1.0])
+    position = leaf.position + rotated(leaf.orientation, centres.mean(axis=0))
+    orientation = composed(leaf.orientation, turn / np.linalg.norm(turn))
+    return Leaf("capsule", position, orientation, np.array([radii[0], length]))
+
+
+@lru_cache(maxsize=1024)
+def _shape(kind: str, data: bytes, margin: float) -> Shape:
+    """The shape with these figures of a leaf; equal ones are one object. ValueError says why there is none."""
+    figures = np.frombuffer(data)
+    match kind:
+        case "box":
+            return Box(figures)
+        case "sphere":
+            return Sphere(*figures)
+        case "capsule":
+            return Capsule(*figures)
+        case "cylinder":
+            return Cylinder(*figures)
+        case "plane":
+            return HalfSpace(figures[:3], figures[3])
+        case "hull":
+            points = figures.reshape(-1, 3)
+            return RoundedHull(points, margin) if margin else Hull(points)
+        case "multisphere":
+            raise ValueError("the hull of unequal spheres is not modelled")
+        case "height field":
+            raise ValueError("a height field is modelled only if a Recorder has noted its heightfieldData")
+        case _:
+            raise ValueError(f"a {kind} is not modelled")
+
+
+def summary(reasons: Sequence[str], shapes: int) -> str:
+    if shapes == 1:
+        return reasons[0]
+    return "; ".join(f"{number} of {shapes} shapes: {reason}" for reason, number in Counter(reasons).items())

@@ -1,0 +1,82 @@
+"""A pybullet client written to a temporary .bullet file, and which body of the file is which of the client."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+
+import pybullet
+
+from overlapper.simulation.extraction.bullet_file import BulletFile
+from overlapper.simulation.extraction.model import BASE
+
+MULTIBODY, SOFT_BODY = 2, 3  # of getDynamicsInfo; 1 is a rigid body in maximal coordinates
+
+
+def body_ids(client: int) -> set[int]:
+    return {pybullet.getBodyUniqueId(i, client) for i in range(pybullet.getNumBodies(client))}
+
+
+def body_type(client: int, id: int) -> int:
+    return int(pybullet.getDynamicsInfo(id, BASE, client)[10])
+
+
+def saved_bodies(client: int, ids: Sequence[int]) -> tuple[BulletFile, dict[int, int]]:
+    """The scene as a .bullet file, and the place in the file of each of `ids` but the soft ones.
+
+    The file has no ids. Position and number of links identify a body unless another shares them or pybullet hides
+    its position; then each has a friction of its own while the file is written.
+    """
+    ids = [id for id in ids if body_type(client, id) != SOFT_BODY]
+    file = save(client)
+    saved = {(body.links, *body.position.tolist()): row for row, body in enumerate(file.bodies)}
+    wanted = {id: (pybullet.getNumJoints(id, client), *_base_position(client, id)) for id in ids}
+    if len(saved) == len(file.bodies) and len(set(wanted.values())) == len(ids) and saved.keys() >= {*wanted.values()}:
+        return file, {id: saved[key] for id, key in wanted.items()}
+
+    taken = {body.friction for body in file.bodies}
+    frictions = dict(zip(ids, (float(value) for value in count(1) if value not in taken)))
+    with _frictions(client, frictions):
+        file = save(client)
+    by_friction = {body.friction: row for row, body in enumerate(file.bodies)}
+    return file, {id: by_friction[friction] for id, friction in frictions.items() if friction in by_friction}
+
+
+def hides_pose(client: int, id: int) -> bool:
+    """Whether pybullet tells no poses of this body, as of one with more than 128 links; the .bullet file has them."""
+    return not _base_position(client, id)
+
+
+def _base_position(client: int, id: int) -> tuple[float, ...]:
+    try:
+        return tuple(pybullet.getBasePositionAndOrientation(id, client)[0])
+    except pybullet.error:
+        return ()
+
+
+def save(client: int) -> BulletFile:
+    with tempfile.TemporaryDirectory(prefix="overlapper-") as folder:
+        path = Path(folder) / "scene.bullet"
+        try:
+            pybullet.saveBullet(str(path), physicsClientId=client)
+            return BulletFile(path)
+        except (pybullet.error, OSError) as error:
+            raise RuntimeError(
+                f"the physics server of physicsClientId {client} could not hand over its shapes in {path}: "
+                "it must run on this machine and be allowed to write there"
+            ) from error
+
+
+@contextmanager
+def _frictions(client: int, frictions: Mapping[int, float]) -> Iterator[None]:
+    before = {id: pybullet.getDynamicsInfo(id, BASE, client)[1] for id in frictions}
+    try:
+        for id, friction in frictions.items():
+            pybullet.changeDynamics(id, BASE, lateralFriction=friction, physicsClientId=client)
+        yield
+    finally:
+        for id, friction in before.items():
+            pybullet.changeDynamics(id, BASE, lateralFriction=friction, physicsClientId=client)

@@ -1,0 +1,145 @@
+"""The bodies of a pybullet client that have been read: new ones are noticed, and those that go."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Mapping
+
+import pybullet
+
+from overlapper.simulation.body_marks import Marks
+from overlapper.simulation.extraction.body import read_body
+from overlapper.simulation.extraction.bullet_file import BulletFile
+from overlapper.simulation.extraction.model import BASE, Body, Color, Decomposed, Settings, Skipped
+from overlapper.simulation.extraction.saved_scene import body_ids, hides_pose, saved_bodies
+from overlapper.simulation.recorder import Recorder
+
+
+class KnownBodies:
+    """`by_id` are the bodies, sorted; each is read once, and again when its margin or its heights have changed.
+
+    `hidden` are the places in a .bullet file of those whose poses have no other source. `filters` are group and mask by
+    body and link, as they were when the last body was read, or at the last `read_filters`.
+    """
+
+    def __init__(self, client: int, settings: Settings, recorder: Recorder | None) -> None:
+        self._client, self._settings, self._recorder = client, settings, recorder
+        self._marks = Marks(client)
+        self._unidentified = 0
+        self.by_id: dict[int, Body] = {}
+        self.hidden: dict[int, int] = {}
+        self.filters: dict[tuple[int, int], tuple[int, int]] = {}
+
+    def refresh(self, placed: Collection[int]) -> list[Skipped] | None:
+        """Read what is new; None if nothing has come or gone, else what is newly skipped. `placed` ones have shapes."""
+        if not (self._margins_changed(placed) or self._ground_changed() or not self._marks.are_as_remembered()):
+            return None
+        # After a syncBodyInfo, pybullet would show the user data of a removed body on the one that inherits its id.
+        pybullet.syncUserData(physicsClientId=self._client)
+        ids = body_ids(self._client)
+        fresh = ids != self.by_id.keys() or not all(map(self._marks.is_on, ids))
+        skipped = self._read() if fresh else None
+        self._marks.remember(self.by_id)
+        return skipped
+
+    def read_filters(self) -> None:
+        """Read groups and masks again, of the same bodies."""
+        self._take_filters(*saved_bodies(self._client, sorted(self.by_id)))
+
+    @property
+    def shape_count(self) -> int:
+        """How many shapes there are, modelled or not."""
+        return sum(body.shape_count for body in self.by_id.values()) + self._unidentified
+
+    @property
+    def links(self) -> dict[int, Collection[int]]:
+        """The links of each body."""
+        return {id: body.link_names for id, body in self.by_id.items()}
+
+    @property
+    def names(self) -> dict[tuple[int, int], str]:
+        """By (body, link); those that several would share end in "#" and the id."""
+        labels = _distinct({id: body.name for id, body in self.by_id.items()})
+        return {
+            (id, link): f"{labels[id]}/{name}"
+            for id, body in self.by_id.items()
+            for link, name in _distinct(body.link_names).items()
+        }
+
+    @property
+    def colors(self) -> dict[tuple[int, int], Color]:
+        """By (body, link)."""
+        return {(id, link): color for id, body in self.by_id.items() for link, color in body.colors.items()}
+
+    @property
+    def decomposed(self) -> list[Decomposed]:
+        """The concave meshes that are modelled as unions of convex parts."""
+        return [each for body in self.by_id.values() for each in body.decomposed]
+
+    @property
+    def skipped(self) -> list[Skipped]:
+        """What is not modelled, one entry per body and link."""
+        return [each for body in self.by_id.values() for each in body.skipped] + self._skipped_unidentified()
+
+    def _margins_changed(self, placed: Collection[int]) -> bool:
+        """Whether a base has another margin than before, where that counts; its body is then new."""
+        if self._settings.surface == "nominal":
+            return False
+        watched = body_ids(self._client).intersection(placed)
+        margins = {id: pybullet.getDynamicsInfo(id, BASE, self._client)[11] for id in watched}
+        changed = [id for id, margin in margins.items() if margin != self.by_id[id].margin]
+        for id in changed:
+            del self.by_id[id]
+        return bool(changed)
+
+    def _ground_changed(self) -> bool:
+        """Whether a height field has been given other heights; its body is then new."""
+        grounds = {id: body.ground for id, body in self.by_id.items() if body.ground}
+        for id, ground in grounds.items():
+            if self._recorder and self._recorder.height_field(id) is not ground.field:
+                del self.by_id[id]
+        return len(grounds) > sum(1 for id in grounds if id in self.by_id)
+
+    def _read(self) -> list[Skipped]:
+        """Read the bodies that are not marked yet, forget those that are gone; what is newly skipped."""
+        client = self._client
+        # Of the bodies that createMultiBody makes from batchPositions, only the last is known before a sync.
+        pybullet.syncBodyInfo(client)
+        pybullet.syncUserData(physicsClientId=client)
+        ids = sorted(body_ids(client))
+        known = {id: self.by_id[id] for id in ids if id in self.by_id and self._marks.is_on(id)}
+        fresh = [id for id in ids if id not in known]
+        hidden = [id for id in ids if hides_pose(client, id)]
+        unidentified, self.hidden = (self._unidentified if ids else 0), {}
+        if fresh or hidden:
+            file, rows = saved_bodies(client, ids)
+            self._take_filters(file, rows)
+            unidentified = len(file.bodies) - len(rows)
+            self.hidden = {id: rows[id] for id in hidden if id in rows}
+        for id in fresh:
+            body = file.bodies[rows[id]] if id in rows else None
+            field = self._recorder.height_field(id) if self._recorder else None
+            known[id] = read_body(client, id, file, body, self._settings, field)
+            self._marks.put(id)
+        self.by_id = dict(sorted(known.items()))
+        grown, self._unidentified = unidentified > self._unidentified, unidentified
+        skipped = [each for id in fresh for each in self.by_id[id].skipped]
+        return skipped + (self._skipped_unidentified() if grown else [])
+
+    def _take_filters(self, file: BulletFile, rows: Mapping[int, int]) -> None:
+        self.filters = {
+            (id, link): (collider.group, collider.mask)
+            for id, row in rows.items()
+            for link, collider in file.bodies[row].colliders.items()
+        }
+
+    def _skipped_unidentified(self) -> list[Skipped]:
+        if not self._unidentified:
+            return []
+        reason = "pybullet does not identify the links of robots in maximal coordinates"
+        return [Skipped(-1, BASE, f"{self._unidentified} rigid bodies", reason)]
+
+
+def _distinct(names: Mapping[int, str]) -> dict[int, str]:
+    number = Counter(names.values())
+    return {id: name if number[name] == 1 else f"{name}#{id}" for id, name in names.items()}
