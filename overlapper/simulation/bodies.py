@@ -80,7 +80,8 @@ class Bodies:
         self.physicsClientId = physicsClientId
         self._known = KnownBodies(physicsClientId, Settings(concave, concave_threshold, surface), recorder)
         self._in_force = RulesInForce(recorder)
-        self._asked: Literal["simulated", "all"] | int = "simulated"  # of the last overlaps(); how many, if it was a list
+        # Of the last overlaps(); how many, if it was a list.
+        self._asked: Literal["simulated", "all"] | int = "simulated"
         self._arrange()
         self._refresh()
         self._found = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
