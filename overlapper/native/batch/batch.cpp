@@ -10,7 +10,8 @@
 #include "batch/box_tree.h"
 #include "batch/parallel.h"
 #include "distance/box_axes.h"
-#include "distance/minkowski.h"
+#include "distance/gjk.h"
+#include "geometry/rounding.h"
 #include "shapes/planes_asked.h"
 
 namespace overlapper {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "distance/minkowski.h"
+#include "geometry/rounding.h"
 
 namespace overlapper {
 namespace {

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "geometry/rounding.h"
+
 namespace overlapper {
 namespace {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "distance/minkowski.h"
+#include "distance/least_translation.h"
 #include "shapes/shape.h"
 
 namespace overlapper {

@@ -3,6 +3,7 @@
 #include <limits>
 #include <vector>
 
+#include "geometry/rounding.h"
 #include "geometry/wide.h"
 #include "shapes/solid.h"
 
@@ -112,8 +113,8 @@ class PartingSearch {
     const Vec3 product = cross(along, step);
     if (16 * norm2(product) > norm2(along) * norm2(step)) return unit(product);
     // Of nearly parallel edges, the product of doubles would tilt along them.
-    return unit(rounded(wide_cross(wide_difference(a_.vertex(edge.to), a_.vertex(edge.from)),
-                                   wide_difference(b_.vertex(right), b_.vertex(left)))));
+    return unit(rounded(cross(wide_difference(a_.vertex(edge.to), a_.vertex(edge.from)),
+                              wide_difference(b_.vertex(right), b_.vertex(left)))));
   }
 
   Way lowest(Vec3 direction) const {

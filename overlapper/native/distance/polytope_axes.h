@@ -2,7 +2,8 @@
 
 #include <optional>
 
-#include "distance/minkowski.h"
+#include "distance/least_translation.h"
+#include "shapes/shape.h"
 
 namespace overlapper {
 

@@ -1,6 +1,6 @@
 #include "distance/portal.h"
 
-#include "distance/minkowski.h"
+#include "distance/simplex.h"
 
 namespace overlapper {
 namespace {

@@ -12,9 +12,9 @@ struct WideGap {
   WideVector witness_a, witness_b;
 };
 
-/// GJK on the cores, as in minkowski.h. `noise` is how far rounding in double-double may move a point. At most one of
+/// GJK on the cores, as in gjk.h. `rounding` is how far operations in double-double may move a point. At most one of
 /// the two may be a half-space.
-WideGap wide_gap(const WideBody& a, const WideBody& b, double noise);
+WideGap wide_gap(const WideBody& a, const WideBody& b, double rounding);
 
 /// How far a has to move along `normal`, which points from b to a, until its support planes are those of b; negative if
 /// they are apart along it.

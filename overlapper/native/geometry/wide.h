@@ -8,6 +8,7 @@ namespace overlapper {
 /// Dekker); further operations are right to about 2^-100 of the larger operand.
 struct DoubleDouble {
   double head = 0, tail = 0;
+  friend bool operator==(const DoubleDouble&, const DoubleDouble&) = default;
 };
 
 inline DoubleDouble two_sum(double a, double b) {
@@ -57,6 +58,7 @@ inline DoubleDouble sqrt(DoubleDouble a) {
 
 struct WideVector {
   DoubleDouble x, y, z;
+  friend bool operator==(const WideVector&, const WideVector&) = default;
 };
 
 /// a - b, exactly.
@@ -64,7 +66,7 @@ inline WideVector wide_difference(Vec3 a, Vec3 b) {
   return {two_sum(a.x, -b.x), two_sum(a.y, -b.y), two_sum(a.z, -b.z)};
 }
 
-inline WideVector wide_cross(const WideVector& u, const WideVector& v) {
+inline WideVector cross(const WideVector& u, const WideVector& v) {
   return {u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
 }
 
@@ -72,9 +74,9 @@ inline WideVector wide_cross(const WideVector& u, const WideVector& v) {
 /// product cancels.
 inline WideVector wide_normal(Vec3 a, Vec3 b, Vec3 c) {
   const double ab = norm2(b - a), bc = norm2(c - b), ca = norm2(a - c);
-  if (ab >= bc && ab >= ca) return wide_cross(wide_difference(a, c), wide_difference(b, c));
-  if (bc >= ca) return wide_cross(wide_difference(b, a), wide_difference(c, a));
-  return wide_cross(wide_difference(c, b), wide_difference(a, b));
+  if (ab >= bc && ab >= ca) return cross(wide_difference(a, c), wide_difference(b, c));
+  if (bc >= ca) return cross(wide_difference(b, a), wide_difference(c, a));
+  return cross(wide_difference(c, b), wide_difference(a, b));
 }
 
 inline WideVector wide(Vec3 v) { return {{v.x}, {v.y}, {v.z}}; }
@@ -84,6 +86,7 @@ inline DoubleDouble dot(const WideVector& a, const WideVector& b) { return a.x *
 inline WideVector operator-(const WideVector& v) { return {-v.x, -v.y, -v.z}; }
 inline WideVector operator*(DoubleDouble s, const WideVector& v) { return {s * v.x, s * v.y, s * v.z}; }
 inline WideVector operator*(double s, const WideVector& v) { return DoubleDouble{s} * v; }
+inline WideVector operator/(const WideVector& v, DoubleDouble s) { return {v.x / s, v.y / s, v.z / s}; }
 inline double rounded(DoubleDouble a) { return a.head; }
 inline Vec3 rounded(const WideVector& v) { return {v.x.head, v.y.head, v.z.head}; }
 /// What is left when `rounded` is taken away, rounded.
@@ -113,7 +116,7 @@ inline DoubleDouble norm(const WideVector& v) {
 /// Scaled to length one; {0, 0, 0} stays as it is.
 inline WideVector unit(const WideVector& v) {
   const DoubleDouble length = norm(v);
-  return length.head > 0 ? WideVector{v.x / length, v.y / length, v.z / length} : v;
+  return length.head > 0 ? v / length : v;
 }
 
 }  // namespace overlapper

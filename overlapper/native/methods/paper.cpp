@@ -7,10 +7,11 @@
 #include <stdexcept>
 #include <unordered_set>
 
-#include "distance/minkowski.h"
+#include "distance/gjk.h"
 #include "geometry/expanding_hull.h"
 #include "geometry/polytope.h"
 #include "geometry/predicates.h"
+#include "geometry/rounding.h"
 #include "shapes/limits.h"
 
 namespace overlapper {

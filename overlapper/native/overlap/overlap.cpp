@@ -5,9 +5,11 @@
 #include <limits>
 #include <stdexcept>
 
+#include "distance/penetration.h"
 #include "distance/wide_gap.h"
 #include "geometry/expanding_hull.h"
 #include "geometry/predicates.h"
+#include "geometry/rounding.h"
 #include "methods/closed_forms.h"
 #include "methods/paper.h"
 #include "shapes/canonical_order.h"

@@ -6,7 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "distance/minkowski.h"
+#include "distance/gjk.h"
+#include "distance/least_translation.h"
 #include "methods/clipping/clip.h"
 #include "methods/dual/deepest_ball.h"
 #include "methods/dual/region.h"

@@ -1,4 +1,5 @@
-#include "distance/minkowski.h"
+#include "distance/gjk.h"
+#include "distance/penetration.h"
 #include "overlap/overlap.h"
 #include "python/arrays.h"
 #include "shapes/canonical_order.h"

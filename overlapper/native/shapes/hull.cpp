@@ -161,7 +161,7 @@ Plane supporting_plane(const std::vector<Vec3>& vertices, std::span<const int> r
     // On a slender facet the products of doubles nearly cancel.
     WideVector sum;
     for (size_t i = 1; i + 1 < ring.size(); ++i)
-      sum = sum + wide_cross(wide_difference(vertices[ring[i]], apex), wide_difference(vertices[ring[i + 1]], apex));
+      sum = sum + cross(wide_difference(vertices[ring[i]], apex), wide_difference(vertices[ring[i + 1]], apex));
     normal = unit(rounded(sum));
   }
   double offset = -kInfinity;

@@ -34,7 +34,7 @@ WideVector leave_ball(const WideVector& q, const WideVector& d, double radius) {
 
 /// The same from a point that may be outside, for the far one of two crossings.
 WideVector leave_cap(const WideVector& q, const WideVector& d, double radius) {
-  const WideVector across = wide_cross(q, d);
+  const WideVector across = cross(q, d);
   const DoubleDouble dd = dot(d, d);
   DoubleDouble square = dd * two_product(radius, radius) - dot(across, across);
   if (square.head < 0) square = {};

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "distance/minkowski.h"
+#include "geometry/rounding.h"
 #include "methods/clipping/meeting.h"
 #include "methods/tracing/trace.h"
 #include "shapes/canonical_order.h"

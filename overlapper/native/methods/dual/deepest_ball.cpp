@@ -4,7 +4,7 @@
 #include <limits>
 #include <numeric>
 
-#include "distance/minkowski.h"
+#include "geometry/rounding.h"
 
 namespace overlapper {
 namespace {

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "distance/simplex.h"
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// GJK with witness points (Gilbert, Johnson, Keerthi 1988) on the cores of a and b: spheres and capsules count as the
+/// point or segment that their radius surrounds. Neither may be a half-space. Coordinates should be relative to
+/// something near.
+Separation separate_cores(const Placed& a, const Placed& b);
+
+/// Nearest points of two shapes.
+struct Distance {
+  double distance = 0;  ///< negative by an unspecified amount if the cores overlap
+  double gap = 0;       ///< certified lower bound of the distance along `normal`
+  Vec3 normal;          ///< unit, from b to a; {0, 0, 0} if the shapes' cores overlap
+  Vec3 witness_a, witness_b;
+};
+Distance distance(const Placed& a, const Placed& b);
+
+}  // namespace overlapper

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "geometry/vec.h"
+
+namespace overlapper {
+
+/// The least translation that separates: moving a by depth * normal leaves the two touching.
+struct Penetration {
+  double depth = 0;  ///< negative if the shapes are apart
+  Vec3 normal;       ///< unit, from b to a
+};
+
+}  // namespace overlapper

@@ -1,0 +1,144 @@
+#include "distance/penetration.h"
+
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "distance/box_axes.h"
+#include "distance/gjk.h"
+#include "distance/polytope_axes.h"
+#include "geometry/expanding_hull.h"
+#include "geometry/predicates.h"
+#include "geometry/rounding.h"
+
+namespace overlapper {
+namespace {
+
+const HalfSpace* half_space(const Placed& placed) { return std::get_if<HalfSpace>(&placed.shape); }
+
+/// EPA's polytope: support points of the difference of two cores, and which of its facets are known to be final.
+class DepthSearch {
+ public:
+  DepthSearch(const Placed& a, const Placed& b) : a_(a), b_(b) {}
+
+  Penetration run() {
+    for (int axis = 0; axis < 3; ++axis)
+      for (double side : {-1.0, 1.0}) ask({axis == 0 ? side : 0, axis == 1 ? side : 0, axis == 2 ? side : 0});
+    for (double x : {-1.0, 1.0})
+      for (double y : {-1.0, 1.0})
+        for (double z : {-1.0, 1.0}) ask({x, y, z});
+    // A slender difference may show its corners in one plane only. Asked across that plane, it shows more, unless it is
+    // flat itself, which the difference of two segments is.
+    bool solid = hull_.build();
+    for (int attempt = 0; attempt < 3 && !solid; ++attempt) {
+      const Vec3 across = across_all();
+      ask(across);
+      ask(-across);
+      solid = hull_.build();
+    }
+    if (!solid) return best_;
+    for (int round = 0; round < kMaxRounds; ++round) {
+      const int facet = least_facet();
+      if (facet < 0) break;
+      const Vec3 normal = normal_of(facet);
+      const double before = offset_[facet];
+      const double reached = ask(normal);
+      const int p = static_cast<int>(hull_.points.size()) - 1;
+      // A smooth rim is never reached: stop when the facet's offset and the support agree to rounding.
+      if (reached - before <= rounding(extent_) || !hull_.sees(facet, p)) {
+        final_.resize(hull_.facets.size(), false);
+        final_[facet] = true;
+        if (best_.depth <= before + 1e-12 * extent_) break;
+        continue;
+      }
+      hull_.insert(p, facet);
+    }
+    return best_;
+  }
+
+ private:
+  static constexpr int kMaxRounds = 2000;
+
+  Vec3 corner(int facet, int i) const { return hull_.points[hull_.facets[facet].vertex[i]]; }
+
+  /// Adds the support point along `direction`; its offset is an upper bound of the depth.
+  double ask(Vec3 direction) {
+    direction = unit(direction);
+    const Vec3 w = a_.core_support(direction) - b_.core_support(-direction);
+    extent_ = std::max(extent_, max_component(abs(w)));
+    hull_.add(w);
+    const double offset = dot(direction, w);
+    // `direction` pushes A - B away from the origin; a leaves b the opposite way.
+    if (offset < best_.depth) best_ = {offset, -direction};
+    return offset;
+  }
+
+  Vec3 normal_of(int facet) const {
+    return unit(accurate_normal(corner(facet, 0), corner(facet, 1), corner(facet, 2)));
+  }
+
+  /// The facet nearest to the origin that is not final yet. Equally turned boxes make needles of collinear corners,
+  /// whose plain normals are noise: ranked by those, the nearest facet may come last.
+  int least_facet() {
+    int best = -1;
+    double least = std::numeric_limits<double>::infinity();
+    for (int f = 0; f < static_cast<int>(hull_.facets.size()); ++f) {
+      if (f == static_cast<int>(offset_.size()))
+        offset_.push_back(hull_.facets[f].removed() ? 0 : dot(normal_of(f), corner(f, 0)));
+      if (hull_.facets[f].removed() || (f < static_cast<int>(final_.size()) && final_[f])) continue;
+      if (offset_[f] < least) least = offset_[f], best = f;
+    }
+    return best;
+  }
+
+  /// Orthogonal to the plane, or to the line, of the points so far.
+  Vec3 across_all() const {
+    Vec3 u, v;
+    for (Vec3 p : hull_.points) {
+      const Vec3 edge = p - hull_.points[0];
+      if (norm2(edge) > norm2(u)) u = edge;
+    }
+    for (Vec3 p : hull_.points) {
+      const Vec3 edge = p - hull_.points[0];
+      if (norm2(cross(u, edge)) > norm2(cross(u, v))) v = edge;
+    }
+    const Vec3 normal = unit(cross(u, v));
+    if (norm2(normal) > 0) return normal;
+    return norm2(u) > 0 ? any_orthogonal(unit(u)) : Vec3{0, 0, 1};
+  }
+
+  const Placed &a_, &b_;
+  ExpandingHull hull_;
+  std::vector<char> final_;
+  std::vector<double> offset_;  ///< per facet: of its plane, along its outward unit normal
+  double extent_ = 0;
+  Penetration best_{std::numeric_limits<double>::infinity(), {}};
+};
+
+}  // namespace
+
+Penetration penetration(const Placed& a, const Placed& b) {
+  if (half_space(a) && half_space(b))
+    throw std::invalid_argument("two half-spaces have no least translation that separates them");
+  if (half_space(a) || half_space(b)) {
+    const Distance height = distance(a, b);
+    return {-height.distance, height.normal};
+  }
+  Penetration of_boxes;
+  const Box *box_a = std::get_if<Box>(&a.shape), *box_b = std::get_if<Box>(&b.shape);
+  if (box_a && box_b) {
+    of_boxes = box_penetration(*box_a, a.pose, *box_b, b.pose, 0);
+    if (of_boxes.depth > 0) return of_boxes;
+  } else if (const auto of_polytopes = polytope_penetration(a, b)) {
+    return *of_polytopes;
+  }
+  const double radius = core_radius(a.shape) + core_radius(b.shape);
+  const Separation cores = separate_cores(a, b);
+  if (!cores.origin_inside && cores.gap > 0) return {radius - cores.distance, cores.normal};
+  if (box_a && box_b) return of_boxes;
+  Penetration result = DepthSearch(a, b).run();
+  result.depth += radius;
+  return result;
+}
+
+}  // namespace overlapper

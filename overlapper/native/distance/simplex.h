@@ -1,0 +1,214 @@
+#pragma once
+
+#include <array>
+#include <limits>
+#include <type_traits>
+
+#include "geometry/predicates.h"
+#include "geometry/wide.h"
+
+namespace overlapper {
+
+/// A point of the Minkowski difference A - B with the points of A and of B that make it.
+template <class Vector>
+struct DifferencePointOf {
+  Vector on_a, on_b;
+  Vector difference() const { return on_a - on_b; }
+};
+using DifferencePoint = DifferencePointOf<Vec3>;
+
+/// One to four points of A - B and the weights (barycentric coordinates) of the point of their hull nearest to the
+/// origin. In doubles or in double-double.
+template <class Vector>
+struct SimplexOf {
+  using Point = DifferencePointOf<Vector>;
+  using Scalar = decltype(Vector::x);
+
+  std::array<Point, 4> corner;
+  std::array<Scalar, 4> weight{};
+  int size = 0;
+  Vector nearest;  ///< that point: from the plane or line of the corners, so that it has a direction even when tiny
+
+  /// The same combination of the points of A; a common point of both if `nearest` is the origin.
+  Vector witness_a() const { return combined(&Point::on_a); }
+  Vector witness_b() const { return combined(&Point::on_b); }
+
+ private:
+  Vector combined(Vector Point::* on) const {
+    Vector sum;
+    for (int i = 0; i < size; ++i) sum = sum + weight[i] * (corner[i].*on);
+    return sum;
+  }
+};
+using Simplex = SimplexOf<Vec3>;
+
+/// What GJK knows when it stops.
+template <class Vector>
+struct SeparationOf {
+  SimplexOf<Vector> simplex;
+  bool origin_inside = false;  ///< the simplex contains the origin
+  double distance = 0;         ///< length of simplex.nearest, 0 if the origin is inside; an upper bound
+  /// A lower bound: the support planes along `normal` are so far apart; negative if none separates.
+  double gap = -std::numeric_limits<double>::infinity();
+  Vector normal;  ///< unit, from b to a; {0, 0, 0} if the origin is inside
+};
+using Separation = SeparationOf<Vec3>;
+
+// What differs between doubles and double-doubles.
+
+/// The square orders points as their distance does and takes no root.
+inline double rank(Vec3 nearest) { return norm2(nearest); }
+/// The square of what double-doubles tell from nothing may underflow.
+inline double rank(const WideVector& nearest) { return norm(nearest).head; }
+
+/// A needle's normal is found with about twice as many digits as its corners have.
+inline Vec3 plane_normal(Vec3 a, Vec3 b, Vec3 c) { return accurate_normal(a, b, c); }
+/// Double-doubles have digits to spare, and are scaled to keep their products in range.
+inline WideVector plane_normal(const WideVector& a, const WideVector& b, const WideVector& c) {
+  return unit(cross(b - a, c - a));
+}
+
+/// The point nearest to the origin of the plane through p with that plane_normal().
+inline Vec3 foot(Vec3 normal, Vec3 p) { return dot(normal, p) / norm2(normal) * normal; }
+inline WideVector foot(const WideVector& normal, const WideVector& p) { return dot(normal, p) * normal; }
+
+/// True if the tetrahedron contains the origin, decided by exact signs; then also its weights.
+inline bool weigh(Vec3 a, Vec3 b, Vec3 c, Vec3 d, std::array<double, 4>& weight) {
+  const int side = orientation(a, b, c, d);
+  if (side == 0) return false;
+  const Vec3 o;
+  if (orientation(o, b, c, d) * side < 0 || orientation(a, o, c, d) * side < 0 || orientation(a, b, o, d) * side < 0 ||
+      orientation(a, b, c, o) * side < 0)
+    return false;
+  const auto volume = [&](Vec3 p, Vec3 q, Vec3 r) { return std::max(0.0, side * dot(p, cross(q, r))); };
+  weight = {volume(b, c, d), volume(a, d, c), volume(a, b, d), volume(a, c, b)};
+  const double sum = weight[0] + weight[1] + weight[2] + weight[3];
+  if (!(sum > 0)) return false;
+  for (double& w : weight) w /= sum;
+  return true;
+}
+/// True if all shares have one sign in double-double; corners there are not doubles, and have no exact predicates.
+inline bool weigh(const WideVector& a, const WideVector& b, const WideVector& c, const WideVector& d,
+                  std::array<DoubleDouble, 4>& weight) {
+  const DoubleDouble wa = -dot(b, cross(c, d)), wb = dot(a, cross(c, d)), wc = -dot(a, cross(b, d)),
+                     wd = dot(a, cross(b, c));
+  const DoubleDouble sum = wa + wb + wc + wd;
+  if (sum.head == 0) return false;
+  weight = {wa / sum, wb / sum, wc / sum, wd / sum};
+  return std::ranges::none_of(weight, [](DoubleDouble w) { return w.head < 0; });
+}
+
+/// Exact signs are better proof that the origin is inside than a face, edge or corner that rounding has put it on.
+/// Without them the fewest corners are.
+template <class Vector>
+inline constexpr bool kInsideIsExact = std::is_same_v<Vector, Vec3>;
+
+/// Weights of the point of a segment's line nearest to the origin, and that point; false unless both are positive.
+template <class Vector>
+bool weigh(const Vector& a, const Vector& b, SimplexOf<Vector>& s) {
+  const Vector ab = b - a;
+  const auto wb = -dot(a, ab), wa = dot(b, ab);
+  if (!(rounded(wa) > 0 && rounded(wb) > 0)) return false;
+  // Divided by their own sum and not by |ab|²: on a short segment the two differ by far more than rounding.
+  const auto sum = wa + wb;
+  s.weight = {wa / sum, wb / sum};
+  s.nearest = wa > wb ? a + s.weight[1] * ab : b - s.weight[0] * ab;
+  return true;
+}
+
+/// The same for a triangle's plane: areas seen along its normal.
+template <class Vector>
+bool weigh(const Vector& a, const Vector& b, const Vector& c, SimplexOf<Vector>& s) {
+  const Vector n = plane_normal(a, b, c);
+  const auto wa = dot(n, cross(b, c)), wb = dot(n, cross(c, a)), wc = dot(n, cross(a, b));
+  if (!(rounded(wa) > 0 && rounded(wb) > 0 && rounded(wc) > 0 && rounded(dot(n, n)) > 0)) return false;
+  const auto sum = wa + wb + wc;
+  s.weight = {wa / sum, wb / sum, wc / sum};
+  // The normal of a needle is known to more digits than a sum of its far corners, of which nearly all cancels.
+  const auto aa = dot(a, a), bb = dot(b, b), cc = dot(c, c);
+  s.nearest = foot(n, !(aa > bb) && !(aa > cc) ? a : !(bb > cc) ? b : c);
+  return true;
+}
+
+/// Keeps the corners that support the point nearest to the origin. All sub-simplices are tried and the nearest valid
+/// one wins, which needs no case analysis of Voronoi regions that rounding could contradict. Returns the rank() of
+/// that point: 0 if the origin is inside.
+template <class Vector>
+double reduce(SimplexOf<Vector>& s) {
+  SimplexOf<Vector> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (int subset = 1; subset < 1 << s.size; ++subset) {
+    SimplexOf<Vector> part;
+    std::array<Vector, 4> p;
+    for (int i = 0; i < s.size; ++i) {
+      if (!(subset >> i & 1)) continue;
+      p[part.size] = s.corner[i].difference();
+      part.corner[part.size++] = s.corner[i];
+    }
+    bool valid = false;
+    switch (part.size) {
+      case 1: part.weight[0] = {1}, part.nearest = p[0], valid = true; break;
+      case 2: valid = weigh(p[0], p[1], part); break;
+      case 3: valid = weigh(p[0], p[1], p[2], part); break;
+      case 4:
+        if ((least == 0 && !kInsideIsExact<Vector>) || !weigh(p[0], p[1], p[2], p[3], part.weight)) break;
+        s = part;
+        return 0;
+    }
+    if (!valid) continue;
+    const double distance = rank(part.nearest);
+    if (distance < least) least = distance, best = part;
+  }
+  s = best;
+  return least;
+}
+
+template <class Vector>
+bool contains(const SimplexOf<Vector>& s, const Vector& difference) {
+  for (int i = 0; i < s.size; ++i)
+    if (s.corner[i].difference() == difference) return true;
+  return false;
+}
+
+/// GJK with witness points (Gilbert, Johnson, Keerthi 1988), from any `first` point of A - B. `support` finds a
+/// farthest point of A - B along a unit vector. `settled(length, gap, best)` says whether the distance is known well
+/// enough: it lies between `length` and `gap`, which this round has found, or `best`, which any round has (the duality
+/// gap of Frank and Wolfe).
+template <class Vector, class Support, class Settled>
+SeparationOf<Vector> separate(const DifferencePointOf<Vector>& first, const Support& support, const Settled& settled) {
+  SeparationOf<Vector> result;
+  SimplexOf<Vector>& simplex = result.simplex;
+  simplex.corner[0] = first;
+  simplex.weight[0] = {1};
+  simplex.size = 1;
+  simplex.nearest = first.difference();
+  double least = rank(simplex.nearest);
+  // Polytopes end by themselves, as each round finds a new vertex; a cylinder's rim converges, and no bit improves
+  // after some dozens of rounds.
+  constexpr int kMaxRounds = 256;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const auto length = norm(simplex.nearest);
+    if (settled(rounded(length), 0, 0)) {
+      result.origin_inside = rounded(length) == 0;
+      break;
+    }
+    const Vector direction = simplex.nearest / length;
+    const DifferencePointOf<Vector> farthest = support(-direction);
+    const Vector w = farthest.difference();
+    const double gap = rounded(dot(w, direction));
+    if (gap > result.gap) result.gap = gap, result.normal = direction;
+    if (settled(rounded(length), gap, result.gap) || contains(simplex, w)) break;
+    SimplexOf<Vector> grown = simplex;
+    grown.corner[grown.size++] = farthest;
+    const double nearer = reduce(grown);
+    result.origin_inside = nearer == 0;
+    if (!result.origin_inside && !(nearer < least)) break;
+    simplex = grown, least = nearer;
+    if (result.origin_inside) break;
+  }
+  if (result.origin_inside) result.normal = {};
+  else result.distance = rounded(norm(simplex.nearest));
+  return result;
+}
+
+}  // namespace overlapper

@@ -1,0 +1,24 @@
+#pragma once
+
+/// \file
+/// Words of error, each with one meaning throughout the core.
+///
+/// - *rounding*: what operations on doubles (or on double-doubles, where that is said) may lose, bounded from their
+///   number and the size of their operands.
+/// - *doubt*: the band about zero in which doubles cannot tell a sign; beyond it they are right, within it wider
+///   arithmetic or exact signs decide.
+/// - *error*: the bound that is stated to the user, such as `volume_error`.
+/// - *flatness*: m; by how much the plane of a facet misses the corners it was made from. It belongs to the body, is no
+///   rounding, and no more digits lessen it.
+/// - *certified*, *lower*, *upper*: bounds that hold whatever rounding did.
+namespace overlapper {
+
+/// Rounding to be expected in sums of coordinates of that size: a rotation, a translation and a dot product make about
+/// 16 roundings of at most half an ulp.
+inline double rounding(double magnitude) { return 16 * 0x1p-53 * magnitude; }
+
+/// A sum beyond this has the sign that doubles give it: two rotations, a translation and a dot product, each of the
+/// last bits of a quaternion's length included, may lose half as much. Within, wider arithmetic decides.
+inline double doubt(double magnitude) { return 4 * rounding(magnitude); }
+
+}  // namespace overlapper
