@@ -12,7 +12,6 @@ from rich.progress import Progress
 
 if TYPE_CHECKING:
     from overlapper.scenes.playback import View
-    from overlapper.scenes.verdict import Frame
     from overlapper.viewer.look import Look
 
 Step = TypeVar("Step")
@@ -30,7 +29,7 @@ def with_progress(frames: Iterable[Step], name: str, steps: int) -> Iterator[Ste
 @contextmanager
 def recorder(
     path: Path, looks: Sequence[Look] = (), rate: float = PICTURES_PER_SECOND
-) -> Iterator[Callable[[Frame | View], None]]:
+) -> Iterator[Callable[[View], None]]:
     """Records some of the frames it is called with, and writes the page in the end, however that comes."""
     from overlapper.viewer import Recording
 
@@ -38,7 +37,7 @@ def recorder(
     recording = Recording(*looks)
     shown = 0
 
-    def record(frame: Frame | View) -> None:
+    def record(frame: View) -> None:
         nonlocal shown
         if frame.time * rate >= shown:
             recording.add(frame.bodies, frame.contacts, frame.time)

@@ -99,7 +99,7 @@ def _measure(
     """The run, with its files; False if it was interrupted, and then both have what was done until then."""
     with quiet() as noise, scene_refusals(noise), ExitStack() as stack:
         with without_banner():
-            from overlapper.scenes.verdict import run as frames_of
+            from overlapper.scenes.run import run as frames_of
             from overlapper.simulation import link_contacts
         from overlapper.cli.summary import Summary
         from overlapper.reference import Fcl

@@ -13,8 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from overlapper.reference import Comparison
-from overlapper.scenes.verdict import Frame
-from overlapper.simulation import Decomposed, Report, Skipped
+from overlapper.scenes.run import Frame
+from overlapper.simulation import Bodies, Decomposed, Report, Skipped
 from overlapper.simulation.links import LinkContact, link_contacts
 
 # Units for the volumes of one table, in m³: the largest of them that makes the largest volume a tenth or more.
@@ -75,7 +75,7 @@ class Summary:
     verdicts: Counter[str] = field(default_factory=Counter)
     disagreements: list[Disagreement] = field(default_factory=list)
 
-    def add(self, frame: Frame, opinions: Sequence[Comparison] = ()) -> None:
+    def add(self, frame: Frame[Bodies], opinions: Sequence[Comparison] = ()) -> None:
         """Take in a frame; `opinions` are FCL's of its contacts, if it was asked."""
         self.steps, self.seconds = frame.step, frame.time
         self.report = _sum(self.report, frame.bodies.report())

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from overlapper.scenes.comparison import Move
-from overlapper.scenes.verdict import Still, Verdict
+from overlapper.scenes.still import Still
+from overlapper.scenes.verdict import Verdict
 from overlapper.viewer import Recording
 
 LIMIT = 3  # moves of a cause; what more there is, the terminal counts

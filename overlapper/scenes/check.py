@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Literal
 
 from overlapper.scenes.expected import read_expected
-from overlapper.scenes.scene import load_scene
-from overlapper.scenes.verdict import SceneError, Verdict, examine, record
+from overlapper.scenes.record import record
+from overlapper.scenes.scene import SceneError, load_scene
+from overlapper.scenes.verdict import Verdict, examine
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,11 +37,11 @@ class Move:
 
     def cells(self) -> tuple[str, ...]:
         """A line of a table below HEADS."""
-        told = [self.difference, self.allowed, self.part] if math.isfinite(self.difference) else []
-        figures = [f"{each:.3g}" for each in told]
-        if math.isnan(self.allowed):
-            figures = [figures[0], "", f"{figures[2]} %"]
-        return (str(self.step), self.who, self.quantity, self.recorded, self.found, *figures, *[""] * (3 - len(told)))
+        figures = ("", "", "")
+        if math.isfinite(self.difference):
+            allowed = "" if math.isnan(self.allowed) else f"{self.allowed:.3g}"
+            figures = (f"{self.difference:.3g}", allowed, f"{self.part:.3g}" + " %" * math.isnan(self.allowed))
+        return (str(self.step), self.who, self.quantity, self.recorded, self.found, *figures)
 
     def __str__(self) -> str:
         moved = f"step {self.step}, {self.who}: {self.quantity} is {self.found}, recorded as {self.recorded}"

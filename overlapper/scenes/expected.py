@@ -68,6 +68,9 @@ ROUNDING = {
 # not depend on chance, and less than anyone would call the same grasp.
 DRIFT = {"position": Budget(0.0, 1e-4), "orientation": Budget(0.0, 1e-3)}
 
+# What is told of the overlaps when bodies are elsewhere, or are others: changes of a hundredth.
+HUNDREDTHS = {"volume": Budget(0.01, 0.0), "depth": Budget(0.01, 0.0)}
+
 
 @dataclass(frozen=True, slots=True)
 class Expected:

@@ -7,31 +7,24 @@ alone: its scene is run again with the table's settings, and held against the ta
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from overlapper.scenes.comparison import compare_measures
-from overlapper.scenes.expected import read_expected
+from overlapper.scenes.expected import HUNDREDTHS, read_expected
+from overlapper.scenes.run import Frame, run
 from overlapper.scenes.scene import Scene, SceneError, load_scene
+from overlapper.scenes.still import Still
 from overlapper.scenes.table import Row, link_rows, rows
 from overlapper.scenes.table_file import TABLES, read_metadata, read_table
-from overlapper.scenes.verdict import HUNDREDTHS, Still, run
+from overlapper.simulation import Bodies
 from overlapper.simulation.links import link_contacts
-from overlapper.viewer.labels import Bodies, Contact
 
 STEP = 1 / 240  # s, what pybullet takes for a step; an expected file says nothing of time
 
-
-@dataclass(frozen=True, slots=True)
-class View:
-    """The bodies and what they share after `step` steps, `time` seconds into the simulation."""
-
-    step: int
-    time: float
-    bodies: Bodies
-    contacts: Sequence[Contact]
+View = Frame[Bodies] | Frame[Still]
 
 
 @dataclass
@@ -88,13 +81,12 @@ def _scene_of(path: Path, settings: dict[str, str]) -> Scene:
 
 
 def _run(scene: Scene, steps: int, settings: dict[str, Any]) -> Generator[View, None, None]:
-    for frame in run(scene, steps, **settings):
-        yield View(frame.step, frame.time, frame.bodies, frame.contacts)
+    yield from run(scene, steps, **settings)
 
 
 def _stills(stills: dict[int, Still], tolerance: float) -> Generator[View, None, None]:
     for step, still in stills.items():
-        yield View(step, step * STEP, still, still.contacts(tolerance))
+        yield Frame(step, step * STEP, still, still.contacts(tolerance))
 
 
 def _held_against(
@@ -119,43 +111,28 @@ def _held_against(
             found += link_rows(*where, link_contacts(frame.contacts))
         else:
             found += rows(*where, frame.contacts)
-        yield View(frame.step, frame.time, frame.bodies, frame.contacts)
+        yield frame
     moves = compare_measures(recorded, found, HUNDREDTHS).moves
     if moves:
         first = min(moves, key=lambda move: move.step)
         playback.remarks.append(f"what is seen is not what {path} has, as the simulation has changed: {first}")
 
 
-def largest(views: Iterator[View]) -> View:
+def largest(views: Iterator[View]) -> Frame[Still]:
     """The view in which most is shared, kept apart from the simulation; the last one if nothing ever is."""
     best, most = None, -1.0
     for view in views:
         volume = sum(contact.overlap.volume for contact in view.contacts)
         if volume > most or volume == 0 == most:
-            best, most = kept(view), volume
+            best, most = view.kept(), volume
     if best is None:
         raise ValueError("there is nothing to see: no step was simulated or recorded")
     return best
 
 
-def at_step(views: Iterator[View], step: int) -> View:
+def at_step(views: Iterator[View], step: int) -> Frame[Still]:
     """The view after that many steps."""
     for view in views:
         if view.step == step:
-            return kept(view)
+            return view.kept()
     raise ValueError(f"there is no step {step} to see")
-
-
-@dataclass(frozen=True, slots=True)
-class _Kept:
-    keys: Sequence[tuple[int, int, int]]
-    placed: Sequence[Any]
-    colors: dict[tuple[int, int], Sequence[float]]
-    names: dict[tuple[int, int], str]
-
-
-def kept(view: View) -> View:
-    """The same, unmoved by what the simulation does next."""
-    bodies = view.bodies
-    still = _Kept(list(bodies.keys), list(bodies.placed), dict(bodies.colors), dict(bodies.names))
-    return View(view.step, view.time, still, list(view.contacts))

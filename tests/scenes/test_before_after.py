@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 import re
 import shutil
 import subprocess
@@ -11,9 +12,12 @@ from pathlib import Path
 import pytest
 from tornado.websocket import websocket_connect
 
-from overlapper.scenes import before_after
+from overlapper.scenes import before_after, check
+from overlapper.scenes.comparison import Move
 from overlapper.scenes.expected import read_expected
-from overlapper.scenes.verdict import examine, load_scene, record
+from overlapper.scenes.record import record
+from overlapper.scenes.scene import load_scene
+from overlapper.scenes.verdict import examine
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
@@ -52,6 +56,41 @@ def test_the_page_tells_the_verdicts_and_holds_both_frames(verdict, tmp_path):
     )  # of both frames: table and cubes reach from -0.1 to 0.27
     assert re.search(r'(src|href)="http', text) is None
     assert len(text) < 1_000_000
+
+
+@pytest.mark.parametrize(
+    ("recorded", "today", "cells"),
+    [
+        ("0.15", "0.35", "<td>overlapping</td><td>not there</td>"),
+        ("0.35", "0.15", "<td>not there</td><td>overlapping</td>"),
+    ],
+)
+def test_a_pair_that_comes_or_goes_has_a_line_without_figures(recorded, today, cells, tmp_path):
+    path = tmp_path / "cubes.py"
+    path.write_text(CUBES.replace("0.15]", f"{recorded}]"))
+    record(load_scene(path))
+    path.write_text(CUBES.replace("0.15]", f"{today}]"))
+    outcome = check.hold(path, tmp_path / "pages")
+    assert outcome.word == "moved"
+    assert f"status is {'not there' if today == '0.35' else 'overlapping'}, recorded as" in "\n".join(outcome.lines)
+    assert f"<td>status</td>{cells}<td></td><td></td><td></td></tr>" in outcome.page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("figures", "cells", "sentence"),
+    [
+        ((), ("", "", ""), "a: depth_m is 2, recorded as 1"),
+        ((1.0, 0.5, 2.0), ("1", "0.5", "2"), ": off by 1 where 0.5 is allowed, 2 times its budget"),
+        ((1.0, 0.0, math.inf), ("1", "0", "inf"), ": off by 1 where 0 is allowed"),
+        ((1.0, math.nan, 100.0), ("1", "", "100 %"), ": off by 1, 100 %"),
+        ((math.inf, math.nan, math.inf), ("", "", ""), "a: depth_m is 2, recorded as 1"),
+        ((math.nan, 0.5, math.nan), ("", "", ""), "a: depth_m is 2, recorded as 1"),
+    ],
+)
+def test_a_move_is_told_by_the_figures_that_it_has(figures, cells, sentence):
+    move = Move(3, "a", "depth_m", "1", "2", *figures)
+    assert move.cells() == ("3", "a", "depth_m", "1", "2", *cells) and len(cells) + 5 == len(Move.HEADS)
+    assert str(move).endswith(sentence)
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not to be had here")

@@ -13,7 +13,8 @@ from PIL import Image
 from overlapper import Box, HalfSpace, Placed, RoundedHull, Sphere, overlap
 from overlapper.cli import view as cli
 from overlapper.scenes.playback import largest, play
-from overlapper.scenes.verdict import load_scene, record
+from overlapper.scenes.record import record
+from overlapper.scenes.scene import load_scene
 from overlapper.viewer import picture
 from overlapper.viewer.look import Look
 

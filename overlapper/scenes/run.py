@@ -1,0 +1,99 @@
+"""A scene run: built in a client of its own and stepped, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Generator, Sequence
+from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar
+
+from overlapper.scenes.scene import Scene, SceneError, Step, broken
+from overlapper.scenes.still import Still
+from overlapper.simulation import Among, Bodies, Concave, Recorder, Surface
+from overlapper.simulation.contacts import Contacts
+
+import pybullet  # isort: skip  # after the simulation, which says what to install
+
+Shown = TypeVar("Shown", bound="Bodies | Still", covariant=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Frame(Generic[Shown]):
+    """The bodies and what they share after `step` steps, `time` seconds into the simulation.
+
+    Of a run, `bodies` is the same object in every frame; of what was recorded or is kept, a Still.
+    """
+
+    step: int
+    time: float
+    bodies: Shown
+    contacts: Contacts
+
+    def kept(self) -> Frame[Still]:
+        """The same, unmoved by what the simulation does next."""
+        return Frame(self.step, self.time, self.still(), self.contacts)
+
+    def still(self) -> Still:
+        """The bodies apart from the simulation."""
+        return self.bodies if isinstance(self.bodies, Still) else Still.of(self.bodies)
+
+
+def run(
+    scene: Scene,
+    steps: int | None = None,
+    tolerance: float = 1e-3,
+    method: Literal["auto", "paper"] = "auto",
+    only: Container[int] | None = None,
+    concave: Concave = "decompose",
+    concave_threshold: float = 0.05,
+    surface: Surface = "nominal",
+    pairs: Among | None = None,
+) -> Generator[Frame[Bodies], None, None]:
+    """Build the scene in a client of its own and step it, `scene.steps` times by default.
+
+    Every step is a frame, the first has number 1; or only those in `only`, if given. `tolerance` and `method` are those
+    of `overlapper.overlap`, `concave`, `concave_threshold` and `surface` of `Bodies`, `pairs` of `Bodies.overlaps`, by
+    default as the scene says; a recorder hears all that it tells pybullet. SceneError if the scene itself fails.
+    """
+    client = pybullet.connect(pybullet.DIRECT)
+    recorder = Recorder(client)
+    among = scene.pairs if pairs is None else pairs
+    try:
+        step = _built(scene, client)
+        bodies = Bodies(
+            client, concave=concave, concave_threshold=concave_threshold, surface=surface, recorder=recorder
+        )
+        seconds = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
+        for i in range(steps or scene.steps):
+            _controlled(scene, step, i)
+            pybullet.stepSimulation(client)
+            if only is None or i + 1 in only:
+                bodies.update()
+                yield Frame(i + 1, (i + 1) * seconds, bodies, bodies.overlaps(tolerance, method, pairs=among))
+    finally:
+        recorder.close()
+        pybullet.disconnect(client)
+
+
+def _built(scene: Scene, client: int) -> Step | None:
+    try:
+        step = scene.build(client)
+    except Exception as error:
+        raise broken(scene.path, "cannot be built", error) from error
+    if step is not None and not callable(step):
+        raise SceneError(f"build(client) of {scene.path} must return None or a function step(i), not {step!r}")
+    return step
+
+
+def _controlled(scene: Scene, step: Step | None, i: int) -> None:
+    if step is None:
+        return
+    try:
+        step(i)
+    except Exception as error:
+        raise broken(scene.path, f"fails before step {i + 1}", error) from error
+
+
+def stills(scene: Scene, steps: Sequence[int]) -> dict[int, Still]:
+    """Today's scene in some of its steps, with its shapes as they will be read from a file."""
+    last = min(max(steps), scene.steps)
+    return {frame.step: Still.of(frame.bodies).as_written() for frame in run(scene, last, only=steps)}

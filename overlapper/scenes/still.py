@@ -1,0 +1,93 @@
+"""A scene at a moment, apart from the simulator: as it was seen, or as it was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import Batch, Placed, Shape
+from overlapper.polytopes.shape_text import shape_of, text_of
+from overlapper.scenes.comparison import poses
+from overlapper.scenes.expected import Key
+from overlapper.scenes.table import Row, key, placements, rows
+from overlapper.simulation.contacts import Contacts
+
+if TYPE_CHECKING:
+    from overlapper.simulation import Bodies
+
+
+@dataclass(frozen=True, slots=True)
+class Still:
+    """The shapes of a scene at a moment, apart from the simulator; the fields are those of `simulation.Bodies`."""
+
+    keys: list[Key]
+    shapes: list[Shape]
+    positions: NDArray[np.float64]
+    orientations: NDArray[np.float64]
+    names: dict[tuple[int, int], str]
+    colors: dict[tuple[int, int], tuple[float, float, float, float]]
+
+    @classmethod
+    def of(cls, bodies: Bodies) -> Still:
+        """The bodies as they are now, unmoved by what the simulation does next."""
+        return cls(
+            list(bodies.keys),
+            list(bodies.shapes),
+            bodies.positions.copy(),
+            bodies.orientations.copy(),
+            bodies.names,
+            bodies.colors,
+        )
+
+    @classmethod
+    def recorded(cls, recorded: Sequence[Row], shapes: dict[Key, Shape]) -> Still:
+        """The shapes of a step of an expected file where its rows say; names are numbers and all is grey."""
+        where = {each: pose for (_, each), pose in poses(recorded).items()}
+        keys = sorted(where)
+        ordered = np.array([where[each] for each in keys]).reshape(-1, 7)
+        links = {each[:2] for each in keys}
+        return cls(
+            keys,
+            [shapes[each] for each in keys],
+            ordered[:, :3],
+            ordered[:, 3:],
+            {(body, link): f"body {body}/link {link}" for body, link in links},
+            dict.fromkeys(links, (0.6, 0.6, 0.6, 1.0)),
+        )
+
+    def as_written(self) -> Still:
+        """With the shapes as they will be read from a file."""
+        read = {id(shape): shape_of(text_of(shape)) for shape in self.shapes}
+        return replace(self, shapes=[read[id(shape)] for shape in self.shapes])
+
+    def moved(self, by: Sequence[float]) -> Still:
+        """All of it, moved by a vector in m."""
+        return replace(self, positions=self.positions + by)
+
+    @property
+    def placed(self) -> list[Placed]:
+        """The shapes where they are, parallel to `keys`."""
+        return [Placed(*each) for each in zip(self.shapes, self.positions, self.orientations)]
+
+    def rows(self, step: int, tolerance: float) -> list[Row]:
+        """A row for each pair of shapes of different bodies that overlap or touch, and one for each shape alone."""
+        pairs = rows(step, 0.0, self, self.contacts(tolerance))
+        met = {shape for row in pairs for shape in (key(row)[:3], key(row)[3:])}
+        return pairs + [row for row in self.placements(step) if key(row)[:3] not in met]
+
+    def placements(self, step: int) -> list[Row]:
+        """A row for each shape, as if it were alone."""
+        return [{"step": step, **row, "status": "alone"} for row in placements(self, "A").values()]
+
+    def contacts(self, tolerance: float) -> Contacts:
+        """The pairs of shapes of different bodies that overlap or touch."""
+        # Pairs of static bodies are in it, too: whether they may be left out is the simulator's business.
+        batch, where = Batch(self.shapes), (self.positions, self.orientations)
+        keys = np.array(self.keys, dtype=np.int64).reshape(-1, 3)
+        bodies, pairs = keys[:, 0], batch.candidate_pairs(*where)
+        among = pairs[bodies[pairs[:, 0]] != bodies[pairs[:, 1]]]
+        return Contacts(keys, batch.overlaps(*where, among, tolerance, separated=False))
