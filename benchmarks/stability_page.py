@@ -18,7 +18,7 @@ from matplotlib.colors import Colormap, LinearSegmentedColormap
 from paper_pictures import PICTURES, save, steps_in_thicknesses
 from paper_steps import STEPS
 from peers import PEERS
-from stability import NOT_ASKED, RIGHT, error_of, failed, read
+from stability_results import NOT_ASKED, RIGHT, error_of, failed, read
 from stress import TABLE as STRESS
 
 matplotlib.use("Agg")

@@ -19,6 +19,7 @@ ROOT = Path(__file__).parents[2]
 import paper_steps  # noqa: E402
 import stability  # noqa: E402
 import stability_page  # noqa: E402
+import stability_results  # noqa: E402
 from peers import clipping, paper, scipy_halfspaces  # noqa: E402
 from watched import Watched  # noqa: E402
 
@@ -26,7 +27,7 @@ CUBE = families.CORNERS
 
 
 def question(*bodies):
-    return stability.Question(families.Case("", 0.0, bodies), bodies)
+    return stability_results.Question(families.Case("", 0.0, bodies), bodies)
 
 
 DEEP = question(CUBE, CUBE + [1.5, 0.25, 0.5])  # 0.5 x 1.75 x 1.5
@@ -61,9 +62,14 @@ def is_not_installed(a: np.ndarray, b: np.ndarray) -> bool:
 
 def test_right_answers_are_no_failures():
     volume = 0.5 * 1.75 * 1.5
-    assert stability.verdict(DEEP, volume * (1 + 1e-9)) == "1.0e-09"
-    assert not stability.failed("1.0e-09")
-    assert stability.verdict(DEEP, True) == stability.verdict(APART, False) == stability.verdict(APART, 0.0) == "ok"
+    assert stability_results.verdict(DEEP, volume * (1 + 1e-9)) == "1.0e-09"
+    assert not stability_results.failed("1.0e-09")
+    assert (
+        stability_results.verdict(DEEP, True)
+        == stability_results.verdict(APART, False)
+        == stability_results.verdict(APART, 0.0)
+        == "ok"
+    )
 
 
 @pytest.mark.parametrize(
@@ -81,12 +87,12 @@ def test_right_answers_are_no_failures():
     ],
 )
 def test_wrong_answers_are_failures(asked, answer, words):
-    assert stability.verdict(asked, answer) == words
-    assert stability.failed(words)
+    assert stability_results.verdict(asked, answer) == words
+    assert stability_results.failed(words)
 
 
 def test_bodies_that_touch_may_be_said_to_overlap_or_not():
-    assert [stability.verdict(TOUCHING, answer) for answer in (True, False, 0.0, 1e-13)] == ["ok"] * 4
+    assert [stability_results.verdict(TOUCHING, answer) for answer in (True, False, 0.0, 1e-13)] == ["ok"] * 4
 
 
 @pytest.mark.parametrize(("depth", "clear"), [(1e-11, True), (1e-13, False), (-1e-13, False), (-1e-10, True)])
@@ -135,7 +141,7 @@ def test_planes_beside_the_true_ones_are_found_to_lose_the_overlap():
 
 
 def test_the_page_says_what_the_committed_results_say():
-    notes, rows = stability.read(stability.RESULTS)
+    notes, rows = stability_results.read(stability.RESULTS)
     assert len(rows) > 800
     assert set(stability.PEERS) <= set(rows[0])
     page = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
@@ -152,11 +158,11 @@ def test_the_page_says_what_the_committed_results_say():
 def test_the_command_writes_results_page_and_pictures(tmp_path):
     command = [sys.executable, "-m", "overlapper", "stability", "--seed=3", "--count=1", f"--out={tmp_path}"]
     subprocess.run(command, check=True, capture_output=True, timeout=300)
-    notes, rows = stability.read(tmp_path / "stability.csv")
+    notes, rows = stability_results.read(tmp_path / "stability.csv")
     assert notes[0].startswith("seed 3; overlapper")
     missing = {note.removeprefix("missing: ").partition(" (")[0] for note in notes[1:]}
     for peer in stability.PEERS:
-        asked = [row for row in rows if row[peer] != stability.NOT_ASKED]
+        asked = [row for row in rows if row[peer] != stability_results.NOT_ASKED]
         assert bool(asked) is (peer not in missing)
     assert {"stability.md", "stability.png", "stability_degeneracy.png"} <= {path.name for path in tmp_path.iterdir()}
 
