@@ -1,0 +1,130 @@
+"""The arrows between the parts of the house point down, in Python and in C++, and each library has one room."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+NATIVE = ROOT / "overlapper" / "native"
+
+# The sources that are here are looked at, not the package that is installed.
+LINTER = """
+import sys
+sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]
+sys.path.insert(0, "")
+from importlinter.cli import lint_imports_command
+lint_imports_command()
+"""
+
+# The folders of the core from above down: a file may include those of its own and of lower ones.
+FLOORS = ["python", "batch", "overlap", "methods", "distance", "shapes", "geometry"]
+
+# The ways that know nothing of each other.
+APART = ["methods/clipping", "methods/tracing", "methods/dual"]
+
+# What includes what it should not, file by file.
+EXCEPTIONS = {
+    ("distance/portal.h", "methods/tracing/close_body.h"),
+    ("methods/clipping/clip.cpp", "methods/tracing/trace.h"),
+    ("methods/clipping/clip.h", "methods/dual/region.h"),
+    ("methods/paper.h", "overlap/overlap.h"),
+    ("methods/tracing/trace.h", "methods/clipping/clip.h"),
+    ("methods/tracing/trace.h", "methods/dual/region.h"),
+}
+
+
+def contracts(folder: Path) -> tuple[int, str]:
+    """The exit code and the report of import-linter on the sources in a folder."""
+    command = [sys.executable, "-c", LINTER, "--config", "pyproject.toml", "--no-cache"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_python_imports_only_downwards_and_each_library_in_one_room():
+    code, report = contracts(ROOT)
+    assert code == 0, report
+
+
+@pytest.mark.parametrize(
+    ("file", "line", "arrow"),
+    [
+        ("viewer/stage.py", "from overlapper.scenes.still import Still", "viewer.stage -> overlapper.scenes.still"),
+        ("union.py", "import overlapper.reference", "union -> overlapper.reference"),
+        ("viewer/live.py", "from overlapper.simulation import Bodies", "viewer.live -> overlapper.simulation"),
+        ("viewer/live.py", "import pybullet", "viewer.live -> pybullet"),
+        ("simulation/links.py", "import fcl", "simulation.links -> fcl"),
+        ("cli/view.py", "import meshcat.geometry", "cli.view -> meshcat"),
+        ("cli/refusals.py", "from sqlalchemy.exc import SQLAlchemyError", "cli.refusals -> sqlalchemy"),
+        ("simulation/contacts.py", "import coacd", "simulation.contacts -> coacd"),
+        ("scenes/table.py", "import matplotlib.pyplot", "scenes.table -> matplotlib"),
+    ],
+)
+def test_an_arrow_that_is_broken_is_named_with_both_ends(file, line, arrow, tmp_path):
+    sources = shutil.ignore_patterns("native", "*.so", "__pycache__")
+    shutil.copytree(ROOT / "overlapper", tmp_path / "overlapper", ignore=sources)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    broken = tmp_path / "overlapper" / file
+    broken.write_text(f"{broken.read_text()}\n{line}\n")
+    code, report = contracts(tmp_path)
+    assert code == 1
+    assert f"overlapper.{arrow}" in report
+
+
+def test_a_part_without_a_floor_is_named(tmp_path):
+    sources = shutil.ignore_patterns("native", "*.so", "__pycache__")
+    shutil.copytree(ROOT / "overlapper", tmp_path / "overlapper", ignore=sources)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    (tmp_path / "overlapper" / "helpers.py").write_text("")
+    code, report = contracts(tmp_path)
+    assert code == 1
+    assert "overlapper.helpers" in report
+
+
+def broken_includes(native: Path) -> set[tuple[str, str]]:
+    """The files of the core that include one of a higher folder, or of a way beside theirs, with the file included."""
+    found = set()
+    for path in [*native.rglob("*.h"), *native.rglob("*.cpp")]:
+        file = path.relative_to(native).as_posix()
+        if file.startswith("fuzz/"):  # which is above all
+            continue
+        for included in re.findall(r'^\s*#\s*include "([^"]+)"', path.read_text(encoding="utf-8"), re.MULTILINE):
+            floor, below = (FLOORS.index(each.partition("/")[0]) for each in (file, included))
+            ways = [next((way for way in APART if each.startswith(f"{way}/")), None) for each in (file, included)]
+            beside = ways[0] is not None and floor == below and ways[1] != ways[0]
+            if below < floor or beside:
+                found.add((file, included))
+    return found
+
+
+def test_the_core_includes_only_downwards():
+    found = broken_includes(NATIVE)
+    lines = "\n".join(f"{file} includes {included}" for file, included in sorted(found - EXCEPTIONS))
+    assert not lines, lines
+    mended = "\n".join(f"{file} does not include {included}" for file, included in sorted(EXCEPTIONS - found))
+    assert not mended, f"these are exceptions no more:\n{mended}"
+
+
+@pytest.mark.parametrize(
+    ("file", "included", "broken"),
+    [
+        ("geometry/polytope.cpp", "shapes/hull.h", True),
+        ("distance/portal.cpp", "methods/tracing/trace.h", True),
+        ("methods/paper.cpp", "overlap/overlap.h", True),
+        ("methods/clipping/clip.cpp", "methods/dual/region.h", True),
+        ("methods/tracing/trace.cpp", "methods/choose.h", True),
+        ("methods/tracing/trace.cpp", "methods/tracing/seam.h", False),
+        ("methods/paper.cpp", "methods/clipping/clip.h", False),
+        ("overlap/overlap.cpp", "geometry/vec.h", False),
+        ("python/batch.cpp", "python/arrays.h", False),
+        ("fuzz/fuzz_overlap.cpp", "batch/batch.h", False),
+    ],
+)
+def test_an_include_that_points_up_is_named_with_both_files(file, included, broken, tmp_path):
+    path = tmp_path / file
+    path.parent.mkdir(parents=True)
+    path.write_text(f'#include "{included}"\n#include <vector>\n')
+    assert broken_includes(tmp_path) == ({(file, included)} if broken else set())
