@@ -90,7 +90,7 @@ def corners(body: Placed) -> np.ndarray:
 
 
 def exact_points(body: Placed) -> list[truth.exact.Vector]:
-    return truth.exact.placed(corners(body).tolist(), body.position.tolist(), body.orientation.tolist())
+    return truth.exact.placed(corners(body).tolist(), body.position.tolist(), body.given_orientation.tolist())
 
 
 def vertices(body: Placed) -> np.ndarray:

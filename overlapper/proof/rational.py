@@ -111,7 +111,7 @@ class RationalBody:
     def __init__(self, placed: Placed) -> None:
         self.shape = placed.shape
         self.position: Exact = exact(placed.position)
-        self.axes = rotation(placed.orientation)
+        self.axes = rotation(placed.given_orientation)
         self._turn = integers(self.axes)
 
     def local(self, points: Exact, scale: int = 1) -> tuple[Exact, int]:

@@ -318,7 +318,9 @@ class Placed:
     """
     A shape and where it is in the world.
 
-    position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0.
+    position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0. The body is turned
+    by what the numbers say as given, M(q) / |q|² without rounding; the attribute `orientation` is divided by the length,
+    which rounds.
     """
 
     def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
@@ -333,6 +335,10 @@ class Placed:
     @property
     def orientation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
         """(4,) unit quaternion x, y, z, w"""
+
+    @property
+    def given_orientation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(4,) x, y, z, w as given, of any length"""
 
     @property
     def volume(self) -> float:

@@ -133,7 +133,7 @@ def test_what_rounding_has_turned_inside_out_is_not_a_solid():
         Placed(
             Capsule(2.3283064365386963e-10, 0.25),
             (0, 0.75, -4.4703483581542969e-08),
-            (0.23076923076923078, 0.30769230769230771, -0.92307692307692313, 0),
+            (-3, 9, 1, -12),
         ),
     )
     answer = overlap(*thick_and_thin, tolerance=0.1, method="paper")

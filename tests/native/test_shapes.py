@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from fractions import Fraction
 
 import exact
 import numpy as np
@@ -225,11 +226,29 @@ def test_lists_integers_and_strided_arrays_are_welcome_as_points():
 # Placed
 
 
-def test_placed_normalises_its_quaternion():
-    body = Placed(Box([1, 2, 3]), (1, 2, 3), (0, 0, 7, 7))
+@pytest.mark.parametrize("length", [7, 1e-300, 5e-324, 1e308])
+def test_placed_shows_its_quaternion_as_a_unit_one_and_keeps_it_as_given(length):
+    body = Placed(Box([1, 2, 3]), (1, 2, 3), (0, 0, length, length))
     assert_array_equal(body.position, [1, 2, 3])
+    assert_array_equal(body.given_orientation, [0, 0, length, length])
     assert_allclose(body.orientation, [0, 0, np.sqrt(0.5), np.sqrt(0.5)], rtol=4 * EPS)
-    assert_allclose(body.bounds, [[-1, 1, 0], [3, 3, 6]], atol=32 * EPS)
+    assert_array_equal(body.bounds, [[-1, 1, 0], [3, 3, 6]])  # the quarter turn has no rounding
+
+
+@given(placed(solids))
+def test_the_unit_quaternion_that_is_shown_places_a_body_that_shows_it(body):
+    again = Placed(body.shape, body.position, body.orientation)
+    assert_array_equal(again.orientation, body.orientation)
+    assert_array_equal(again.given_orientation, body.orientation)
+
+
+@given(quaternions(), st.integers(-900, 900))
+def test_a_rotation_is_right_to_half_an_ulp_whatever_the_length_of_its_quaternion(q, exponent):
+    as_given = np.ldexp(q, exponent)
+    for axis, image in zip(AXES, exact.placed(AXES, (0, 0, 0), as_given.tolist())):
+        column = Placed(HalfSpace(axis, 1.0), (0, 0, 0), as_given).centroid  # nearest to the origin: the turned normal
+        for entry, truth in zip(column.tolist(), image):
+            assert abs(Fraction(entry) - truth) <= Fraction(np.spacing(abs(entry))) / 2 + Fraction(2) ** -98
 
 
 def test_placed_stands_at_the_origin_by_default():

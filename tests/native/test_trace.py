@@ -92,7 +92,7 @@ def test_volume_and_centroid_are_exact_to_twelve_digits(a, b, apart):
     position = apart * AWAY
     found = overlap(Hull(a), Placed(Hull(b), position, TURN))
     placed = Placed(Hull(b), position, TURN)
-    truth = exact.common(exact.hull(a), exact.hull(exact.placed(b, placed.position, placed.orientation)))
+    truth = exact.common(exact.hull(a), exact.hull(exact.placed(b, placed.position, placed.given_orientation)))
     assert abs(Fraction(found.volume) - truth.volume) <= Fraction(found.volume_error) <= truth.volume / 10**12
     assert_allclose(found.centroid, np.array(truth.centroid, float), rtol=0, atol=1e-12)
 

@@ -283,6 +283,24 @@ def posed_slivers(rng):
     return Case(f"{low}-{high}", depth, tuple(Posed(p, *pose) for p in stacked(rng, low, high, -depth)))
 
 
+def levers(rng):
+    """Hulls counted from `parameter` metres away, which quaternions of any length bring back; or one and a half-space.
+
+    What a rounded quaternion turns by is off by that lever times its rounding.
+    """
+    lever = power(rng, 0, 6)
+    bodies: list[Posed | Below] = []
+    for points in overlapping_points(rng):
+        centre = lever * directions(rng, 1)[0]
+        length = float(rng.choice([1, 1, rng.uniform(0.1, 10), 2.0**-500, 2.0**500]) * rng.choice([1, 1.3]))
+        turn_ = rng.integers(-9, 10, 4) + [0, 0, 0, 0.5] if rng.random() < 0.5 else quaternion(rng) * length
+        (back,) = exact.placed([-centre], (0, 0, 0), turn_)
+        bodies.append(Posed(points + centre, np.array(back, float), turn_))
+    if rng.random() < 0.3:
+        bodies[1] = Below(tuple(directions(rng, 1)[0]), 0.1)
+    return Case("half-space" if isinstance(bodies[1], Below) else "hulls", lever, tuple(bodies))
+
+
 def slivers(rng):
     """A feature sunk into another: `parameter` is the depth, from a tenth to 1e-12 of the size."""
     low, high = two_features(rng)
@@ -679,7 +697,7 @@ def lens_over_pi(r, s, d):
 FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
     family.__name__: family
     for family in (
-        general, posed, posed_boxes, posed_slivers, slivers, tilted_slivers, touching, parallel_edges,
+        general, posed, posed_boxes, posed_slivers, levers, slivers, tilted_slivers, touching, parallel_edges,
         nearly_touching, identical, shared_planes, shared_facets, nested_flush, needles_and_plates,
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,

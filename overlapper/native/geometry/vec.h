@@ -64,15 +64,21 @@ inline Mat3 operator*(const Mat3& a, const Mat3& b) {
   return {apply_transposed(b, a.row0), apply_transposed(b, a.row1), apply_transposed(b, a.row2)};
 }
 
-/// Unit quaternion, scalar last as in pybullet.
+/// Scalar last as in pybullet. Of any length but 0, it stands for the rotation M(q) / |q|², which is rational.
 struct Quaternion {
   double x = 0, y = 0, z = 0, w = 1;
 };
 
-inline Mat3 rotation_matrix(Quaternion q) {
-  return {{1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y - q.w * q.z), 2 * (q.x * q.z + q.w * q.y)},
-          {2 * (q.x * q.y + q.w * q.z), 1 - 2 * (q.x * q.x + q.z * q.z), 2 * (q.y * q.z - q.w * q.x)},
-          {2 * (q.x * q.z - q.w * q.y), 2 * (q.y * q.z + q.w * q.x), 1 - 2 * (q.x * q.x + q.y * q.y)}};
+/// True if it turns nothing, whatever its length.
+inline bool unturned(Quaternion q) { return q.x == 0 && q.y == 0 && q.z == 0; }
+
+/// The same rotation from a quaternion whose largest component is in [1, 2): a power of two rounds nothing, and the
+/// squares neither overflow nor underflow.
+inline Quaternion in_range(Quaternion q) {
+  const double largest = std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z), std::abs(q.w)});
+  if (largest >= 1 && largest < 2) return q;
+  const int down = -std::ilogb(largest);
+  return {std::scalbn(q.x, down), std::scalbn(q.y, down), std::scalbn(q.z, down), std::scalbn(q.w, down)};
 }
 
 /// Maps a point x of the body to rotation * x + translation.

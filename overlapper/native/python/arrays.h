@@ -33,6 +33,8 @@ Array to_numpy(std::vector<T> values, std::initializer_list<size_t> shape) {
 
 inline Vector to_numpy(Vec3 v) { return to_numpy<Vector>(std::vector<double>{v.x, v.y, v.z}, {3}); }
 
+inline Vector to_numpy(Quaternion q) { return to_numpy<Vector>(std::vector<double>{q.x, q.y, q.z, q.w}, {4}); }
+
 inline Matrix to_numpy(std::span<const Vec3> rows) {
   std::vector<double> values;
   values.reserve(3 * rows.size());

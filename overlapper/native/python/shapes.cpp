@@ -1,3 +1,4 @@
+#include <cfloat>
 #include <sstream>
 
 #include "geometry/polytope.h"
@@ -81,9 +82,20 @@ std::string repr(const RoundedHull& h) {
 std::string repr(const Shape& shape) {
   return std::visit([](const auto& s) { return repr(s); }, shape);
 }
+
+/// Divided by its length; as given if that is 1 but for a rounding, so that what is read back is the same body.
+Quaternion unit(Quaternion given) {
+  const auto length = [](Quaternion q) { return std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w); };
+  if (std::abs(length(given) - 1) <= 2 * DBL_EPSILON) return given;
+  const Quaternion q = in_range(given);
+  const double l = length(q);
+  return {q.x / l, q.y / l, q.z / l, q.w / l};
+}
+
 std::string repr(const Placed& p) {
+  const Quaternion q = unit(p.orientation);
   return "Placed(" + repr(p.shape) + ", position=" + text(p.position) +
-         ", orientation=" + tuple_text({p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w}) + ")";
+         ", orientation=" + tuple_text({q.x, q.y, q.z, q.w}) + ")";
 }
 
 template <class T>
@@ -304,7 +316,9 @@ void define_placed(nb::module_& m) {
   nb::class_<Placed> placed(m, "Placed",
                             R"(A shape and where it is in the world.
 
-position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0.)");
+position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0. The body is turned
+by what the numbers say as given, M(q) / |q|² without rounding; the attribute `orientation` is divided by the length,
+which rounds.)");
   placed.def(
       "__init__",
       [](Placed* self, nb::handle shape, nb::handle position, nb::handle orientation) {
@@ -321,12 +335,11 @@ position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, 
       nb::sig("def shape(self) -> Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace"));
   array_property(placed, "position", [](const Placed& p) { return to_numpy(p.position); }, "(3,) m");
   array_property(
-      placed, "orientation",
-      [](const Placed& p) {
-        return to_numpy<Vector>(std::vector<double>{p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w},
-                                {4});
-      },
+      placed, "orientation", [](const Placed& p) { return to_numpy(unit(p.orientation)); },
       "(4,) unit quaternion x, y, z, w");
+  array_property(
+      placed, "given_orientation", [](const Placed& p) { return to_numpy(p.orientation); },
+      "(4,) x, y, z, w as given, of any length");
   placed.def_prop_ro("volume", [](const Placed& p) { return volume(p.shape); }, "m³; infinite for a half-space");
   array_property(
       placed, "centroid", [](const Placed& p) { return to_numpy(p.pose * centroid(p.shape)); }, "(3,) in the world, m");
@@ -337,8 +350,8 @@ position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, 
   placed.def(
       "__reduce__",
       [](nb::handle self) {
-        return nb::make_tuple(self.type(),
-                              nb::make_tuple(self.attr("shape"), self.attr("position"), self.attr("orientation")));
+        return nb::make_tuple(
+            self.type(), nb::make_tuple(self.attr("shape"), self.attr("position"), self.attr("given_orientation")));
       },
       nb::sig("def __reduce__(self) -> tuple[type, tuple[object, ...]]"));
   placed.def("__copy__", [](nb::handle self) { return nb::borrow(self); });

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "geometry/wide_pose.h"
 #include "shapes/limits.h"
 #include "shapes/planes_asked.h"
 
@@ -232,13 +233,14 @@ void Placed::move_to(Vec3 new_position, Quaternion q) {
   require(max_component(abs(new_position)) < kLargest, "position must be closer to the origin than 1e100 m");
   require(std::isfinite(q.x) && std::isfinite(q.y) && std::isfinite(q.z) && std::isfinite(q.w),
           "orientation must be finite");
-  const double length = std::hypot(std::hypot(q.x, q.y), std::hypot(q.z, q.w));
-  require(length > 0, "orientation must not be the zero quaternion");
-  if (std::abs(length - 1) > DBL_EPSILON) q = {q.x / length, q.y / length, q.z / length, q.w / length};
+  require(!unturned(q) || q.w != 0, "orientation must not be the zero quaternion");
   position = new_position;
   orientation = q;
   pose = {rotation_matrix(q), new_position};
-  if (const HullData* hull = polytope_of(shape)) pose.translation = pose * hull->origin;
+  const HullData* hull = polytope_of(shape);
+  if (!hull || hull->origin == Vec3{}) return;
+  // A hull that is counted from far away may be brought back by its pose: the two nearly cancel.
+  pose.translation = rounded(wide_rotation(q) * wide(hull->origin) + wide(new_position));
 }
 
 Vec3 Placed::support(Vec3 direction) const {

@@ -127,7 +127,7 @@ const HullData* polytope_of(const Shape& shape);
 struct Placed {
   Shape shape;
   Vec3 position;
-  Quaternion orientation;
+  Quaternion orientation;  ///< as it came, of any length: dividing by that rounds, and wider arithmetic need not
   Pose pose;
 
   Vec3 support(Vec3 direction) const;

@@ -127,8 +127,7 @@ double radius(const Shape& shape) {
 double lost_far_away(const Placed& body) {
   const HullData* hull = polytope_of(body.shape);
   if (!hull || norm2(hull->origin) == 0) return 0;
-  const bool turned = body.orientation.w != 1;
-  return turned || norm2(body.position) > 0 ? norm(hull->origin) + norm(body.position) : 0;
+  return !unturned(body.orientation) || norm2(body.position) > 0 ? norm(hull->origin) + norm(body.position) : 0;
 }
 
 double flatness(const Shape& shape) {

@@ -8,18 +8,17 @@ namespace {
 constexpr WideColumns kIdentity{WideLanes{Quad{1, 0, 0, 0}, Quad{}}, WideLanes{Quad{0, 1, 0, 0}, Quad{}},
                                 WideLanes{Quad{0, 0, 1, 0}, Quad{}}};
 
-bool unturned(Quaternion q) { return q.w == 1 && q.x == 0 && q.y == 0 && q.z == 0; }
-
 /// Where the coordinates of a hull's data begin.
 Vec3 data_origin(const Shape& shape) {
   const Hull* hull = std::get_if<Hull>(&shape);
   return hull ? hull->data->origin : Vec3{};
 }
 
-/// Columns of a rotation matrix, that of a quaternion of length 1 but for a few roundings.
+/// Columns of the rotation that a quaternion of any length stands for.
 template <bool fused>
-WideColumns rotation_columns(Quaternion q) {
-  if (unturned(q)) return kIdentity;
+WideColumns rotation_columns(Quaternion given) {
+  if (unturned(given)) return kIdentity;
+  const Quaternion q = in_range(given);
   const Quad xyz{q.x, q.y, q.z}, yzx{q.y, q.z, q.x}, zxy{q.z, q.x, q.y};
   const WideLanes xx = two_product<fused>(xyz, xyz), xy = two_product<fused>(xyz, yzx);
   const WideLanes zw = two_product<fused>(zxy, q.w), zz = two_product<fused>(zxy, zxy);
@@ -28,9 +27,7 @@ WideColumns rotation_columns(Quaternion q) {
   sum.add(zw);
   difference.add(-zw);
   const WideLanes squares = across.lanes();
-  const DoubleDouble beyond = lane(squares, 0) + lane(xx, 1) + (two_product(q.w, q.w) - DoubleDouble{1});
-  // What the squared length is beyond 1, e, is a few ulps: 1 / (1 + e) = 1 - e + e² to double-double.
-  const DoubleDouble twice{2, -2 * beyond.head * (1 - beyond.head)};
+  const DoubleDouble twice = DoubleDouble{2} / (lane(squares, 0) + lane(xx, 1) + two_product(q.w, q.w));
   const auto scaled = [&](const WideLanes& v) { return WideSum<fused>(v, twice).lanes(); };
   const WideLanes plus = scaled(sum.lanes()), minus = scaled(difference.lanes());
   const WideLanes diagonal = WideLanes{Quad{1, 1, 1}, Quad{}} - scaled(squares);
