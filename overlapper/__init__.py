@@ -22,6 +22,7 @@ from overlapper._core import (
     penetration_depth,
 )
 from overlapper.face import lazily as _lazily
+from overlapper.shape import Shape
 
 if TYPE_CHECKING:
     from overlapper.polytopes.database import read_polytopes as read_polytopes
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from overlapper.polytopes.mesh_file import read_hull as read_hull
     from overlapper.polytopes.mesh_file import write_mesh as write_mesh
     from overlapper.polytopes.random import random_polytope
-
-Shape = Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace
 
 __version__ = _version("overlapper")
 __all__ = [

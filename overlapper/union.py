@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, HalfSpace, Overlap, Placed, overlap
+from overlapper._core import Box, HalfSpace, Overlap, Placed, overlap
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "paper"]

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from overlapper import Hull, Placed
+from overlapper._core import Hull, Placed
 from overlapper.process import Ended, Worker
 from overlapper.union import union_volume
 

@@ -10,7 +10,8 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Shape, Sphere
+from overlapper._core import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Sphere
+from overlapper.shape import Shape
 
 PARAMETERS: dict[type, tuple[str, ...]] = {
     Box: ("half_extents",),
