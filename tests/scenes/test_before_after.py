@@ -6,12 +6,14 @@ import math
 import re
 import shutil
 import subprocess
+import sys
 import urllib.request
 from pathlib import Path
 
 import pytest
 from tornado.websocket import websocket_connect
 
+from overlapper import scenes
 from overlapper.scenes import before_after, check
 from overlapper.scenes.comparison import Move
 from overlapper.scenes.expected import read_expected
@@ -74,6 +76,28 @@ def test_a_pair_that_comes_or_goes_has_a_line_without_figures(recorded, today, c
     assert outcome.word == "moved"
     assert f"status is {'not there' if today == '0.35' else 'overlapping'}, recorded as" in "\n".join(outcome.lines)
     assert f"<td>status</td>{cells}<td></td><td></td><td></td></tr>" in outcome.page.read_text(encoding="utf-8")
+
+
+def test_without_meshcat_there_is_no_page_and_the_verdict_says_why(tmp_path, monkeypatch):
+    path = tmp_path / "cubes.py"
+    path.write_text(CUBES)
+    record(load_scene(path))
+    path.write_text(CUBES.replace("0.15]", "0.17]"))
+    monkeypatch.delattr(scenes, "before_after")
+    monkeypatch.setitem(sys.modules, "overlapper.scenes.before_after", None)
+    outcome = check.hold(path, tmp_path / "pages")
+    assert (outcome.word, outcome.page) == ("moved", None)
+    assert outcome.lines[-1].startswith("no page of before and after: import of overlapper.scenes.before_after halted")
+
+
+def test_a_scene_that_ends_before_a_recorded_step_has_no_second_frame(tmp_path):
+    path = tmp_path / "cubes.py"
+    path.write_text(CUBES)
+    record(load_scene(path))
+    path.write_text(CUBES.replace("STEPS = 2", "STEPS = 1"))
+    outcome = check.hold(path, tmp_path / "pages")
+    assert "    step 2, the scene: last step is 1, recorded as 2" in outcome.lines
+    assert "<td>the scene</td><td>last step</td><td>2</td><td>1</td>" in outcome.page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -159,3 +159,19 @@ def test_what_is_no_table_is_refused_by_name(tmp_path, text):
     path.write_text(text)
     with pytest.raises(ValueError, match=r"other\.csv"):
         read_csv(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("a,step\n1,2\n", r"is not a table of overlaps: it has a column 'a'$"),
+        ("# only a heading\n", r"is not a table of overlaps: it has no columns$"),
+        ("step,volume_m3\n1,0.5\ntwo,0.5\n", r"cannot be read at line 3 below its heading: invalid literal"),
+        ("step,volume_m3\n1,0.5,7\n", r"cannot be read at line 2 below its heading"),
+    ],
+)
+def test_a_file_that_is_no_table_is_refused_in_a_sentence(tmp_path, text, sentence):
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=sentence):
+        read_csv(path)

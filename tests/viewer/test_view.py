@@ -197,3 +197,8 @@ def test_a_ball_in_the_ground_is_pictured_with_the_plane_around_it(tmp_path):
     seen = colours(picture.save(tmp_path / "a.png", both, both.contacts))
     assert seen["green"] > 10_000
     assert seen["orange"] + seen["sky blue"] > 500
+
+
+def test_a_playback_without_views_has_nothing_to_see():
+    with pytest.raises(ValueError, match=r"^there is nothing to see: no step was simulated or recorded$"):
+        largest(iter(()))
