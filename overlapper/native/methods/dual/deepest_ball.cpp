@@ -5,107 +5,20 @@
 #include <numeric>
 
 #include "geometry/rounding.h"
+#include "methods/dual/basis.h"
 
 namespace overlapper {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-using Row4 = std::array<double, 4>;
-
-Row4 row_of(const Plane& plane) { return {plane.normal.x, plane.normal.y, plane.normal.z, 1}; }
-
-/// Solves m z = b by elimination with row pivoting, which is backward stable.
-Row4 solve(std::array<Row4, 4> m, Row4 b) {
-  for (int k = 0; k < 4; ++k) {
-    int pivot = k;
-    for (int i = k + 1; i < 4; ++i)
-      if (std::abs(m[i][k]) > std::abs(m[pivot][k])) pivot = i;
-    std::swap(m[k], m[pivot]);
-    std::swap(b[k], b[pivot]);
-    if (m[k][k] == 0) continue;
-    for (int i = k + 1; i < 4; ++i) {
-      const double factor = m[i][k] / m[k][k];
-      for (int j = k; j < 4; ++j) m[i][j] -= factor * m[k][j];
-      b[i] -= factor * b[k];
-    }
-  }
-  Row4 z{};
-  for (int k = 3; k >= 0; --k) {
-    double sum = b[k];
-    for (int j = k + 1; j < 4; ++j) sum -= m[k][j] * z[j];
-    z[k] = m[k][k] != 0 ? sum / m[k][k] : 0;
-  }
-  return z;
+/// The largest of the numbers that the planes were made from.
+double magnitude(std::span<const OwnedPlane> planes, std::span<const double> reach) {
+  double largest = 0;
+  for (const OwnedPlane& p : planes)
+    largest = std::max(largest, p.owner >= 0 ? reach[p.owner] : std::abs(p.plane.offset));
+  return largest;
 }
-
-/// Four planes at which the linear programme's optimum over the planes seen so far lies.
-class Basis {
- public:
-  explicit Basis(const std::array<OwnedPlane, 4>& planes) : planes_(planes) {}
-
-  /// The ball that touches all four planes: centre and radius.
-  std::pair<Vec3, double> ball() const {
-    std::array<Row4, 4> m;
-    Row4 offsets;
-    for (int i = 0; i < 4; ++i) m[i] = row_of(planes_[i].plane), offsets[i] = planes_[i].plane.offset;
-    const Row4 z = solve(m, offsets);
-    return {{z[0], z[1], z[2]}, z[3]};
-  }
-
-  /// Exchanges one plane for `entering` so that the weights stay non-negative. False if rounding leaves no choice.
-  bool exchange(const OwnedPlane& entering) {
-    const Row4 weight = combination_of({0, 0, 0, 1});
-    const Row4 share = combination_of(row_of(entering.plane));
-    int leaving = -1;
-    double least = kInfinity;
-    for (int i = 0; i < 4; ++i) {
-      if (share[i] <= 1e-12) continue;
-      const double ratio = std::max(0.0, weight[i]) / share[i];
-      if (ratio < least) least = ratio, leaving = i;
-    }
-    if (leaving < 0) return false;
-    planes_[leaving] = entering;
-    return true;
-  }
-
-  /// An upper bound of the radius that holds whatever rounding did to the basis: a sum of the four inequalities with
-  /// non-negative weights that add up to one, about `centre`, for balls whose centre is within `reach` of it.
-  double certified_radius(Vec3 centre, double reach) const {
-    Row4 weight = combination_of({0, 0, 0, 1});
-    double total = 0, bound = 0;
-    Vec3 left_over;
-    for (double& w : weight) {
-      w = std::max(0.0, w);
-      total += w;
-    }
-    if (!(total > 0)) return kInfinity;
-    for (int i = 0; i < 4; ++i) {
-      bound -= weight[i] / total * signed_distance(planes_[i].plane, centre);
-      left_over += weight[i] / total * planes_[i].plane.normal;
-    }
-    return bound + norm(left_over) * reach;
-  }
-
-  /// The largest of the numbers that the four planes were made from.
-  double magnitude(std::span<const double> reach) const {
-    double largest = 0;
-    for (const OwnedPlane& p : planes_)
-      largest = std::max(largest, p.owner >= 0 ? reach[p.owner] : std::abs(p.plane.offset));
-    return largest;
-  }
-
- private:
-  /// The shares of the four planes' rows that add up to `row`.
-  Row4 combination_of(const Row4& row) const {
-    std::array<Row4, 4> transposed_rows;
-    for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) transposed_rows[j][i] = row_of(planes_[i].plane)[j];
-    return solve(transposed_rows, row);
-  }
-
-  std::array<OwnedPlane, 4> planes_;
-};
 
 /// The plane of the listed ones and of the smooth bodies that `point` violates most.
 OwnedPlane tightest(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, Vec3 point) {
@@ -165,7 +78,7 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double>
     const auto [centre, radius] = basis.ball();
     // At a nearly singular corner the centre runs away, and both figures with it.
     const OwnedPlane worst = tightest(bodies, planes, centre);
-    const double made_from = std::max(basis.magnitude(reach), worst.owner >= 0 ? reach[worst.owner] : 0);
+    const double made_from = std::max(magnitude(basis.cuts(), reach), worst.owner >= 0 ? reach[worst.owner] : 0);
     const double rounding_here = rounding(std::max(made_from, norm(centre)));
     best.upper = std::min(best.upper, radius + rounding_here);
     const double certain = doubt(std::max(made_from, norm(centre)));
