@@ -20,7 +20,7 @@ class AxisSearch {
     const double worth = rounding(max_component(half_a_) + max_component(half_b_));
     for (Vec3 column : {columns_.row0, columns_.row1, columns_.row2})
       // In these axes the products with the first box's edges are orthogonal to them to the last bit, so that the
-      // noise of two nearly parallel edges turns the axis only across both.
+      // rounding of two nearly parallel edges turns the axis only across both.
       for (Vec3 axis : {Vec3{0, -column.z, column.y}, Vec3{column.z, 0, -column.x}, Vec3{-column.y, column.x, 0}}) {
         const double length = std::sqrt(norm2(axis));
         if (length > 0 && consider(axis / length, worth) < -far) return best_;

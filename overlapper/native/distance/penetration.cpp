@@ -78,7 +78,7 @@ class DepthSearch {
   }
 
   /// The facet nearest to the origin that is not final yet. Equally turned boxes make needles of collinear corners,
-  /// whose plain normals are noise: ranked by those, the nearest facet may come last.
+  /// whose plain normals are all rounding: ranked by those, the nearest facet may come last.
   int least_facet() {
     int best = -1;
     double least = std::numeric_limits<double>::infinity();

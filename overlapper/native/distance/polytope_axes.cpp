@@ -20,7 +20,7 @@ constexpr int kMostTurns = 64;
 constexpr int kGlance = 8;
 
 /// A direction and how far the other solid reaches against it.
-struct Way {
+struct Lowest {
   Vec3 direction;  ///< unit
   int vertex;      ///< lowest along it
   double height;   ///< of that vertex
@@ -28,18 +28,20 @@ struct Way {
 
 /// Per facet of one solid, the way along its normal into the other. Where the first few vertices already show that a
 /// way is longer than the best one known, it ends at the lowest of these.
-void ways_along_normals(const Solid& faces, const Solid& other, double best, std::vector<Way>& ways) {
+void lowest_along_normals(const Solid& faces, const Solid& other, double best, std::vector<Lowest>& ways) {
   ways.resize(faces.stride);
   for (int f = 0; f < faces.facets; f += 4) {
-    const Pair ax = load(&faces.nx[f]), ay = load(&faces.ny[f]), az = load(&faces.nz[f]),
-               top_a = load(&faces.offset[f]);
-    const Pair bx = load(&faces.nx[f + 2]), by = load(&faces.ny[f + 2]), bz = load(&faces.nz[f + 2]);
-    const Pair top_b = load(&faces.offset[f + 2]);
-    Pair height_a = Pair{} + std::numeric_limits<double>::infinity(), height_b = height_a, lowest_a{}, lowest_b{};
+    const TwoLanes ax = load(&faces.nx[f]), ay = load(&faces.ny[f]), az = load(&faces.nz[f]),
+                   top_a = load(&faces.offset[f]);
+    const TwoLanes bx = load(&faces.nx[f + 2]), by = load(&faces.ny[f + 2]), bz = load(&faces.nz[f + 2]);
+    const TwoLanes top_b = load(&faces.offset[f + 2]);
+    TwoLanes height_a = TwoLanes{} + std::numeric_limits<double>::infinity(), height_b = height_a, lowest_a{},
+             lowest_b{};
     for (int v = 0; v < other.vertices;) {
       for (const int end = std::min(v + kGlance, other.vertices); v < end; ++v) {
         const double x = other.x[v], y = other.y[v], z = other.z[v];
-        const Pair a = ax * x + ay * y + az * z, b = bx * x + by * y + bz * z, number = Pair{} + static_cast<double>(v);
+        const TwoLanes a = ax * x + ay * y + az * z, b = bx * x + by * y + bz * z,
+                       number = TwoLanes{} + static_cast<double>(v);
         lowest_a = a < height_a ? number : lowest_a;
         height_a = a < height_a ? a : height_a;
         lowest_b = b < height_b ? number : lowest_b;
@@ -59,21 +61,21 @@ void ways_along_normals(const Solid& faces, const Solid& other, double best, std
 /// The least translation that parts two solids in the same coordinates.
 class PartingSearch {
  public:
-  PartingSearch(const Solid& a, const Solid& b, double noise) : a_(a), b_(b), noise_(noise) {}
+  PartingSearch(const Solid& a, const Solid& b, double rounding) : a_(a), b_(b), rounding_(rounding) {}
 
   /// False if they may be apart, or if doubles cannot tell.
   bool run() {
-    thread_local std::vector<Way> of_a, of_b;
-    ways_along_normals(a_, b_, best_.depth, of_a);
+    thread_local std::vector<Lowest> of_a, of_b;
+    lowest_along_normals(a_, b_, best_.depth, of_a);
     for (int f = 0; f < a_.facets; ++f) keep(of_a[f].direction, a_.offset[f] - of_a[f].height);
-    if (best_.depth <= 4 * noise_) return false;
-    ways_along_normals(b_, a_, best_.depth, of_b);
+    if (best_.depth <= 4 * rounding_) return false;
+    lowest_along_normals(b_, a_, best_.depth, of_b);
     for (int f = 0; f < b_.facets; ++f) keep(-of_b[f].direction, b_.offset[f] - of_b[f].height);
     for (const Edge& e : a_.edges) {
-      if (best_.depth <= 4 * noise_) return false;
+      if (best_.depth <= 4 * rounding_) return false;
       if (!search_arc(e, of_a[e.left], of_a[e.right], kMostTurns)) return false;
     }
-    return best_.depth > 4 * noise_;
+    return best_.depth > 4 * rounding_;
   }
 
   const Penetration& best() const { return best_; }
@@ -84,7 +86,7 @@ class PartingSearch {
   }
 
   /// Looks for shorter ways out between two directions in which a reaches farthest with an edge.
-  bool search_arc(const Edge& edge, const Way& left, const Way& right, int turns) {
+  bool search_arc(const Edge& edge, const Lowest& left, const Lowest& right, int turns) {
     if (left.vertex == right.vertex) return true;
     const Vec3 from = a_.vertex(edge.from), low_left = b_.vertex(left.vertex), low_right = b_.vertex(right.vertex);
     const Vec3 step = low_right - low_left;
@@ -95,15 +97,15 @@ class PartingSearch {
     // Both vertices of b are equally low here, so that the difference reaches at least so far; between here and either
     // end, where the vertex there bounds it, it reaches at least as far as at the nearer of the two.
     const Vec3 crossing = left.direction + rise / (rise + fall) * (right.direction - left.direction);
-    if (dot(crossing, from - low_left) - noise_ >= best_.depth * std::sqrt(norm2(crossing))) return true;
+    if (dot(crossing, from - low_left) - rounding_ >= best_.depth * std::sqrt(norm2(crossing))) return true;
     if (turns == 0) return false;
-    const Way across = lowest(orthogonal(edge, left.vertex, right.vertex));
-    if (dot(across.direction, from) - across.height < best_.depth - noise_) {
+    const Lowest across = lowest(orthogonal(edge, left.vertex, right.vertex));
+    if (dot(across.direction, from) - across.height < best_.depth - rounding_) {
       const double depth = highest(across.direction) - across.height;
       // Where a face and two edges agree to rounding, the face is the better witness.
-      if (depth < best_.depth - noise_) keep(across.direction, depth);
+      if (depth < best_.depth - rounding_) keep(across.direction, depth);
     }
-    if (dot(across.direction, low_left) - across.height <= noise_) return true;
+    if (dot(across.direction, low_left) - across.height <= rounding_) return true;
     return search_arc(edge, left, across, turns - 1) && search_arc(edge, across, right, turns - 1);
   }
 
@@ -117,8 +119,8 @@ class PartingSearch {
                               wide_difference(b_.vertex(right), b_.vertex(left)))));
   }
 
-  Way lowest(Vec3 direction) const {
-    Way way{direction, 0, std::numeric_limits<double>::infinity()};
+  Lowest lowest(Vec3 direction) const {
+    Lowest way{direction, 0, std::numeric_limits<double>::infinity()};
     for (int v = 0; v < b_.vertices; ++v) {
       const double height = dot(direction, b_.vertex(v));
       if (height < way.height) way.height = height, way.vertex = v;
@@ -133,7 +135,7 @@ class PartingSearch {
   }
 
   const Solid &a_, &b_;
-  double noise_;  ///< m: rounding of heights
+  double rounding_;  ///< m: of heights, and what they are off where facets are not flat
   Penetration best_{std::numeric_limits<double>::infinity(), {}};
 };
 
@@ -154,13 +156,13 @@ std::optional<Penetration> polytope_penetration(const Placed& a, const Placed& b
   }
   const Pose pose = relative_pose(a.pose, b.pose);
   const double reach = radius(a.shape) + radius(b.shape) + norm(pose.translation);
-  const double noise = rounding(reach), flat = flatness(a.shape) + flatness(b.shape);
-  if (flat > 4 * noise) return std::nullopt;
+  const double of_heights = rounding(reach), flat = flatness(a.shape) + flatness(b.shape);
+  if (flat > 4 * of_heights) return std::nullopt;
   thread_local Solid solid_a, solid_b;
   constexpr double beyond = std::numeric_limits<double>::infinity();
   set_solid(solid_a, a, 0, nullptr, beyond);
   set_solid(solid_b, b, 1, &pose, beyond);
-  PartingSearch search(solid_a, solid_b, noise + flat);
+  PartingSearch search(solid_a, solid_b, of_heights + flat);
   if (!search.run()) return std::nullopt;
   return Penetration{search.best().depth, a.pose.rotation * search.best().normal};
 }

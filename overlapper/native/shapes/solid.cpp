@@ -23,8 +23,8 @@ constexpr std::array<Edge, 12> kBoxEdges = box_edges();
 /// One coordinate of a box's corners and normals, from that row of its rotation. Both go by the numbers of corner() and
 /// side(), and have the bits that placing each alone would give it.
 void place_box_coordinate(Vec3 row, Vec3 half, double origin, double* corners, double* normals) {
-  constexpr Pair sign{-1, 1};
-  const Pair x = sign * (row.x * half.x);
+  constexpr TwoLanes sign{-1, 1};
+  const TwoLanes x = sign * (row.x * half.x);
   const double y = row.y * half.y, z = row.z * half.z;
   store(corners, x - y - z + origin);
   store(corners + 2, x + y - z + origin);

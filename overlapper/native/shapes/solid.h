@@ -9,10 +9,10 @@
 namespace overlapper {
 
 /// Two doubles of a column, which every machine adds, multiplies and compares at once.
-using Pair = double __attribute__((vector_size(16)));
+using TwoLanes = double __attribute__((vector_size(16)));
 
-inline Pair load(const double* p) {
-  Pair v;
+inline TwoLanes load(const double* p) {
+  TwoLanes v;
   std::memcpy(&v, p, sizeof v);
   return v;
 }

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "geometry/rounding.h"
-#include "methods/clipping/meeting.h"
+#include "methods/clipping/sign_table.h"
 #include "methods/tracing/trace.h"
 #include "shapes/canonical_order.h"
 
@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-struct Workspace : Meeting {
+struct Workspace : TableClipping {
   std::vector<int> apex;          ///< per facet: one of its vertices, or -1
   std::vector<double> cone;       ///< per facet: six times the volume of the cone from the origin
   std::vector<double> extent;     ///< per vertex: the sum of its coordinates over their size
@@ -37,18 +37,18 @@ Vec3 centre(std::span<Vec3> vertices) {
 
 /// Two vectors, the coordinates of both side by side.
 struct VecPair {
-  Pair x, y, z;
+  TwoLanes x, y, z;
 };
-inline VecPair beside(Vec3 a, Vec3 b) { return {Pair{a.x, b.x}, Pair{a.y, b.y}, Pair{a.z, b.z}}; }
+inline VecPair beside(Vec3 a, Vec3 b) { return {TwoLanes{a.x, b.x}, TwoLanes{a.y, b.y}, TwoLanes{a.z, b.z}}; }
 inline VecPair operator+(const VecPair& a, const VecPair& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline VecPair operator-(const VecPair& a, const VecPair& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline VecPair operator/(const VecPair& a, double s) { return {a.x / s, a.y / s, a.z / s}; }
-inline VecPair operator*(Pair s, const VecPair& a) { return {s * a.x, s * a.y, s * a.z}; }
-inline Pair dot(const VecPair& a, const VecPair& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline VecPair operator*(TwoLanes s, const VecPair& a) { return {s * a.x, s * a.y, s * a.z}; }
+inline TwoLanes dot(const VecPair& a, const VecPair& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline VecPair cross(const VecPair& a, const VecPair& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-inline Pair norm2(const VecPair& a) { return dot(a, a); }
+inline TwoLanes norm2(const VecPair& a) { return dot(a, a); }
 inline Vec3 lane(const VecPair& a, int k) { return {a.x[k], a.y[k], a.z[k]}; }
 
 /// Calls `use(e, f, two)` for edges two by two; of an odd number the last one is alone, and `f` is the same.
@@ -115,9 +115,10 @@ class Sums {
       const VecPair from = beside(vertices[e.from], vertices[f.from]), to = beside(vertices[e.to], vertices[f.to]);
       const VecPair left = beside(vertices[left_e], vertices[left_f]), sum = from + to, area = cross(from, to);
       const VecPair right = beside(vertices[right_e], vertices[right_f]);
-      const Pair on_left = dot(left, area), on_right = -dot(right, area), on_both = on_left + on_right;
-      const Pair products = (Pair{extent[left_e], extent[left_f]} + Pair{extent[right_e], extent[right_f]}) *
-                            Pair{extent[e.from], extent[f.from]} * Pair{extent[e.to], extent[f.to]};
+      const TwoLanes on_left = dot(left, area), on_right = -dot(right, area), on_both = on_left + on_right;
+      const TwoLanes products =
+          (TwoLanes{extent[left_e], extent[left_f]} + TwoLanes{extent[right_e], extent[right_f]}) *
+          TwoLanes{extent[e.from], extent[f.from]} * TwoLanes{extent[e.to], extent[f.to]};
       const VecPair moments = on_left * (left + sum) + on_right * (right + sum);
       const auto add_lane = [&](const Edge& edge, int k) {
         cone[edge.left] += on_left[k];
@@ -279,7 +280,7 @@ std::optional<ClippedPair> clip_by_table(const Placed& a, const Placed& b) {
   Workspace& w = workspace();
   set_solid(w.first, a, 0, nullptr, 4 * reach);
   set_solid(w.second, b, 1, &pose, 4 * reach);
-  const Signs signs = w.trace(sign_rounding);
+  const Signs signs = w.run(sign_rounding);
   if (signs == Signs::kSeparated) return ClippedPair{};
   if (signs == Signs::kUncertain) return std::nullopt;
   const Vec3 middle = centre(w.vertices);
@@ -348,7 +349,7 @@ Signs clip_in_turn(Workspace& w, std::span<const Placed> bodies, std::span<const
     if (!set_part(w.second, bodies[i], i, pose, ball_around(w.first, sign_rounding), 4 * reach))
       return Signs::kSeparated;
     if (w.second.facets == 0) continue;
-    if (const Signs signs = w.trace(sign_rounding); signs != Signs::kCertain) return signs;
+    if (const Signs signs = w.run(sign_rounding); signs != Signs::kCertain) return signs;
     w.take_common(4 * reach);
   }
   return Signs::kCertain;

@@ -1,4 +1,4 @@
-#include "methods/clipping/meeting.h"
+#include "methods/clipping/sign_table.h"
 
 #include <bit>
 #include <cstring>
@@ -186,13 +186,13 @@ bool SignTable::beyond_a_plane(double margin) const {
   return found;
 }
 
-/// Finds the common polytope of a meeting whose solids are in place.
+/// Finds the common polytope of a clipping whose solids are in place.
 template <class Lanes>
-class Tracer {
+class EdgeCutter {
  public:
-  Tracer(Meeting& meeting, double rounding) : w_(meeting), rounding_(rounding) {}
+  EdgeCutter(TableClipping& clipping, double rounding) : w_(clipping), rounding_(rounding) {}
 
-  Signs trace() {
+  Signs run() {
     const Signs one = w_.first_signs.template fill<Lanes>(w_.first, w_.second, rounding_);
     if (one == Signs::kSeparated) return one;
     const Signs other = w_.second_signs.template fill<Lanes>(w_.second, w_.first, rounding_);
@@ -208,8 +208,8 @@ class Tracer {
     w_.seam.begin_with_room(2 * most_edges);
     w_.unpaired = 0;
     w_.open.resize(static_cast<size_t>(w_.first.facets) * w_.second.facets, 0);
-    const bool certain = trace(w_.first, w_.first_signs, w_.first_vertex, true) &&
-                         trace(w_.second, w_.second_signs, w_.second_vertex, false) && w_.unpaired == 0;
+    const bool certain = cut_edges(w_.first, w_.first_signs, w_.first_vertex, true) &&
+                         cut_edges(w_.second, w_.second_signs, w_.second_vertex, false) && w_.unpaired == 0;
     if (!certain) {
       std::fill(w_.open.begin(), w_.open.end(), 0);
       return Signs::kUncertain;
@@ -218,14 +218,14 @@ class Tracer {
   }
 
  private:
-  int add_vertex(Vec3 v, double doubt, const Corner& corner) {
+  int add_vertex(Vec3 v, double doubt, const CornerSource& corner) {
     w_.vertices.push_back(v);
     w_.doubt.push_back(doubt);
     w_.corners.push_back(corner);
     return static_cast<int>(w_.vertices.size()) - 1;
   }
 
-  bool trace(const Solid& body, const SignTable& signs, std::vector<int>& common_vertex, bool is_first) {
+  bool cut_edges(const Solid& body, const SignTable& signs, std::vector<int>& common_vertex, bool is_first) {
     common_vertex.assign(body.vertices, -1);
     for (int i = 0; i < body.vertices; ++i)
       if (signs.outside[i] == 0)
@@ -290,40 +290,40 @@ class Tracer {
     }
   }
 
-  Meeting& w_;
+  TableClipping& w_;
   double rounding_;
 };
 
 namespace {
 
-using Way = Signs(Meeting&, double rounding);
+using Run = Signs(TableClipping&, double rounding);
 
 template <class Lanes>
-Signs trace_by(Meeting& meeting, double rounding) {
-  return Tracer<Lanes>(meeting, rounding).trace();
+Signs run_by(TableClipping& clipping, double rounding) {
+  return EdgeCutter<Lanes>(clipping, rounding).run();
 }
 
 #if defined(__AVX2__)
-Way* fastest_way() { return trace_by<Quad>; }
+Run* fastest_run() { return run_by<Quad>; }
 #elif defined(__x86_64__)
 /// With all that it calls, for machines that have more than the rest is compiled for.
-__attribute__((target("avx2"), flatten)) Signs trace_by_avx2(Meeting& meeting, double rounding) {
-  return trace_by<Quad>(meeting, rounding);
+__attribute__((target("avx2"), flatten)) Signs run_by_avx2(TableClipping& clipping, double rounding) {
+  return run_by<Quad>(clipping, rounding);
 }
-Way* fastest_way() { return __builtin_cpu_supports("avx2") ? trace_by_avx2 : trace_by<Pair>; }
+Run* fastest_run() { return __builtin_cpu_supports("avx2") ? run_by_avx2 : run_by<TwoLanes>; }
 #else
-Way* fastest_way() { return trace_by<Pair>; }
+Run* fastest_run() { return run_by<TwoLanes>; }
 #endif
 
 }  // namespace
 
-Signs Meeting::trace(double rounding) {
-  static Way* const way = fastest_way();
+Signs TableClipping::run(double rounding) {
+  static Run* const run_fastest = fastest_run();
   planes_asked += first.facets + second.facets;
-  return way(*this, rounding);
+  return run_fastest(*this, rounding);
 }
 
-void Meeting::take_common(double beyond) {
+void TableClipping::take_common(double beyond) {
   facet_number.assign(first.facets + second.facets, -1);
   next.own_edges.clear();
   int kept = 0;
@@ -348,7 +348,7 @@ void Meeting::take_common(double beyond) {
   first.edges = first.own_edges;
 }
 
-void Meeting::show_first() {
+void TableClipping::show_first() {
   vertices.begin_with_room(first.vertices);
   for (int i = 0; i < first.vertices; ++i) vertices.push_back(first.vertex(i));
   edges.begin_with_room(first.edges.size());

@@ -58,16 +58,16 @@ class RoomyList {
 };
 
 /// Two solids and what they have in common, whose facets are numbered as the first one's and then the second one's.
-struct Meeting {
+struct TableClipping {
   Solid first, second;
-  RoomyList<Vec3> vertices;   ///< of the common polytope
-  RoomyList<Corner> corners;  ///< parallel to them
-  RoomyList<double> doubt;    ///< parallel to them: see Solid
-  RoomyList<Edge> edges;      ///< of the common polytope
-  RoomyList<Edge> seam;       ///< its edges between the first body's facets, on the left, and the second's
+  RoomyList<Vec3> vertices;         ///< of the common polytope
+  RoomyList<CornerSource> corners;  ///< parallel to them
+  RoomyList<double> doubt;          ///< parallel to them: see Solid
+  RoomyList<Edge> edges;            ///< of the common polytope
+  RoomyList<Edge> seam;             ///< its edges between the first body's facets, on the left, and the second's
 
   /// Finds the common polytope; what is not certain or separated has none.
-  Signs trace(double rounding);
+  Signs run(double rounding);
 
   int owner(int facet) const { return facet < first.facets ? first.owner[facet] : second.owner[facet - first.facets]; }
 
@@ -78,7 +78,7 @@ struct Meeting {
 
  private:
   template <class Lanes>
-  friend class Tracer;
+  friend class EdgeCutter;
 
   SignTable first_signs, second_signs;
   std::vector<int> first_vertex, second_vertex;  ///< which common vertex a body's vertex is, or -1

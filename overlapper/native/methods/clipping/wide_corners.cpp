@@ -55,7 +55,7 @@ template <bool fused>
 class WideCorners {
  public:
   WideCorners(const CommonCorners& common, std::span<WideLanes> planes)
-      : common_(common), planes_(planes), lost_(0x1p-96 * common.reach), noise_(lost_) {
+      : common_(common), planes_(planes), wide_rounding_(0x1p-96 * common.reach), corner_rounding_(wide_rounding_) {
     const Placed &a = common.a, &b = common.b;
     columns_ = rotation_columns<fused>(b.orientation);
     translation_ = in_lanes(wide_difference(b.position, a.position));
@@ -93,7 +93,7 @@ class WideCorners {
     }
   }
 
-  double noise() const { return noise_; }
+  double corner_rounding() const { return corner_rounding_; }
 
  private:
   static WideLanes turned(const WideColumns& columns, const WideLanes& v) {
@@ -144,7 +144,7 @@ class WideCorners {
   void place_four(const Mat3& axes, std::span<Vec3> vertices, const std::array<size_t, 4>& at) {
     const QuadVector vertex(vertices[at[0]], vertices[at[1]], vertices[at[2]], vertices[at[3]]);
     QuadVector way{Vec3{}, Vec3{}, Vec3{}, Vec3{}};
-    const std::span<const Corner> corners = common_.corners;
+    const std::span<const CornerSource> corners = common_.corners;
     if (std::ranges::any_of(at, [&](size_t i) { return corners[i].vertex < 0; })) beside_planes(at, vertex, way);
     for (int n = 0; n < 4; ++n) {
       if (corners[at[n]].vertex < 0) continue;
@@ -186,13 +186,13 @@ class WideCorners {
     const Quad size = volume < 0 ? -volume : volume;
     const Quad high_a = a < 0 ? -a : a, high_b = b < 0 ? -b : b, high_c = c < 0 ? -c : c;
     const Quad high = high_a < high_b ? high_b : high_a, highest = high < high_c ? high_c : high;
-    const Quad noise = 4 * (lost_ + 0x1p-50 * highest / size) / size;
+    const Quad rounding = 4 * (wide_rounding_ + 0x1p-50 * highest / size) / size;
     for (int n = 0; n < 4; ++n)
-      if (common_.corners[at[n]].vertex < 0) noise_ = std::max(noise_, noise[n]);
+      if (common_.corners[at[n]].vertex < 0) corner_rounding_ = std::max(corner_rounding_, rounding[n]);
   }
 
   /// From a vertex that doubles have placed to the body's own.
-  Vec3 beside_vertex(const Corner& corner, Vec3 vertex) const {
+  Vec3 beside_vertex(const CornerSource& corner, Vec3 vertex) const {
     const Shape& shape = corner.body == 0 ? common_.a.shape : common_.b.shape;
     const Box* box = std::get_if<Box>(&shape);
     const Vec3 local =
@@ -210,14 +210,14 @@ class WideCorners {
 
   const CommonCorners& common_;
   std::span<WideLanes> planes_;
-  WideColumns columns_;    ///< of the rotation from the second body's coordinates to the first's
-  WideLanes translation_;  ///< and what follows it
-  double lost_;            ///< m: what a few dozen operations in double-double lose
-  double noise_;
+  WideColumns columns_;     ///< of the rotation from the second body's coordinates to the first's
+  WideLanes translation_;   ///< and what follows it
+  double wide_rounding_;    ///< m: of a few dozen operations in double-double
+  double corner_rounding_;  ///< m: of the corners placed so far
 };
 
-using Way = std::optional<double>(const CommonCorners&, const Mat3& axes, std::span<Vec3> vertices,
-                                  std::span<WideLanes> planes);
+using Placing = std::optional<double>(const CommonCorners&, const Mat3& axes, std::span<Vec3> vertices,
+                                      std::span<WideLanes> planes);
 
 template <bool fused>
 std::optional<double> place_by(const CommonCorners& common, const Mat3& axes, std::span<Vec3> vertices,
@@ -225,11 +225,11 @@ std::optional<double> place_by(const CommonCorners& common, const Mat3& axes, st
   WideCorners<fused> wide(common, planes);
   if (!wide.add_planes()) return std::nullopt;
   wide.place(axes, vertices);
-  return wide.noise();
+  return wide.corner_rounding();
 }
 
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
-Way* fastest_way() { return place_by<true>; }
+Placing* fastest_placing() { return place_by<true>; }
 #elif defined(__x86_64__)
 /// With all that it calls, for machines that have more than the rest is compiled for.
 __attribute__((target("avx2,fma"), flatten)) std::optional<double> place_by_avx2(const CommonCorners& common,
@@ -238,11 +238,11 @@ __attribute__((target("avx2,fma"), flatten)) std::optional<double> place_by_avx2
                                                                                  std::span<WideLanes> planes) {
   return place_by<true>(common, axes, vertices, planes);
 }
-Way* fastest_way() {
+Placing* fastest_placing() {
   return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? place_by_avx2 : place_by<false>;
 }
 #else
-Way* fastest_way() { return place_by<false>; }
+Placing* fastest_placing() { return place_by<false>; }
 #endif
 
 /// But for what underflows, which is nothing beside any body's size.
@@ -257,9 +257,9 @@ std::optional<double> place_in_wide(const CommonCorners& common, const Mat3& axe
   std::vector<Vec3> expected(vertices.begin(), vertices.end());
   place_by<false>(common, axes, expected, planes);
 #endif
-  const std::optional<double> noise = fastest_way()(common, axes, vertices, planes);
+  const std::optional<double> rounding = fastest_placing()(common, axes, vertices, planes);
   assert(std::ranges::equal(vertices, expected, same));
-  return noise;
+  return rounding;
 }
 
 }  // namespace overlapper

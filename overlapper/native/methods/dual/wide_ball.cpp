@@ -46,7 +46,7 @@ Owned<WidePlane> tightest(std::span<const WideBody> bodies, const WideVector& po
 }  // namespace
 
 WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const OwnedPlane> hints, double margin,
-                           double reach, double noise) {
+                           double reach, double rounding) {
   const std::array<Owned<WidePlane>, 4> simplex = surrounding_simplex(bodies, reach);
   Basis basis(simplex);
   WideBall best{{}, -kInfinity, kInfinity, {}};
@@ -63,13 +63,13 @@ WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const Own
   constexpr int kMaxRounds = 512;
   for (int round = 0; round < kMaxRounds; ++round) {
     const WideVector centre = basis.ball().first;
-    best.upper = std::min(best.upper, basis.certified_radius(centre, reach + norm(centre).head) + noise);
+    best.upper = std::min(best.upper, basis.certified_radius(centre, reach + norm(centre).head) + rounding);
     const Owned<WidePlane> worst = tightest(bodies, centre);
-    const double slack = -signed_distance(worst.plane, centre).head - noise;
+    const double slack = -signed_distance(worst.plane, centre).head - rounding;
     if (slack > best.lower) best.lower = slack, best.centre = centre;
     const bool deep = best.lower > margin && best.lower >= best.upper / 4;
     const bool shallow = best.upper <= margin && best.lower >= -margin;
-    if (deep || shallow || best.upper < -margin || best.upper - best.lower <= 4 * noise) break;
+    if (deep || shallow || best.upper < -margin || best.upper - best.lower <= 4 * rounding) break;
     if (!enter(worst)) break;
   }
   return best;

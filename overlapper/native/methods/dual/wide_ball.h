@@ -7,7 +7,7 @@
 
 namespace overlapper {
 
-/// The largest ball in the common set, as in common_point.h but in double-double, as far as the question needs it: is
+/// The largest ball in the common set, as in deepest_ball.h but in double-double, as far as the question needs it: is
 /// its radius above `margin`, or below -margin?
 struct WideBall {
   WideVector centre;
@@ -17,8 +17,8 @@ struct WideBall {
 };
 
 /// `hints` are planes to begin with, of which only the normals count. `reach` is how large the coordinates are, and
-/// `noise` how far rounding in double-double may move a plane.
+/// `rounding` how far operations in double-double may move a plane.
 WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const OwnedPlane> hints, double margin,
-                           double reach, double noise);
+                           double reach, double rounding);
 
 }  // namespace overlapper

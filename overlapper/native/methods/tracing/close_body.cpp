@@ -102,7 +102,7 @@ void CloseBody::place_side(int facet) {
   const Vec3 normal = data().planes[facet].normal;
   Side side{turned_ ? turn_ * normal : normal, {}, std::numeric_limits<double>::infinity(), 0};
   for (int v : data().facet(facet)) {
-    const Corner& c = corner(v);
+    const PlacedCorner& c = corner(v);
     if (c.size < side.size) side.through = c.at, side.size = c.size;
     side.farthest = std::max(side.farthest, c.size);
   }

@@ -79,11 +79,11 @@ class CloseBody {
   }
 
   /// Kept for whoever asks again.
-  struct Corner {
+  struct PlacedCorner {
     Vec3 at;
     double size;  ///< its distance from the common point
   };
-  const Corner& corner(int vertex) {
+  const PlacedCorner& corner(int vertex) {
     if (corner_placed_[vertex] != now_) place_corner(vertex);
     return corners_[vertex];
   }
@@ -119,7 +119,7 @@ class CloseBody {
   int last_ = -1;              ///< the facet towards the last point asked for
   int now_ = 0;
   std::vector<int> corner_placed_, side_placed_;
-  std::vector<Corner> corners_;
+  std::vector<PlacedCorner> corners_;
   std::vector<Side> sides_;
 };
 

@@ -24,7 +24,7 @@ void Seam::begin(CloseBody& first, CloseBody& second) {
 
 /// How far a vertex lies outside of the plane of the other body's facet.
 double Seam::height(CloseBody& of, int vertex, CloseBody& over, int facet) {
-  const CloseBody::Corner& v = of.corner(vertex);
+  const CloseBody::PlacedCorner& v = of.corner(vertex);
   const CloseBody::Side& side = over.side(facet);
   const double s = dot(side.normal, v.at - side.through);
   certain_ &= std::abs(s) > CloseBody::kSign * (v.size + side.size) + over.mesh().flat();
@@ -62,8 +62,8 @@ int Seam::turning_edge(int body, int from, CrossingFacets at) {
 /// facet's half-edge.
 double Seam::order(int body, int entering, int other_edge) {
   CloseBody &self = *bodies_[body], &other = *bodies_[1 - body];
-  const CloseBody::Corner &p = self.corner(self.begin(entering)), &q = self.corner(self.end(entering)),
-                          &r = other.corner(other.begin(other_edge)), &s = other.corner(other.end(other_edge));
+  const CloseBody::PlacedCorner &p = self.corner(self.begin(entering)), &q = self.corner(self.end(entering)),
+                                &r = other.corner(other.begin(other_edge)), &s = other.corner(other.end(other_edge));
   const Vec3 along = q.at - p.at, side = s.at - r.at, between = r.at - p.at;
   const double a = std::sqrt(norm2(along)), b = std::sqrt(norm2(side)), c = std::sqrt(norm2(between));
   const double det = dot(cross(along, side), between);
@@ -97,7 +97,7 @@ Vec3 Seam::meet(int body, int entering, int plane) {
   CloseBody &self = *bodies_[body], &other = *bodies_[1 - body];
   const int from = self.begin(entering), to = self.end(entering);
   const double above = height(self, from, other, plane), below = -height(self, to, other, plane);
-  const CloseBody::Corner &p = self.corner(from), &q = self.corner(to);
+  const CloseBody::PlacedCorner &p = self.corner(from), &q = self.corner(to);
   const Vec3 along = q.at - p.at, through = other.side(plane).through;
   const double share = above / (above + below), rest = below / (above + below);
   const Vec3 at = share < rest ? p.at + share * along : q.at - rest * along;
