@@ -10,7 +10,7 @@
 namespace overlapper {
 namespace {
 
-/// Of both together: beyond it, EPA is done sooner, which climbs from vertex to vertex.
+/// The most facets of both together: beyond, EPA is done sooner, which climbs from vertex to vertex.
 constexpr int kMostFacets = 1024;
 
 /// Vertices that one arc passes on the other body; doubles that stay in doubt would go on.
@@ -114,7 +114,7 @@ class PartingSearch {
     const Vec3 along = a_.vertex(edge.to) - a_.vertex(edge.from), step = b_.vertex(right) - b_.vertex(left);
     const Vec3 product = cross(along, step);
     if (16 * norm2(product) > norm2(along) * norm2(step)) return unit(product);
-    // Of nearly parallel edges, the product of doubles would tilt along them.
+    // The product of two nearly parallel edges would tilt along them in doubles.
     return unit(rounded(cross(wide_difference(a_.vertex(edge.to), a_.vertex(edge.from)),
                               wide_difference(b_.vertex(right), b_.vertex(left)))));
   }

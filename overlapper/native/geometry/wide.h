@@ -49,7 +49,7 @@ inline bool operator<(DoubleDouble a, DoubleDouble b) {
 inline bool operator>(DoubleDouble a, DoubleDouble b) { return b < a; }
 inline DoubleDouble abs(DoubleDouble a) { return a.head < 0 ? -a : a; }
 
-/// Of a number that is not negative.
+/// The square root of a number that is not negative.
 inline DoubleDouble sqrt(DoubleDouble a) {
   if (!(a.head > 0)) return {};
   const double first = std::sqrt(a.head);
@@ -89,7 +89,7 @@ inline WideVector operator*(double s, const WideVector& v) { return DoubleDouble
 inline WideVector operator/(const WideVector& v, DoubleDouble s) { return {v.x / s, v.y / s, v.z / s}; }
 inline double rounded(DoubleDouble a) { return a.head; }
 inline Vec3 rounded(const WideVector& v) { return {v.x.head, v.y.head, v.z.head}; }
-/// What is left when `rounded` is taken away, rounded.
+/// The vector less its `rounded`, rounded.
 inline Vec3 tail(const WideVector& v) { return {v.x.tail, v.y.tail, v.z.tail}; }
 
 // Plain doubles are their own, so that code can be written for both.
@@ -103,7 +103,7 @@ inline WideVector apply_transposed(const Mat3& m, const WideVector& v) {
   return v.x * wide(m.row0) + v.y * wide(m.row1) + v.z * wide(m.row2);
 }
 
-/// Its length; scaled by a power of two first, which keeps the squares in range.
+/// The length of a vector; scaled by a power of two first, which keeps the squares in range.
 inline DoubleDouble norm(const WideVector& v) {
   const double largest = max_component(abs(rounded(v)));
   if (!(largest > 0)) return {};

@@ -55,7 +55,8 @@ inline WideLanes fused_product(const Quad& a, const Quad& b) {
 }
 #endif
 
-/// By fused multiply-adds, or Dekker's way for machines that have none; the same bits, unless something underflows.
+/// The exact product, by fused multiply-adds or Dekker's way for machines that have none; the same bits, unless
+/// something underflows.
 template <bool fused, class T>
 WideLanes two_product(const Quad& a, const T& b) {
   if constexpr (fused) {
@@ -96,7 +97,7 @@ inline WideLanes in_lanes(const WideVector& v, DoubleDouble last = {}) {
 /// Four vectors side by side, a coordinate of each in a lane, or the columns of a matrix.
 using WideColumns = std::array<WideLanes, 4>;
 
-/// Of a 4 × 4 matrix, in two steps that are an instruction or two each.
+/// The transpose of a 4 × 4 matrix, in two steps that are an instruction or two each.
 inline void transpose(Quad& a, Quad& b, Quad& c, Quad& d) {
   const Quad ab02{a[0], b[0], a[2], b[2]}, ab13{a[1], b[1], a[3], b[3]};
   const Quad cd02{c[0], d[0], c[2], d[2]}, cd13{c[1], d[1], c[3], d[3]};

@@ -17,7 +17,7 @@ constexpr std::array<Edge, 12> box_edges() {
   }
   return edges;
 }
-/// By the numbers of corner() and side().
+/// The edges of a box, by the numbers of corner() and side().
 constexpr std::array<Edge, 12> kBoxEdges = box_edges();
 
 /// One coordinate of a box's corners and normals, from that row of its rotation. Both go by the numbers of corner() and
@@ -53,7 +53,8 @@ void set_box(Solid& solid, const Box& box) {
   for (int f = 0; f < 6; ++f) solid.set_plane(f, side(box, f).normal, side(box, f).offset);
 }
 
-/// Beyond it, asking every vertex of one body against every plane of the other takes longer than the dual hull.
+/// The most facets: beyond, asking every vertex of one body against every plane of the other takes longer than the dual
+/// hull.
 constexpr size_t kMostFacets = 1024;
 
 }  // namespace

@@ -60,7 +60,7 @@ struct Ball {
 /// A bounded polytope in the coordinates of `pose`, or a half-space. Planes that fill up the stride are `beyond` away.
 void set_solid(Solid& solid, const Placed& body, int owner, const Pose* pose, double beyond);
 
-/// Only those planes and edges of a body that a ball reaches; false if the ball is outside of one of the planes.
+/// Keeps those planes and edges of a body that a ball reaches; false if the ball is outside of one of the planes.
 bool set_part(Solid& solid, const Placed& body, int owner, const Pose& pose, const Ball& ball, double beyond);
 
 /// How far from its own origin a shape reaches; of a half-space, how far its plane is.

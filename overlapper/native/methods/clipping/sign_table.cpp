@@ -306,7 +306,7 @@ Signs run_by(TableClipping& clipping, double rounding) {
 #if defined(__AVX2__)
 Run* fastest_run() { return run_by<Quad>; }
 #elif defined(__x86_64__)
-/// With all that it calls, for machines that have more than the rest is compiled for.
+/// Compiled with all that it calls for machines that have more than the rest is compiled for.
 __attribute__((target("avx2"), flatten)) Signs run_by_avx2(TableClipping& clipping, double rounding) {
   return run_by<Quad>(clipping, rounding);
 }

@@ -100,7 +100,7 @@ class WideCorners {
     return WideSum<fused>(columns, vector(v)).lanes();
   }
 
-  /// Of a point above planes through the origin, a coordinate of whose normals is in each of the columns.
+  /// Heights of a point above planes through the origin, a coordinate of whose normals is in each of the columns.
   static WideLanes heights(const WideColumns& normals, const WideLanes& point) {
     const auto [x, y, z] = vector(point);
     return product<fused>(normals[0], x) + product<fused>(normals[1], y) + product<fused>(normals[2], z);
@@ -191,7 +191,7 @@ class WideCorners {
       if (common_.corners[at[n]].vertex < 0) corner_rounding_ = std::max(corner_rounding_, rounding[n]);
   }
 
-  /// From a vertex that doubles have placed to the body's own.
+  /// The step from a vertex that doubles have placed to the body's own.
   Vec3 beside_vertex(const CornerSource& corner, Vec3 vertex) const {
     const Shape& shape = corner.body == 0 ? common_.a.shape : common_.b.shape;
     const Box* box = std::get_if<Box>(&shape);
@@ -231,7 +231,7 @@ std::optional<double> place_by(const CommonCorners& common, const Mat3& axes, st
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
 Placing* fastest_placing() { return place_by<true>; }
 #elif defined(__x86_64__)
-/// With all that it calls, for machines that have more than the rest is compiled for.
+/// Compiled with all that it calls for machines that have more than the rest is compiled for.
 __attribute__((target("avx2,fma"), flatten)) std::optional<double> place_by_avx2(const CommonCorners& common,
                                                                                  const Mat3& axes,
                                                                                  std::span<Vec3> vertices,
@@ -245,7 +245,7 @@ Placing* fastest_placing() {
 Placing* fastest_placing() { return place_by<false>; }
 #endif
 
-/// But for what underflows, which is nothing beside any body's size.
+/// Equal but for what underflows, which is nothing beside any body's size.
 [[maybe_unused]] bool same(Vec3 a, Vec3 b) { return !(max_component(abs(a - b)) > 1e-250); }
 
 }  // namespace

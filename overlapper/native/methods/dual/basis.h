@@ -51,7 +51,7 @@ inline bool has_share(double share) { return share > 1e-12; }
 /// The shares add up to one, so that one of them is a quarter or more.
 inline bool has_share(DoubleDouble share) { return share.head > 0x1p-80; }
 
-/// Of equal ratios, which rounding tells apart at random, the first that comes out least will do.
+/// Rounding tells equal ratios apart at random: the first that comes out least will do.
 inline bool leaves_sooner(const Leaving<double>& a, const Leaving<double>& b) { return a.ratio < b.ratio; }
 /// Double-doubles tell equal ratios from others, and of those the largest share keeps the basis farthest from singular.
 inline bool leaves_sooner(const Leaving<DoubleDouble>& a, const Leaving<DoubleDouble>& b) {

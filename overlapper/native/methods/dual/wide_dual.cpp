@@ -29,7 +29,7 @@ class BodyDuals {
     return slack > 2 * reach * norm(along);
   }
 
-  /// Of the plane with that normal, of any length, through a point or at a height along the normal.
+  /// The dual of the plane with that normal, of any length, through a point or at a height along the normal.
   WideDual through(const WideVector& normal, Vec3 point) const {
     return make(normal, dot(normal, wide(point) - origin_));
   }

@@ -52,7 +52,7 @@ class CloseBody {
   /// √3 times the distance: 2 + 4 √3 half-ulps.
   double corner_rounding() const { return (turned_ ? 9 : 1) * 0x1p-53; }
 
-  /// By how much a normal's direction may be off: three half-ulps as it was made, and the turn.
+  /// The rounding of a normal's direction: three half-ulps as it was made, and the turn.
   double normal_rounding() const { return (turned_ ? 10 : 3) * 0x1p-53; }
 
   /// Of a signed distance: both corners, the normal over their distance, and four half-ulps of that for difference,
@@ -78,7 +78,7 @@ class CloseBody {
     return turned_ ? turn_ * own : own;
   }
 
-  /// Kept for whoever asks again.
+  /// A corner once placed is kept for whoever asks again.
   struct PlacedCorner {
     Vec3 at;
     double size;  ///< its distance from the common point

@@ -296,7 +296,7 @@ bool Tracing::add_cut_facet(int body, int first_corner) {
   return true;
 }
 
-/// From facet to facet over edges that are kept.
+/// Spreads from facet to facet over edges that are kept.
 bool Tracing::spread(int body) {
   std::vector<int>& open = open_[body];
   while (!open.empty()) {
