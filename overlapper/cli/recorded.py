@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from overlapper.scenes.playback import View
     from overlapper.viewer.look import Look
 
-Step = TypeVar("Step")
+Item = TypeVar("Item")
 
 PICTURES_PER_SECOND = 30  # of simulated time: as smooth as a film, and a tenth of the size that every step would take
 
 
-def with_progress(frames: Iterable[Step], name: str, steps: int) -> Iterator[Step]:
+def with_progress(frames: Iterable[Item], name: str, steps: int) -> Iterator[Item]:
     """The frames, counted by a bar on stderr if that is a terminal."""
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:

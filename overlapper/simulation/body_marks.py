@@ -9,7 +9,7 @@ from itertools import repeat
 import pybullet
 
 
-class Marks:
+class BodyMarks:
     """A user data entry on every body that has been read. It goes when the body goes.
 
     What pybullet tells of user data is what this process has heard: another's changes, and those of bodies after a

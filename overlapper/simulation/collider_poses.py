@@ -11,7 +11,7 @@ from overlapper.simulation.extraction.bullet_file import SavedBody
 from overlapper.simulation.extraction.model import BASE
 from overlapper.simulation.extraction.saved_scene import save
 
-Frame = Sequence[Sequence[float]]  # begins with position and quaternion xyzw
+ReportedPose = Sequence[Sequence[float]]  # begins with position and quaternion xyzw
 
 
 class ColliderPoses:
@@ -29,14 +29,14 @@ class ColliderPoses:
         self.bodies = [*self._seen, *(id for id in links if id in hidden)]
         self.colliders = [(id, BASE) for id in self.bodies]
         self.colliders += [(id, link) for id in self.bodies for link in links[id]]
-        self.frames: list[Frame] = []
+        self.frames: list[ReportedPose] = []
         self.static = [True] * len(self.bodies)
 
     def read(self) -> None:
         """Read the frames anew, and which bases are static."""
         client, before = self._client, self.frames or [()] * len(self.bodies)
         saved = save(client).bodies if self._hidden else []
-        frames: list[Frame] = list(map(pybullet.getBasePositionAndOrientation, self._seen, repeat(client)))
+        frames: list[ReportedPose] = list(map(pybullet.getBasePositionAndOrientation, self._seen, repeat(client)))
         frames += [_frame(saved[row], BASE) for row, _ in self._hidden]
         for id, links in self._jointed:
             # Without forward kinematics the poses of links lag one step behind.
@@ -50,6 +50,6 @@ class ColliderPoses:
                 self.static[k] = pybullet.getDynamicsInfo(id, BASE, client)[0] == 0
 
 
-def _frame(body: SavedBody, link: int) -> Frame:
+def _frame(body: SavedBody, link: int) -> ReportedPose:
     collider = body.colliders[link]
     return collider.position.tolist(), collider.orientation.tolist()

@@ -144,7 +144,7 @@ def _of_bullet_file(
     from overlapper.simulation.collision_rules import Colliders, CollisionRules
     from overlapper.simulation.extraction.bullet_file import BulletFile
     from overlapper.simulation.extraction.model import Settings
-    from overlapper.simulation.extraction.modelling import modelled, summary
+    from overlapper.simulation.extraction.modelling import in_one_sentence, modelled
 
     file, settings = BulletFile(path), Settings(concave, concave_threshold, surface)
     colliders = {
@@ -162,7 +162,7 @@ def _of_bullet_file(
             orientation = composed(collider.orientation, part.orientation)
             listed.setdefault(key, []).append(Placed(part.shape, position, orientation))
         if reasons:
-            skipped.append((names[key], summary(reasons, len(parts) + len(reasons))))
+            skipped.append((names[key], in_one_sentence(reasons, len(parts) + len(reasons))))
         decomposed += [(names[key], len(mesh.parts)) for _, mesh in meshes]
     rows = {key: row for row, key in enumerate(colliders)}
     group, mask = np.array([(each.group, each.mask) for each in colliders.values()], dtype=int).reshape(-1, 2).T

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 
 import pybullet
 
-from overlapper.simulation.body_marks import Marks
+from overlapper.simulation.body_marks import BodyMarks
 from overlapper.simulation.extraction.body import read_body
 from overlapper.simulation.extraction.bullet_file import BulletFile
 from overlapper.simulation.extraction.model import BASE, Body, Color, Decomposed, Settings, Skipped
@@ -24,7 +24,7 @@ class KnownBodies:
 
     def __init__(self, client: int, settings: Settings, recorder: Recorder | None) -> None:
         self._client, self._settings, self._recorder = client, settings, recorder
-        self._marks = Marks(client)
+        self._marks = BodyMarks(client)
         self._unidentified = 0
         self.by_id: dict[int, Body] = {}
         self.hidden: dict[int, int] = {}

@@ -15,7 +15,7 @@ import pybullet
 from overlapper.simulation.extraction.bullet_file import BulletFile, Leaf, SavedBody
 from overlapper.simulation.extraction.height_field import HeightField
 from overlapper.simulation.extraction.model import BASE, Body, Color, Decomposed, Ground, Part, Settings, Skipped
-from overlapper.simulation.extraction.modelling import modelled, summary
+from overlapper.simulation.extraction.modelling import in_one_sentence, modelled
 from overlapper.simulation.extraction.saved_scene import MULTIBODY, SOFT_BODY, body_type
 
 REPORTED = {  # by getCollisionShapeData
@@ -60,7 +60,7 @@ def read_body(
         shape_count += count
         label = f"{name}/{link_names[link]}"
         if reasons:
-            skipped.append(Skipped(id, link, label, summary(reasons, count)))
+            skipped.append(Skipped(id, link, label, in_one_sentence(reasons, count)))
         decomposed += [
             Decomposed(id, link, label, numbers, mesh.volume, mesh.mesh_volume, mesh.path) for numbers, mesh in meshes
         ]

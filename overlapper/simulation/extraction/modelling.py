@@ -104,7 +104,7 @@ def _shape(kind: str, data: bytes, margin: float) -> Shape:
             raise ValueError(f"a {kind} is not modelled")
 
 
-def summary(reasons: Sequence[str], shapes: int) -> str:
+def in_one_sentence(reasons: Sequence[str], shapes: int) -> str:
     if shapes == 1:
         return reasons[0]
     return "; ".join(f"{number} of {shapes} shapes: {reason}" for reason, number in Counter(reasons).items())
