@@ -29,11 +29,6 @@ APART = ["methods/clipping", "methods/tracing", "methods/dual"]
 # What includes what it should not, file by file.
 EXCEPTIONS = {
     ("distance/portal.h", "methods/tracing/close_body.h"),
-    ("methods/clipping/clip.cpp", "methods/tracing/trace.h"),
-    ("methods/clipping/clip.h", "methods/dual/region.h"),
-    ("methods/paper.h", "overlap/overlap.h"),
-    ("methods/tracing/trace.h", "methods/clipping/clip.h"),
-    ("methods/tracing/trace.h", "methods/dual/region.h"),
 }
 
 

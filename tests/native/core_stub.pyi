@@ -387,6 +387,17 @@ class Overlap:
     def method(self) -> Literal['auto', 'paper']: ...
 
     @property
+    def way(self) -> Literal['separation', 'clipping', 'tracing', 'closed form', 'dual hull', 'wide separation', 'wide clipping', 'wide dual hull', 'doubt', 'paper']:
+        """
+        How the answer came: by which way the volume was measured, or the status found of bodies that do not overlap.
+
+        'separation': doubles prove a gap. 'clipping': corners of each body held against the planes of the other. 'tracing': the
+        seam of two surfaces followed from facet to facet. 'closed form': a formula. 'dual hull': the convex hull of dual points.
+        'wide ...': the same in double-doubles, where doubles are not enough. 'doubt': not even these tell whether there is an
+        inside, so that the bodies are said to touch. 'paper': the method asked for.
+        """
+
+    @property
     def facets_touched(self) -> int:
         """How many planes of the shapes took part in the measures."""
 
@@ -580,6 +591,12 @@ class Overlaps:
         """(p,) Overlaps.SEPARATED (0), TOUCHING (1) or OVERLAPPING (2)."""
 
     @property
+    def way(self) -> numpy.typing.NDArray[numpy.int8]:
+        """
+        (p,) how the answer came: a place in Overlaps.WAYS, which has the names of Overlap.way.
+        """
+
+    @property
     def volume(self) -> numpy.typing.NDArray[numpy.float64]:
         """(p,) m³; 0 unless overlapping."""
 
@@ -629,6 +646,8 @@ class Overlaps:
     TOUCHING: int = 1
 
     OVERLAPPING: int = 2
+
+    WAYS: tuple = ...
 
     @property
     def examined(self) -> int:

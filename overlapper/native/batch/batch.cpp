@@ -29,65 +29,42 @@ struct Known {
   Vec3 axis;  ///< unit, from b to a: the bodies were apart along it; {0, 0, 0} if they were not
 };
 
-/// Of a pair that clipping has measured.
-Overlaps::Row row_of(const ClippedPair& clipped, const Placed& a, const Placed& b) {
-  const auto [depth, normal] = penetration_of_clipped(a, b);
-  return {.status = clipped.status,
-          .widened = clipped.widened,
-          .facets_touched = clipped.facets_touched,
-          .volume = clipped.volume,
-          .volume_error = clipped.volume_error,
-          .area = clipped.area,
-          .depth = depth,
-          .centroid = clipped.centroid,
-          .normal = normal,
-          .gradient = gradient_of_clipped(clipped, a.position, b.position),
-          .source = {}};
-}
-
 Overlaps::Row row_of(Overlap overlap) {
   Overlaps::Row row;
-  row.status = overlap.status();
-  if (row.status == Status::kSeparated) return row;
-  row.volume_error = overlap.volume_error();
+  row.measures.status = overlap.status();
+  row.measures.way = overlap.way();
+  if (overlap.status() == Status::kSeparated) return row;
+  if (overlap.status() == Status::kOverlapping) row.measures = overlap.measures();
+  row.measures.volume_error = overlap.volume_error();
+  row.measures.facets_touched = overlap.facets_touched();
   row.depth = overlap.contact().depth;
   row.normal = overlap.contact().normal;
-  if (row.status == Status::kOverlapping) {
-    row.widened = overlap.widened();
-    row.facets_touched = overlap.facets_touched();
-    row.volume = overlap.volume();
-    row.area = overlap.area();
-    row.centroid = overlap.centroid();
-    std::ranges::copy(overlap.gradient(), row.gradient.begin());
-  }
   row.source = std::make_shared<Overlap>(std::move(overlap));
   return row;
 }
 
 Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method method) {
-  if (method == Method::kPaper) return row_of(Overlap(a, b, tolerance, method));
-  const std::optional<ClippedPair> clipped = clip(a, b);
-  if (clipped && clipped->status == Status::kSeparated) return {};
-  if (clipped && clipped->measured) return row_of(*clipped, a, b);
-  return row_of(Overlap(a, b, tolerance, clipped));
+  if (method == Method::kAuto) {
+    std::optional<Measures> at_once = measure_at_once(a, b);
+    if (at_once && at_once->status == Status::kSeparated) return {};
+    if (at_once && at_once->measured) {
+      const auto [depth, normal] = penetration_in_order(a, b);
+      return {std::move(*at_once), depth, normal, nullptr};
+    }
+  }
+  return row_of(Overlap(a, b, tolerance, method));
 }
 
 /// A shape where it is now, and what does not change as it moves.
 struct Body {
   Placed placed;
-  double reach;               ///< of the shape from its own origin
+  double radius;              ///< of the shape
   std::uint64_t version = 0;  ///< counts the poses it has had
 
   /// How far it reaches along a unit direction of the world, from its own origin.
   double reach_along(Vec3 direction) const {
     const Vec3 local = apply_transposed(placed.pose.rotation, direction);
     return dot(local, std::visit([&](const auto& s) { return s.support(local); }, placed.shape));
-  }
-
-  /// How large the numbers are that its pose is made from, beside its reach: those of a hull far from its own origin.
-  double leverage() const {
-    const HullData* hull = polytope_of(placed.shape);
-    return hull && norm2(hull->origin) > 0 ? norm(hull->origin) + norm(placed.position) : 0;
   }
 };
 
@@ -97,7 +74,7 @@ bool apart(const Body& a, const Body& b, Vec3& axis) {
   const bool open_a = !bounded(a.placed.shape), open_b = !bounded(b.placed.shape);
   if (open_a && open_b) return false;
   const Vec3 between = a.placed.pose.translation - b.placed.pose.translation;
-  const double margin = 4 * rounding(norm(between) + a.reach + b.reach + a.leverage() + b.leverage());
+  const double margin = 4 * rounding(norm(between) + reach(a.placed, a.radius) + reach(b.placed, b.radius));
   if (open_a || open_b) {
     const Body &open = open_a ? a : b, &closed = open_a ? b : a;
     const Plane& plane = std::get<HalfSpace>(open.placed.shape).plane;
@@ -125,35 +102,32 @@ bool axis_soon_found(const Body& a, const Body& b) {
   return !polytope(a.placed.shape) || !polytope(b.placed.shape);
 }
 
-/// The reach of a shape, and of the numbers that describe it, from its own origin.
-double reach_of(const Shape& shape) {
-  if (const HalfSpace* half = std::get_if<HalfSpace>(&shape)) return std::abs(half->plane.offset);
-  const Bounds box = bounds(Placed{shape, {}, {}, {}});
-  return norm(max(abs(box.lower), abs(box.upper)));
-}
-
 }  // namespace
 
 // ------------------------------------------------------------------------------------------------------------ Overlaps
 
 void Overlaps::append(IndexPair pair, const Row& row) {
   pairs.push_back(pair);
-  status.push_back(static_cast<std::int8_t>(row.status));
-  widened.push_back(row.widened);
-  facets_touched.push_back(row.facets_touched);
-  volume.push_back(row.volume);
-  volume_error.push_back(row.volume_error);
-  area.push_back(row.area);
+  const Measures& m = row.measures;
+  const bool overlapping = m.status == Status::kOverlapping;
+  status.push_back(static_cast<std::int8_t>(m.status));
+  way.push_back(static_cast<std::int8_t>(m.way));
+  widened.push_back(overlapper::widened(m.way));
+  facets_touched.push_back(m.facets_touched);
+  volume.push_back(m.volume);
+  volume_error.push_back(m.volume_error);
+  area.push_back(m.area);
   depth.push_back(row.depth);
-  centroid.push_back(row.status == Status::kOverlapping ? row.centroid : Vec3{kNaN, kNaN, kNaN});
+  centroid.push_back(overlapping ? m.centroid : Vec3{kNaN, kNaN, kNaN});
   normal.push_back(row.normal);
-  gradient.push_back(row.gradient);
+  gradient.push_back({gradient_row(m.pulls[0]), gradient_row(m.pulls[1])});
   source.push_back(row.source);
 }
 
 void Overlaps::reserve(size_t rows) {
   pairs.reserve(rows);
   status.reserve(rows);
+  way.reserve(rows);
   widened.reserve(rows);
   facets_touched.reserve(rows);
   for (std::vector<double>* column : {&volume, &volume_error, &area, &depth}) column->reserve(rows);
@@ -181,11 +155,23 @@ Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
   chosen.method = method;
   chosen.shapes = shapes;
   chosen.poses = poses;
-  chosen.reserve(rows.size());
-  for (std::int64_t i : rows)
-    chosen.append(pairs[i],
-                  {static_cast<Status>(status[i]), widened[i] != 0, facets_touched[i], volume[i], volume_error[i],
-                   area[i], depth[i], centroid[i], normal[i], gradient[i], source[i].lock()});
+  const auto pick = [&](const auto& from, auto& to) {
+    to.reserve(rows.size());
+    for (std::int64_t i : rows) to.push_back(from[i]);
+  };
+  pick(pairs, chosen.pairs);
+  pick(status, chosen.status);
+  pick(way, chosen.way);
+  pick(widened, chosen.widened);
+  pick(facets_touched, chosen.facets_touched);
+  pick(volume, chosen.volume);
+  pick(volume_error, chosen.volume_error);
+  pick(area, chosen.area);
+  pick(depth, chosen.depth);
+  pick(centroid, chosen.centroid);
+  pick(normal, chosen.normal);
+  pick(gradient, chosen.gradient);
+  pick(source, chosen.source);
   return chosen;
 }
 
@@ -211,7 +197,7 @@ struct Batch::Memory {
   size_t walked = 0;         ///< of the last call's pairs, if so
 
   explicit Memory(const std::vector<Shape>& shapes) {
-    for (const Shape& shape : shapes) bodies.push_back({make_placed(shape, {}, {}), reach_of(shape), 0});
+    for (const Shape& shape : shapes) bodies.push_back({make_placed(shape, {}, {}), radius(shape), 0});
     enclosures.resize(shapes.size());
   }
 
@@ -278,7 +264,7 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   }
   const Body &a = bodies[pair.pair[0]], &b = bodies[pair.pair[1]];
   // The article's method has its own way of telling.
-  const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].status == Status::kOverlapping;
+  const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].measures.status == Status::kOverlapping;
   const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
   const size_t planes_before = planes_asked;
   next_rows[i] = separated ? Overlaps::Row{} : row_of(a.placed, b.placed, with_tolerance, by_method);
@@ -343,7 +329,7 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   answer.shapes = shapes_;
   answer.poses = memory->poses;
   const auto listed = [&](size_t i) {
-    return memory->done[i] && (separated || memory->next_rows[i].status != Status::kSeparated);
+    return memory->done[i] && (separated || memory->next_rows[i].measures.status != Status::kSeparated);
   };
   memory->begin(pairs);
   finished = true;

@@ -20,20 +20,16 @@ using PoseNumbers = std::array<double, 7>;
 
 /// What the pairs of one call share, a column per quantity and a row per pair.
 struct Overlaps {
-  /// One row; the quantities are those of Overlap.
   struct Row {
-    Status status = Status::kSeparated;
-    bool widened = false;
-    int facets_touched = 0;
-    double volume = 0, volume_error = 0, area = 0, depth = 0;
-    Vec3 centroid;  ///< meaningless unless overlapping
-    Vec3 normal;    ///< {0, 0, 0} if separated
-    std::array<std::array<double, 6>, 2> gradient{};
-    std::shared_ptr<Overlap> source;  ///< if it took more than clipping
+    Measures measures;
+    double depth = 0;
+    Vec3 normal;                      ///< {0, 0, 0} if separated
+    std::shared_ptr<Overlap> source;  ///< if it took more than measuring at once
   };
 
   std::vector<IndexPair> pairs;
   std::vector<std::int8_t> status;  ///< a Status
+  std::vector<std::int8_t> way;     ///< a Way
   std::vector<char> widened;
   std::vector<int> facets_touched;
   std::vector<double> volume, volume_error, area, depth;

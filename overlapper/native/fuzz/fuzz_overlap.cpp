@@ -212,28 +212,28 @@ void check_region(const Region& region, bool simple) {
   for (double t : region.inner) require(t >= 0 && t <= 1, "vertices are pulled inwards");
 }
 
-void check_quantities(const Quantities& q) {
-  require(q.volume > 0 && q.area > 0 && std::isfinite(q.area), "an overlap has a volume and a surface");
-  require(finite(q.centroid), "the centroid is finite");
-  for (Vec3 row : {q.inertia.row0, q.inertia.row1, q.inertia.row2}) require(finite(row), "the inertia is finite");
+void check_measures(const Measures& m, const Mat3& inertia) {
+  require(m.volume > 0 && m.area > 0 && std::isfinite(m.area), "an overlap has a volume and a surface");
+  require(finite(m.centroid), "the centroid is finite");
+  for (Vec3 row : {inertia.row0, inertia.row1, inertia.row2}) require(finite(row), "the inertia is finite");
 }
 
-void check_surface(const Surface& surface, int bodies, Method method) {
-  const int facets = static_cast<int>(surface.planes.size()), vertices = static_cast<int>(surface.vertices.size());
-  require(surface.ring.size() % 2 == 0 && surface.owner.size() == surface.planes.size(), "facets are complete");
+void check_boundary(const Boundary& boundary, int bodies, Method method) {
+  const int facets = static_cast<int>(boundary.planes.size()), vertices = static_cast<int>(boundary.vertices.size());
+  require(boundary.ring.size() % 2 == 0 && boundary.owner.size() == boundary.planes.size(), "facets are complete");
   // The article's second hull joins facets that are coplanar but for rounding, which may be all there is of a body.
-  const bool closed = vertices - static_cast<int>(surface.ring.size()) / 2 + facets == 2;
+  const bool closed = vertices - static_cast<int>(boundary.ring.size()) / 2 + facets == 2;
   require(closed || method == Method::kPaper, "Euler's formula for the surface");
-  for (int v : surface.ring) require(v >= 0 && v < vertices, "facets refer to vertices");
-  for (int owner : surface.owner) require(owner >= 0 && owner < bodies, "facets have an owner");
-  for (const auto& polygon : surface.patch) {
+  for (int v : boundary.ring) require(v >= 0 && v < vertices, "facets refer to vertices");
+  for (int owner : boundary.owner) require(owner >= 0 && owner < bodies, "facets have an owner");
+  for (const auto& polygon : boundary.patch) {
     require(polygon.size() >= 3, "the patch consists of polygons");
     for (Vec3 v : polygon) require(finite(v), "the patch is finite");
   }
 }
 
 void check_contact(const Overlap& overlap) {
-  const Overlap::Contact& c = overlap.contact();
+  const Contact& c = overlap.contact();
   const Placed &a = overlap.bodies()[0], &b = overlap.bodies()[1];
   require(std::abs(norm(c.normal) - 1) < 1e-12, "the normal has length one");
   require(sound(c.depth) && sound(c.distance), "depth and distance are finite and not negative");
@@ -258,16 +258,16 @@ void check_gradient(const Overlap& overlap) {
     sum += {row[0], row[1], row[2]};
   }
   if (overlap.method() == Method::kAuto)
-    require(norm(sum) <= 0x1p-40 * overlap.quantities().area, "the area vectors sum to zero");
+    require(norm(sum) <= 0x1p-40 * overlap.measures().area, "the area vectors sum to zero");
 }
 
 void check(const Overlap& overlap) {
   check_volume(overlap);
   if (overlap.status() == Status::kOverlapping) {
     check_region(overlap.region(), overlap.method() == Method::kAuto);
-    check_quantities(overlap.quantities());
+    check_measures(overlap.measures(), overlap.inertia());
     check_gradient(overlap);
-    check_surface(overlap.surface(), static_cast<int>(overlap.bodies().size()), overlap.method());
+    check_boundary(overlap.boundary(), static_cast<int>(overlap.bodies().size()), overlap.method());
   }
   if (overlap.pair()) check_contact(overlap);
 }

@@ -43,6 +43,12 @@ inline Pull about(const Pull& pull, Vec3 from, Vec3 to) {
   return {pull.force, pull.moment + cross(from - to, pull.force)};
 }
 
+/// A pull as six numbers; adding to zero makes no negative zeros.
+inline std::array<double, 6> gradient_row(const Pull& pull) {
+  const Vec3 force = Vec3{} + pull.force, moment = Vec3{} + pull.moment;
+  return {force.x, force.y, force.z, moment.x, moment.y, moment.z};
+}
+
 /// What an edge adds to the pull of the patch that it borders on its left, about the origin: the area vector of a
 /// patch, and the integral of x × n over it, are integrals along its border (Stokes).
 template <class Vector>
@@ -65,12 +71,6 @@ struct Measures {
   Vec3 centroid;
   std::array<Pull, 2> pulls{};       ///< on the bodies of a pair, each about its body's position
   std::vector<Pull> pulls_of_group;  ///< likewise, on more than two
-};
-
-/// Measures in the coordinates of the first body of a pair, until they are said in the world's.
-struct LocalMeasures {
-  Measures measures;
-  Pull on_first;  ///< about the centroid; the second body has the opposite
 };
 
 /// Three times the mean of the area on the way, over the area at its beginning, while the planes of a polytope move out

@@ -239,9 +239,23 @@ Part below(const Revolved& body, double sine, double cosine, double t) {
 /// Sums over terms of that size are right to this fraction of it.
 constexpr double kSummation = 64 * DBL_EPSILON;
 
-/// What the plane leaves of the body; the plane's pull is that of body `other`, and `rounding` as in closed_form().
-std::optional<Quantities> cut_by_plane(const Revolved& body, const Plane& plane, int self, double rounding,
-                                       Vec3 reference) {
+Measures by_formula() {
+  Measures m;
+  m.status = Status::kOverlapping;
+  m.way = Way::kClosedForm;
+  m.measured = true;
+  return m;
+}
+
+/// Where a pull acts in the world, and the positions about which those of the bodies are counted.
+std::array<Pull, 2> opposite_pulls(Vec3 force_on_first, Vec3 where, const std::array<Vec3, 2>& positions) {
+  return {about({force_on_first, {}}, where, positions[0]), about({-force_on_first, {}}, where, positions[1])};
+}
+
+/// What the plane leaves of the body, which is number `self` of the pair; the plane belongs to the other. `rounding` as
+/// in closed_form().
+std::optional<Measures> cut_by_plane(const Revolved& body, const Plane& plane, int self, double rounding,
+                                     Vec3 reference, const std::array<Vec3, 2>& positions) {
   double sine = dot(body.axis, plane.normal);
   const Vec3 axis = sine < 0 ? -body.axis : body.axis;
   sine = std::abs(sine);
@@ -251,8 +265,7 @@ std::optional<Quantities> cut_by_plane(const Revolved& body, const Plane& plane,
   const Part part = below(body, sine, cosine, -signed_distance(plane, body.centre));
   if (!(part.volume > 0)) return std::nullopt;
   const auto to_world = [&](Vec3 p) { return reference + (body.centre + (p.x * axis + p.y * sideways)); };
-  Quantities q;
-  q.closed_form = true;
+  Measures q = by_formula();
   q.facets_touched = part.flat_area > 0 ? 1 : 0;
   q.volume = part.volume;
   q.area = part.flat_area + part.curved_area;
@@ -261,7 +274,8 @@ std::optional<Quantities> cut_by_plane(const Revolved& body, const Plane& plane,
   if (part.flat_area > 0) {
     const Vec3 where = to_world(part.flat_moment / part.flat_area);
     // The area vectors of a closed surface sum to zero, and so do their moments.
-    q.pulls = {{1 - self, part.flat_area * plane.normal, where}, {self, -part.flat_area * plane.normal, where}};
+    const Vec3 on_other = part.flat_area * plane.normal;
+    q.pulls = opposite_pulls(self == 0 ? -on_other : on_other, where, positions);
   }
   return q;
 }
@@ -290,8 +304,8 @@ double reach_below(const Revolved& body, Vec3 normal, double offset, Vec3 direct
 }
 
 /// The body where at most one of the planes cuts off anything that the others leave.
-std::optional<Quantities> cut_by_polytope(const Revolved& body, std::span<const Plane> planes, int self,
-                                          double rounding, Vec3 reference) {
+std::optional<Measures> cut_by_polytope(const Revolved& body, std::span<const Plane> planes, int self, double rounding,
+                                        Vec3 reference, const std::array<Vec3, 2>& positions) {
   const Plane* deepest = nullptr;
   double most = -kInfinity;
   std::vector<const Plane*> cutting;
@@ -309,7 +323,7 @@ std::optional<Quantities> cut_by_polytope(const Revolved& body, std::span<const 
     if (reach > offset + 2 * rounding) return std::nullopt;
     if (reach > offset) layers += 4;  // it may cut off a layer of rounding
   }
-  return cut_by_plane(body, *deepest, self, layers * rounding, reference);
+  return cut_by_plane(body, *deepest, self, layers * rounding, reference, positions);
 }
 
 // ----------------------------------------------------------------------------------------------------------------- lens
@@ -326,8 +340,8 @@ double clearance(const End& end, Vec3 centre, double radius, Vec3 normal, double
 }
 
 /// The lens of two balls: cap of a towards b, cap of b towards a.
-std::optional<Quantities> lens(Vec3 a, double ra, Vec3 b, double rb, double rounding, Vec3 reference,
-                               std::span<const End> ends) {
+std::optional<Measures> lens(Vec3 a, double ra, Vec3 b, double rb, double rounding, Vec3 reference,
+                             std::span<const End> ends, const std::array<Vec3, 2>& positions) {
   const double distance = norm(b - a), depth = ra + rb - distance;
   if (!(depth > 0)) return std::nullopt;
   const Vec3 towards = distance > 0 ? (b - a) / distance : Vec3{1, 0, 0};
@@ -346,8 +360,7 @@ std::optional<Quantities> lens(Vec3 a, double ra, Vec3 b, double rb, double roun
     if (std::min(by_a, by_b) <= 0) return std::nullopt;
   }
   const Part cap_a = cap(ra, height_a, -towards), cap_b = cap(rb, height_b, towards);
-  Quantities q;
-  q.closed_form = true;
+  Measures q = by_formula();
   q.volume = cap_a.volume + cap_b.volume;
   q.area = cap_a.curved_area + cap_b.curved_area;
   // About the point where the line of centres passes through the circle.
@@ -357,13 +370,14 @@ std::optional<Quantities> lens(Vec3 a, double ra, Vec3 b, double rb, double roun
   q.centroid = reference + (circle + moment / q.volume);
   q.volume_error = rounding * q.area + kSummation * q.volume;
   const double disc = std::max(cap_a.flat_area, cap_b.flat_area);
-  if (disc > 0) q.pulls = {{0, disc * towards, reference + circle}, {1, -disc * towards, reference + circle}};
+  if (disc > 0) q.pulls = opposite_pulls(disc * towards, reference + circle, positions);
   return q;
 }
 
 /// Where every point of the common set lies beyond the ends of both bodies, the ends are all that matters: the set is
 /// connected, and around the lens there is nothing else of them.
-std::optional<Quantities> lens_of_ends(const Revolved& a, const Revolved& b, double rounding, Vec3 reference) {
+std::optional<Measures> lens_of_ends(const Revolved& a, const Revolved& b, double rounding, Vec3 reference,
+                                     const std::array<Vec3, 2>& positions) {
   const double sign_a = dot(a.axis, b.centre - a.centre) < 0 ? -1 : 1;
   const double sign_b = dot(b.axis, a.centre - b.centre) < 0 ? -1 : 1;
   std::vector<End> ends;
@@ -376,16 +390,17 @@ std::optional<Quantities> lens_of_ends(const Revolved& a, const Revolved& b, dou
     centre_b += sign_b * b.half_length * b.axis;
     ends.push_back({centre_b, sign_b * b.axis});
   }
-  return lens(centre_a, a.radius, centre_b, b.radius, rounding, reference, ends);
+  return lens(centre_a, a.radius, centre_b, b.radius, rounding, reference, ends, positions);
 }
 
 }  // namespace
 
-std::optional<Quantities> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference) {
+std::optional<Measures> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference) {
   const std::optional<Revolved> smooth_a = revolved(a), smooth_b = revolved(b);
+  const std::array<Vec3, 2> positions{a.position, b.position};
   if (smooth_a && smooth_b) {
     if (!smooth_a->round || !smooth_b->round) return std::nullopt;
-    return lens_of_ends(*smooth_a, *smooth_b, rounding, reference);
+    return lens_of_ends(*smooth_a, *smooth_b, rounding, reference, positions);
   }
   if (!smooth_a && !smooth_b) return std::nullopt;
   const Placed& other = smooth_a ? b : a;
@@ -393,7 +408,7 @@ std::optional<Quantities> closed_form(const Placed& a, const Placed& b, double r
   std::vector<Plane> planes;
   append_planes(other.shape, planes);
   for (Plane& plane : planes) plane = other.pose * plane;
-  return cut_by_polytope(smooth_a ? *smooth_a : *smooth_b, planes, smooth_a ? 0 : 1, rounding, reference);
+  return cut_by_polytope(smooth_a ? *smooth_a : *smooth_b, planes, smooth_a ? 0 : 1, rounding, reference, positions);
 }
 
 }  // namespace overlapper

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "methods/dual/region.h"
+#include "geometry/measures.h"
 #include "shapes/shape.h"
 
 namespace overlapper {
@@ -16,7 +16,7 @@ namespace overlapper {
 /// - a ball, a capsule or a cylinder that lies inside a ball, a half-space, a box or a hull.
 ///
 /// Nothing for every other pair. Bodies relative to `reference`, in any order; `rounding` is how far a surface may be
-/// off, in m. There is no polytope, so `inertia` stays zero; `pulls` has one entry per body, which act along one line.
-std::optional<Quantities> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference);
+/// off, in m.
+std::optional<Measures> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference);
 
 }  // namespace overlapper

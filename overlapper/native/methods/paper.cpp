@@ -290,7 +290,7 @@ PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double toleran
   result.region = region_of(common.part);
   result.region->facets_touched = planes;
   // So thin that rounding has turned it inside out: there is no solid to speak of.
-  if (!(measure(*result.region).volume > 0)) return {Status::kTouching, std::nullopt};
+  if (!(measure(*result.region, bodies).measures.volume > 0)) return {Status::kTouching, std::nullopt};
   return result;
 }
 

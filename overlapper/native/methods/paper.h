@@ -3,7 +3,8 @@
 #include <optional>
 #include <span>
 
-#include "overlap/overlap.h"
+#include "geometry/measures.h"
+#include "methods/dual/region.h"
 
 namespace overlapper {
 

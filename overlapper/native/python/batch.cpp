@@ -128,6 +128,8 @@ void define_columns(nb::class_<Overlaps>& cls) {
   column<int>(cls, "pairs", &Overlaps::pairs, {2}, "int32", "(p, 2) indices of the shapes a and b of each row.");
   column<std::int8_t>(cls, "status", &Overlaps::status, {}, "int8",
                       "(p,) Overlaps.SEPARATED (0), TOUCHING (1) or OVERLAPPING (2).");
+  column<std::int8_t>(cls, "way", &Overlaps::way, {}, "int8",
+                      "(p,) how the answer came: a place in Overlaps.WAYS, which has the names of Overlap.way.");
   column<double>(cls, "volume", &Overlaps::volume, {}, "float64", "(p,) m³; 0 unless overlapping.");
   column<double>(cls, "volume_error", &Overlaps::volume_error, {}, "float64",
                  "(p,) m³, certified: the true volume is within volume ± volume_error.");
@@ -165,6 +167,9 @@ unless it took long and its Batch has not been asked since; `overlaps[mask]`, a 
                                      {"TOUCHING", Status::kTouching},
                                      {"OVERLAPPING", Status::kOverlapping}})
     cls.attr(name) = static_cast<int>(status);
+  nb::list ways;
+  for (const char* way : kWayNames) ways.append(way);
+  cls.attr("WAYS") = nb::tuple(ways);
   cls.def_ro("examined", &Overlaps::examined, "How many pairs were looked at: those given, or those whose boxes meet.");
   cls.def_ro(
       "planes_asked", &Overlaps::planes_asked,

@@ -49,17 +49,17 @@ nb::object overlap_of_pair(nb::handle type, const Placed& a, const Placed& b) {
 
 /// Computes what the properties are about to read while other Python threads run.
 const Overlap& measured(const Overlap& o) {
-  if (solid(o) && !o.clipped()) {
+  if (solid(o) && !o.measured_at_once()) {
     const nb::gil_scoped_release release;
     o.volume();
   }
   return o;
 }
 
-IndexMatrix triangles(const Surface& surface) {
+IndexMatrix triangles(const Boundary& boundary) {
   std::vector<int> indices;
-  for (size_t f = 0; f + 1 < surface.ring_start.size(); ++f) {
-    const auto ring = surface.facet(static_cast<int>(f));
+  for (size_t f = 0; f + 1 < boundary.ring_start.size(); ++f) {
+    const auto ring = boundary.facet(static_cast<int>(f));
     for (size_t i = 1; i + 1 < ring.size(); ++i) indices.insert(indices.end(), {ring[0], ring[i], ring[i + 1]});
   }
   const size_t rows = indices.size() / 3;
@@ -90,7 +90,6 @@ std::string repr(const Overlap& o) {
 void define_contact(nb::class_<Overlap>& cls) {
   const auto always = [](const Overlap&) { return true; };
   const auto apart = [](const Overlap& o) { return !solid(o); };
-  using Contact = Overlap::Contact;
   const nb::sig vector_or_none_normal("def normal(self) -> numpy.typing.NDArray[numpy.float64] | None");
   contact_property(
       cls, "normal", always, [](const Contact& c) { return to_numpy(c.normal); }, vector_or_none_normal,
@@ -163,28 +162,29 @@ arithmetic from the shapes' own numbers, as were centroid, area, inertia and gra
 of the facets that the body owns, and its moment. m² and m³; zeros unless overlapping.)");
 }
 
-void define_surface(nb::class_<Overlap>& cls) {
+void define_boundary(nb::class_<Overlap>& cls) {
   array_property(
-      cls, "vertices", [](const Overlap& o) { return solid(o) ? to_numpy(o.surface().vertices) : empty_rows(3); },
+      cls, "vertices", [](const Overlap& o) { return solid(o) ? to_numpy(o.boundary().vertices) : empty_rows(3); },
       "(n, 3) corners of the common polytope, m; empty unless overlapping.");
   array_property(
       cls, "faces",
       [](const Overlap& o) {
-        return solid(o) ? triangles(o.surface()) : to_numpy<IndexMatrix>(std::vector<int>{}, {0, 3});
+        return solid(o) ? triangles(o.boundary()) : to_numpy<IndexMatrix>(std::vector<int>{}, {0, 3});
       },
       "(k, 3) the facets as triangles, counter-clockwise from outside: indices into vertices.");
   cls.def_prop_ro(
       "facets",
-      [](const Overlap& o) { return solid(o) ? polygons(o.surface().ring, o.surface().ring_start) : nb::list(); },
+      [](const Overlap& o) { return solid(o) ? polygons(o.boundary().ring, o.boundary().ring_start) : nb::list(); },
       nb::sig("def facets(self) -> list[numpy.typing.NDArray[numpy.int32]]"),
       "Indices of the vertices around each facet, counter-clockwise from outside.");
   array_property(
-      cls, "halfspaces", [](const Overlap& o) { return solid(o) ? halfspace_rows(o.surface().planes) : empty_rows(4); },
+      cls, "halfspaces",
+      [](const Overlap& o) { return solid(o) ? halfspace_rows(o.boundary().planes) : empty_rows(4); },
       "(f, 4) rows [n, b], one per facet: n · x + b <= 0 inside, n unit (scipy's form).");
   array_property(
       cls, "owner",
       [](const Overlap& o) {
-        return to_numpy(std::span<const int>(solid(o) ? o.surface().owner : std::vector<int>{}));
+        return to_numpy(std::span<const int>(solid(o) ? o.boundary().owner : std::vector<int>{}));
       },
       "(f,) which of the shapes each facet belongs to.");
   cls.def_prop_ro(
@@ -192,7 +192,7 @@ void define_surface(nb::class_<Overlap>& cls) {
       [](const Overlap& o) {
         nb::list list;
         if (solid(o))
-          for (const auto& polygon : o.surface().patch) list.append(nb::cast(to_numpy(polygon), nb::rv_policy::move));
+          for (const auto& polygon : o.boundary().patch) list.append(nb::cast(to_numpy(polygon), nb::rv_policy::move));
         return list;
       },
       nb::sig("def patch(self) -> list[numpy.typing.NDArray[numpy.float64]]"),
@@ -202,7 +202,7 @@ counter-clockwise around a's part of the surface; for more bodies, around the pa
       "bounds",
       [](const Overlap& o) -> nb::object {
         if (!solid(o)) return nb::none();
-        const auto& vertices = o.surface().vertices;
+        const auto& vertices = o.boundary().vertices;
         Bounds box{vertices[0], vertices[0]};
         for (Vec3 v : vertices) box = {min(box.lower, v), max(box.upper, v)};
         return nb::cast(to_numpy(box), nb::rv_policy::move);
@@ -235,10 +235,20 @@ polytope contains the common set and could shrink into it by the fraction `toler
       "method", [](const Overlap& o) { return o.method() == Method::kAuto ? "auto" : "paper"; },
       nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
   cls.def_prop_ro(
+      "way", [](const Overlap& o) { return name(measured(o).way()); },
+      nb::sig("def way(self) -> typing.Literal['separation', 'clipping', 'tracing', 'closed form', 'dual hull', 'wide "
+              "separation', 'wide clipping', 'wide dual hull', 'doubt', 'paper']"),
+      R"(How the answer came: by which way the volume was measured, or the status found of bodies that do not overlap.
+
+'separation': doubles prove a gap. 'clipping': corners of each body held against the planes of the other. 'tracing': the
+seam of two surfaces followed from facet to facet. 'closed form': a formula. 'dual hull': the convex hull of dual points.
+'wide ...': the same in double-doubles, where doubles are not enough. 'doubt': not even these tell whether there is an
+inside, so that the bodies are said to touch. 'paper': the method asked for.)");
+  cls.def_prop_ro(
       "facets_touched", [](const Overlap& o) { return o.facets_touched(); },
       "How many planes of the shapes took part in the measures.");
   define_measures(cls);
-  define_surface(cls);
+  define_boundary(cls);
   define_contact(cls);
   cls.def("__repr__", [](const Overlap& o) { return repr(o); });
   cls.def(

@@ -289,4 +289,29 @@ Bounds bounds(const Placed& placed) {
   return {{reach(0, -1), reach(1, -1), reach(2, -1)}, {reach(0, 1), reach(1, 1), reach(2, 1)}};
 }
 
+double radius(const Shape& shape) {
+  if (const Box* box = std::get_if<Box>(&shape)) return norm(box->half_extents);
+  if (const Hull* hull = std::get_if<Hull>(&shape)) return hull->data->radius;
+  if (const HalfSpace* half = std::get_if<HalfSpace>(&shape)) return std::abs(half->plane.offset);
+  const Bounds box = bounds(Placed{shape, {}, {}, {}});
+  return norm(max(abs(box.lower), abs(box.upper)));
+}
+
+int facets(const Shape& shape) {
+  if (const Hull* hull = std::get_if<Hull>(&shape)) return static_cast<int>(hull->data->planes.size());
+  return std::holds_alternative<Box>(shape) ? 6 : 1;
+}
+
+double flatness(const Shape& shape) {
+  const HullData* hull = polytope_of(shape);
+  return hull ? hull->flatness : 0;
+}
+
+double reach(const Placed& body, double extent) {
+  const HullData* hull = polytope_of(body.shape);
+  if (!hull || norm2(hull->origin) == 0) return extent;
+  const bool moved = !unturned(body.orientation) || norm2(body.position) > 0;
+  return moved ? extent + (norm(hull->origin) + norm(body.position)) : extent;
+}
+
 }  // namespace overlapper

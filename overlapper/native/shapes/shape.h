@@ -123,6 +123,16 @@ double core_radius(const Shape& shape);
 /// The polytope that a hull is, or that a rounded hull is grown from; null for other shapes.
 const HullData* polytope_of(const Shape& shape);
 
+/// How far from its own origin a shape reaches; of a half-space, how far its plane is. For balls, capsules, cylinders
+/// and rounded hulls, the corner of the box around them.
+double radius(const Shape& shape);
+
+/// Facets of a box or a hull; 1 for a half-space.
+int facets(const Shape& shape);
+
+/// m: by how much planes of facets that are not quite flat miss their corners.
+double flatness(const Shape& shape);
+
 /// A shape and where it is. `pose` maps the shape's own coordinates (a hull's are about HullData::origin) to the world.
 struct Placed {
   Shape shape;
@@ -144,6 +154,11 @@ struct Placed {
 static_assert(ConvexOracle<Placed> && ConvexOracle<Hull> && ConvexOracle<HalfSpace>);
 
 Placed make_placed(Shape shape, Vec3 position, Quaternion orientation);
+
+/// How large the numbers are that the points of a body are computed from, none of which is farther than `extent` from
+/// where coordinates are counted from: so large, unless the body is a hull far from its own origin, for rotating and
+/// adding that origin rounds, too.
+double reach(const Placed& body, double extent);
 
 struct Bounds {
   Vec3 lower, upper;

@@ -53,10 +53,6 @@ void set_box(Solid& solid, const Box& box) {
   for (int f = 0; f < 6; ++f) solid.set_plane(f, side(box, f).normal, side(box, f).offset);
 }
 
-/// The most facets: beyond, asking every vertex of one body against every plane of the other takes longer than the dual
-/// hull.
-constexpr size_t kMostFacets = 1024;
-
 }  // namespace
 
 void set_solid(Solid& solid, const Placed& body, int owner, const Pose* pose, double beyond) {
@@ -117,34 +113,6 @@ bool set_part(Solid& solid, const Placed& body, int owner, const Pose& pose, con
   solid.edges = solid.own_edges;
   solid.whole = false;
   return true;
-}
-
-double radius(const Shape& shape) {
-  if (const Box* box = std::get_if<Box>(&shape)) return norm(box->half_extents);
-  if (const Hull* hull = std::get_if<Hull>(&shape)) return hull->data->radius;
-  return std::abs(std::get<HalfSpace>(shape).plane.offset);
-}
-
-double lost_far_away(const Placed& body) {
-  const HullData* hull = polytope_of(body.shape);
-  if (!hull || norm2(hull->origin) == 0) return 0;
-  return !unturned(body.orientation) || norm2(body.position) > 0 ? norm(hull->origin) + norm(body.position) : 0;
-}
-
-double flatness(const Shape& shape) {
-  const HullData* hull = polytope_of(shape);
-  return hull ? hull->flatness : 0;
-}
-
-int facets(const Shape& shape) {
-  if (const Hull* hull = std::get_if<Hull>(&shape)) return static_cast<int>(hull->data->planes.size());
-  return std::holds_alternative<Box>(shape) ? 6 : 1;
-}
-
-bool clippable(const Shape& shape) {
-  if (const Hull* hull = std::get_if<Hull>(&shape))
-    return !hull->data->edges.empty() && hull->data->planes.size() <= kMostFacets;
-  return std::holds_alternative<Box>(shape) || std::holds_alternative<HalfSpace>(shape);
 }
 
 }  // namespace overlapper

@@ -63,18 +63,4 @@ void set_solid(Solid& solid, const Placed& body, int owner, const Pose* pose, do
 /// Keeps those planes and edges of a body that a ball reaches; false if the ball is outside of one of the planes.
 bool set_part(Solid& solid, const Placed& body, int owner, const Pose& pose, const Ball& ball, double beyond);
 
-/// How far from its own origin a shape reaches; of a half-space, how far its plane is.
-double radius(const Shape& shape);
-
-/// What rotating and adding a hull's far origin has cost, as a length.
-double lost_far_away(const Placed& body);
-
-/// m: by how much planes of facets that are not quite flat miss their corners.
-double flatness(const Shape& shape);
-
-int facets(const Shape& shape);
-
-/// Polytopes whose facets are few, and half-spaces.
-bool clippable(const Shape& shape);
-
 }  // namespace overlapper

@@ -5,8 +5,9 @@
 
 #include "geometry/rounding.h"
 #include "methods/clipping/sign_table.h"
-#include "methods/tracing/trace.h"
 #include "shapes/canonical_order.h"
+#include "shapes/local_measures.h"
+#include "shapes/relation.h"
 
 namespace overlapper {
 namespace {
@@ -159,8 +160,7 @@ void for_each_facet(const Workspace& w, Vec3 middle, Use use) {
 
 /// The volume between the polytope and one whose planes are moved out by `moved`: its area grows on the way.
 double moved_volume(double area, double moved, double least_slack) {
-  const double grown = 1 + moved / least_slack;
-  return moved * area * (grown * grown + grown + 1) / 3;
+  return moved * area * growth(moved, least_slack) / 3;
 }
 
 /// Orthogonal axes as rows, the first across the facet nearest to the middle, the second across the one that is nearest
@@ -198,7 +198,7 @@ double area_by_corners(Workspace& w) {
 /// What a tracer has left, once more about `middle` from corners placed in wider arithmetic. Leaves `common` as it is
 /// where even that is not enough.
 void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reach, double least_slack, Vec3 middle,
-                     ClippedPair& common) {
+                     Measures& measures, Pull& on_first) {
   const Mat3 axes = thin_axes(w, middle);
   const std::optional<double> noise =
       place_in_wide({a, b, w.first.facets, w.apex, w.corners, middle, reach}, axes, w.vertices, w.wide_planes);
@@ -210,21 +210,21 @@ void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reac
   // The axes are at right angles and of length 1 but for a few roundings.
   const double error = moved_volume(area, *noise, least_slack) + sums.volume_rounding() + 16 * 0x1p-53 * sums.volume();
   if (!(error <= kEnough * sums.volume())) return;
-  common.measured = common.widened = true;
-  common.volume = sums.volume();
-  common.volume_error = error;
-  common.area = area;
-  common.centroid = middle + apply_transposed(axes, sums.centroid());
+  measures.measured = true;
+  measures.way = Way::kWideClipping;
+  measures.volume = sums.volume();
+  measures.volume_error = error;
+  measures.area = area;
+  measures.centroid = middle + apply_transposed(axes, sums.centroid());
   const Pull pull = sums.pull();
-  common.pull = apply_transposed(axes, pull.force);
-  common.moment = apply_transposed(axes, pull.moment);
+  on_first = {apply_transposed(axes, pull.force), apply_transposed(axes, pull.moment)};
 }
 
-/// What sums in doubles say, about `middle`. Nothing if a plane passes that nearer than `least_slack`, which becomes
-/// the distance of the nearest.
-std::optional<Clipped> measure(Workspace& w, const Sums& sums, Vec3 middle, double rounding, double& least_slack) {
-  Clipped common;
+/// What sums in doubles say, about `middle`. False if a plane passes that nearer than `least_slack`, which becomes the
+/// distance of the nearest.
+bool measure(Workspace& w, const Sums& sums, Vec3 middle, double rounding, double& least_slack, Measures& common) {
   common.status = Status::kOverlapping;
+  common.way = Way::kClipping;
   common.volume = sums.volume();
   common.centroid = middle + sums.centroid();
   double nearest = kInfinity;
@@ -233,11 +233,11 @@ std::optional<Clipped> measure(Workspace& w, const Sums& sums, Vec3 middle, doub
     nearest = std::min(nearest, slack.distance);
     ++common.facets_touched;
   });
-  if (!(nearest > least_slack)) return std::nullopt;
+  if (!(nearest > least_slack)) return false;
   least_slack = nearest;
   common.volume_error = moved_volume(common.area, rounding, least_slack) + sums.volume_rounding();
   common.measured = common.volume_error <= kEnough * common.volume;
-  return common;
+  return true;
 }
 
 /// The body with more facets comes first, whose coordinates are used; then the order does not depend on the caller's.
@@ -246,79 +246,22 @@ bool comes_first(const Placed& a, const Placed& b) {
   return facets_a != facets_b ? facets_a > facets_b : !comes_before(b, a);
 }
 
-/// Pairs of facets, one of each body, up to which a table of all signs is sooner filled than a seam found: measured
-/// with hulls of 4 to 200 facets, deep and shallow, and boxes.
-constexpr double kLeastPairsTraced = 2500;
-
-bool worth_tracing(const Placed& a, const Placed& b) {
-  return traceable(a, b) && static_cast<double>(facets(a.shape)) * facets(b.shape) > kLeastPairsTraced;
-}
-
-/// How large the numbers are that describe a body in the coordinates of another one.
-double reach_from(const Placed& body, double between) { return between + radius(body.shape) + lost_far_away(body); }
-
-/// What all signs of a pair are computed from: where the second body is in the first one's own coordinates.
-struct Arrangement {
-  Pose pose;
-  double reach;  ///< how large the numbers are
-  double flat;
-  double sign_rounding;
-  bool apart;  ///< the balls around the bodies are
-};
-
-Arrangement arrange(const Placed& a, const Placed& b) {
-  const Pose pose = relative_pose(a.pose, b.pose);
-  const double between = norm(pose.translation), reach = std::max(reach_from(a, 0), reach_from(b, between));
-  const double flat = std::max(flatness(a.shape), flatness(b.shape)), sign_rounding = doubt(reach) + 4 * flat;
-  const bool apart = bounded(b.shape) && between > radius(a.shape) + radius(b.shape) + sign_rounding;
-  return {pose, reach, flat, sign_rounding, apart};
-}
-
-std::optional<ClippedPair> clip_by_table(const Placed& a, const Placed& b) {
-  const auto [pose, reach, flat, sign_rounding, apart] = arrange(a, b);
-  if (apart) return ClippedPair{};
+/// In the coordinates of `a`, with the pull on it; false if doubles cannot tell.
+bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_first) {
+  const auto [pose, reach, flat, doubt, apart] = relation(a, b);
+  if (apart) return true;
   Workspace& w = workspace();
   set_solid(w.first, a, 0, nullptr, 4 * reach);
   set_solid(w.second, b, 1, &pose, 4 * reach);
-  const Signs signs = w.run(sign_rounding);
-  if (signs == Signs::kSeparated) return ClippedPair{};
-  if (signs == Signs::kUncertain) return std::nullopt;
+  const Signs signs = w.run(doubt);
+  if (signs != Signs::kCertain) return signs == Signs::kSeparated;
   const Vec3 middle = centre(w.vertices);
   const Sums sums(w, {1, 1, 1});
-  double least_slack = 4 * sign_rounding;  // rounding might hide what is thinner
-  const std::optional<Clipped> measures = measure(w, sums, middle, rounding(reach) + flat, least_slack);
-  if (!measures) return std::nullopt;
-  ClippedPair common{*measures, {}, {}};
-  if (common.measured) {
-    const Pull pull = sums.pull();
-    common.pull = pull.force, common.moment = pull.moment;
-  } else {
-    measure_widened(w, a, b, reach, least_slack, middle, common);
-  }
-  return common;
-}
-
-std::optional<ClippedPair> clip_by_tracing(const Placed& a, const Placed& b) {
-  const Arrangement at = arrange(a, b);
-  if (at.apart) return ClippedPair{};
-  return trace(a, b, at.pose, at.sign_rounding);
-}
-
-/// Calls `way` with the body first whose coordinates it will use, and says the answer in terms of `a` and the world.
-template <class Way>
-std::optional<ClippedPair> in_order(const Placed& a, const Placed& b, bool swapped, Way way) {
-  const Placed& first = swapped ? b : a;
-  std::optional<ClippedPair> common = way(first, swapped ? a : b);
-  if (!common || common->status != Status::kOverlapping) return common;
-  common->centroid = first.pose * common->centroid;
-  common->pull = first.pose.rotation * common->pull;
-  common->moment = first.pose.rotation * common->moment;
-  if (swapped) {
-    // Not the negatives, which would make negative zeros.
-    common->pull = Vec3{} - common->pull;
-    common->moment = Vec3{} - common->moment;
-  }
-  return common;
+  double least_slack = 4 * doubt;  // rounding might hide what is thinner
+  if (!measure(w, sums, middle, rounding(reach) + flat, least_slack, common)) return false;
+  if (common.measured) on_first = sums.pull();
+  else measure_widened(w, a, b, reach, least_slack, middle, common, on_first);
+  return true;
 }
 
 /// The smallest body first; then the order does not depend on the caller's.
@@ -341,15 +284,14 @@ Ball ball_around(const Solid& solid, double rounding) {
 
 /// Cuts the first of some bodies by the others one after the other, all in its coordinates.
 Signs clip_in_turn(Workspace& w, std::span<const Placed> bodies, std::span<const int> order, double reach,
-                   double sign_rounding) {
+                   double doubt) {
   const Placed& first = bodies[order[0]];
   set_solid(w.first, first, order[0], nullptr, 4 * reach);
   for (int i : order.subspan(1)) {
     const Pose pose = relative_pose(first.pose, bodies[i].pose);
-    if (!set_part(w.second, bodies[i], i, pose, ball_around(w.first, sign_rounding), 4 * reach))
-      return Signs::kSeparated;
+    if (!set_part(w.second, bodies[i], i, pose, ball_around(w.first, doubt), 4 * reach)) return Signs::kSeparated;
     if (w.second.facets == 0) continue;
-    if (const Signs signs = w.run(sign_rounding); signs != Signs::kCertain) return signs;
+    if (const Signs signs = w.run(doubt); signs != Signs::kCertain) return signs;
     w.take_common(4 * reach);
   }
   return Signs::kCertain;
@@ -370,44 +312,43 @@ void add_pulls(const Workspace& w, const Pose& pose, Vec3 centroid, std::vector<
 
 }  // namespace
 
-std::optional<ClippedPair> clip(const Placed& a, const Placed& b) {
-  if (worth_tracing(a, b))
-    if (auto traced = in_order(a, b, comes_before(b, a), clip_by_tracing)) return traced;
-  if (!clippable(a.shape) || !clippable(b.shape) || !(bounded(a.shape) || bounded(b.shape))) return std::nullopt;
-  return in_order(a, b, !comes_first(a, b), clip_by_table);
+std::optional<Measures> clip(const Placed& a, const Placed& b) {
+  const bool swapped = !comes_first(a, b);
+  std::optional<Measures> common(std::in_place);
+  Pull on_first{};
+  if (swapped ? clip_in_first(b, a, *common, on_first) : clip_in_first(a, b, *common, on_first))
+    say_in_world(*common, on_first, a, b, swapped);
+  else common.reset();
+  return common;
 }
 
-std::optional<Region> region_of_clipped(const Placed& a, const Placed& b, Vec3 reference) {
-  const Arrangement at = arrange(a, b);
-  return traced_region(a, b, at.pose, at.sign_rounding, reference);
-}
-
-std::optional<ClippedGroup> clip(std::span<const Placed> bodies) {
-  if (!std::ranges::all_of(bodies, [](const Placed& body) { return clippable(body.shape); })) return std::nullopt;
+std::optional<Measures> clip(std::span<const Placed> bodies) {
   const std::vector<int> order = from_small_to_large(bodies);
   const Placed& first = bodies[order[0]];
-  if (!bounded(first.shape)) return std::nullopt;
-  double reach = 0, flat = 0;
+  double far = 0, flat = 0;
   for (const Placed& body : bodies) {
-    reach = std::max(reach, reach_from(body, norm(body.pose.translation - first.pose.translation)));
+    const double between = norm(body.pose.translation - first.pose.translation);
+    far = std::max(far, reach(body, between + radius(body.shape)));
     flat = std::max(flat, flatness(body.shape));
   }
-  const double sign_rounding = doubt(reach) + 4 * flat;
+  const double doubt = doubt_of_signs(far, flat);
   Workspace& w = workspace();
-  const Signs signs = clip_in_turn(w, bodies, order, reach, sign_rounding);
-  if (signs == Signs::kSeparated) return ClippedGroup{};
+  const Signs signs = clip_in_turn(w, bodies, order, far, doubt);
+  if (signs == Signs::kSeparated) return Measures{};
   if (signs == Signs::kUncertain) return std::nullopt;
   w.show_first();
   const Vec3 middle = centre(w.vertices);
   const Sums sums(w, {1, 1, 1});
   // Every cut moves what is left of an edge off its planes by three half-ulps or less.
-  const double rounded = rounding(reach) + 3 * 0x1p-53 * reach * static_cast<double>(bodies.size()) + flat;
-  double least_slack = 4 * sign_rounding;
-  const std::optional<Clipped> measures = measure(w, sums, middle, rounded, least_slack);
-  if (!measures || !measures->measured) return std::nullopt;
-  ClippedGroup common{*measures, std::vector<Pull>(bodies.size())};
-  add_pulls(w, first.pose, common.centroid - middle, common.pulls);
-  common.centroid = first.pose * common.centroid;
+  const double rounded = rounding(far) + 3 * 0x1p-53 * far * static_cast<double>(bodies.size()) + flat;
+  double least_slack = 4 * doubt;
+  std::optional<Measures> common(std::in_place);
+  if (!measure(w, sums, middle, rounded, least_slack, *common) || !common->measured) return std::nullopt;
+  common->pulls_of_group.resize(bodies.size());
+  add_pulls(w, first.pose, common->centroid - middle, common->pulls_of_group);
+  common->centroid = first.pose * common->centroid;
+  for (size_t i = 0; i < bodies.size(); ++i)
+    common->pulls_of_group[i] = about(common->pulls_of_group[i], common->centroid, bodies[i].position);
   return common;
 }
 

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "geometry/region.h"
 #include "geometry/vec.h"
 #include "shapes/shape.h"
 #include "shapes/wide_body.h"
@@ -44,16 +45,10 @@ struct DeepestBall {
 DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double> reach,
                          std::span<const OwnedPlane> planes, std::span<const OwnedPlane> hints);
 
-/// An affine frame, x = origin + axes * y, in which the common set is round: it holds the ball of radius 1 /
-/// kEccentricity and no dual point is longer than kEccentricity, be it a sliver of any thickness. The origin is the
-/// analytic centre of the planes that matter, and the axes are its Dikin ellipsoid (Nesterov and Nemirovskii 1994,
-/// section 2), so that the dual points of those planes sum to zero and their second moments to the identity.
-template <class Point>
-struct FrameAbout {
-  Point origin;
-  Mat3 axes;
-};
-using Frame = FrameAbout<Vec3>;
+/// How round a common set is in its frame: it holds the ball of radius 1 / kEccentricity and no dual point is longer
+/// than kEccentricity, be it a sliver of any thickness. The origin is the analytic centre of the planes that matter,
+/// and the axes are its Dikin ellipsoid (Nesterov and Nemirovskii 1994, section 2), so that the dual points of those
+/// planes sum to zero and their second moments to the identity.
 inline constexpr double kEccentricity = 16;
 
 /// From a point strictly inside all bodies and the cuts, planes that bound the common set; `planes` as above. For

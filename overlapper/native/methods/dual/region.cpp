@@ -197,46 +197,50 @@ Mat3 inertia_tensor(const Mat3& s) {
 
 }  // namespace
 
-Quantities measure(const Region& region) {
+MeasuresInFull measure(const Region& region, std::span<const Placed> bodies) {
   const Moments in_frame = moments(region.polytope);
   const Mat3& axes = region.frame.axes;
   const double scale = determinant(axes);
-  Quantities q;
-  q.facets_touched = region.facets_touched;
+  Measures m;
+  m.status = Status::kOverlapping;
+  m.way = Way::kDual;
+  m.measured = true;
+  m.facets_touched = region.facets_touched;
   const double outer = scale * in_frame.volume;
   const bool exact = std::all_of(region.inner.begin(), region.inner.end(), [](double t) { return t == 1; });
   const double inner = exact ? outer : scale * inner_volume(region);
   // On a doubly curved surface, a regular facet's tangent polygon leaves 5/12 of the shell between the two polytopes
   // outside of the body and the fan over its pulled-in corners 7/12 inside of it.
-  q.volume = outer - 5.0 / 12.0 * (outer - inner);
+  m.volume = outer - 5.0 / 12.0 * (outer - inner);
 
   const Vec3 centre = in_frame.first_moment / in_frame.volume;
-  q.centroid = region.to_world(centre);
+  m.centroid = region.to_world(centre);
   Mat3 second = in_frame.second_moment;
   second.row0 -= in_frame.volume * centre.x * centre;
   second.row1 -= in_frame.volume * centre.y * centre;
   second.row2 -= in_frame.volume * centre.z * centre;
-  Mat3 moments = axes * second * transposed(axes);
-  for (Vec3* row : {&moments.row0, &moments.row1, &moments.row2}) *row = scale * *row;
-  q.inertia = inertia_tensor(moments);
+  Mat3 spread = axes * second * transposed(axes);
+  for (Vec3* row : {&spread.row0, &spread.row1, &spread.row2}) *row = scale * *row;
 
+  if (bodies.size() > 2) m.pulls_of_group.resize(bodies.size());
   double moved = 0, farthest = 0, least_slack = std::numeric_limits<double>::infinity();
   for (int f = 0; f < region.polytope.facets(); ++f) {
     const Region::Facet& facet = region.facets[f];
     const double area = 3 * scale * in_frame.cone_volume[f] / facet.slack;
-    q.area += area;
-    q.pulls.push_back({facet.owner, area * facet.normal, region.to_world(in_frame.facet_centroid[f])});
+    m.area += area;
+    const Vec3 force = area * facet.normal, at = region.to_world(in_frame.facet_centroid[f]);
+    Pull& pull = bodies.size() > 2 ? m.pulls_of_group[facet.owner] : m.pulls[facet.owner];
+    pull.force += force;
+    pull.moment += cross(at - bodies[facet.owner].position, force);
     moved += area * facet.rounding;
     farthest = std::max(farthest, facet.rounding);
     least_slack = std::min(least_slack, facet.slack);
   }
-  // First order: every plane moved by its rounding. Beyond: planes moved out by r lie inside the polytope scaled by 1 +
-  // r / s about the origin, s the least slack, and so does the area on the way.
-  const double grown = 1 + farthest / least_slack;
-  moved *= (grown * grown + grown + 1) / 3;
+  // First order: every plane moved by its rounding; then the area on the way.
+  moved *= growth(farthest, least_slack) / 3;
   // Then the sums themselves, whose vertices are placed to about a hundred roundings.
-  q.volume_error = 7.0 / 12.0 * (outer - inner) + moved + 256 * DBL_EPSILON * outer;
-  return q;
+  m.volume_error = 7.0 / 12.0 * (outer - inner) + moved + 256 * DBL_EPSILON * outer;
+  return {std::move(m), inertia_tensor(spread)};
 }
 
 }  // namespace overlapper

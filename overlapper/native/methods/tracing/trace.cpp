@@ -4,7 +4,10 @@
 
 #include "distance/portal.h"
 #include "methods/tracing/seam.h"
+#include "shapes/canonical_order.h"
+#include "shapes/local_measures.h"
 #include "shapes/planes_asked.h"
+#include "shapes/relation.h"
 
 namespace overlapper {
 namespace {
@@ -27,8 +30,8 @@ class Tracing {
     return find_seam(normal) && complete() && closed() ? Answer::kTraced : Answer::kUnknown;
   }
 
-  /// Nothing if the planes pass the middle nearer than `least`.
-  std::optional<ClippedPair> measures(double least) const;
+  /// False if the planes pass the middle nearer than `least`.
+  bool measure(double least, Measures& common, Pull& on_first) const;
   Region region(const Placed& a, Vec3 reference);
 
  private:
@@ -364,7 +367,7 @@ struct BlockSums {
   }
 };
 
-std::optional<ClippedPair> Tracing::measures(double least) const {
+bool Tracing::measure(double least, Measures& common, Pull& on_first) const {
   const Vec3 origin = middle();
   const std::array<double, 2> slips{slip(0), slip(1)};
   BlockSums total, block;
@@ -404,30 +407,28 @@ std::optional<ClippedPair> Tracing::measures(double least) const {
     }
   }
   total.add(block);
-  if (!(least_slack > least)) return std::nullopt;
+  if (!(least_slack > least)) return false;
 
-  ClippedPair common;
   common.status = Status::kOverlapping;
-  common.traced = true;
+  common.way = Way::kTracing;
   common.volume = total.six_volumes / 6;
   common.area = total.area;
   const Vec3 centroid = total.moment / (4 * total.six_volumes);
   common.facets_touched = static_cast<int>(facets_.size());
-  Vec3 turn;
   for (const SeamCorner& corner : seam_.corners()) {
     const Pull of_edge = pull_along_border(corner.at - origin, seam_.corners()[corner.next].at - origin);
-    common.pull += of_edge.force;
-    turn += of_edge.moment;
+    on_first.force += of_edge.force;
+    on_first.moment += of_edge.moment;
   }
-  common.moment = turn - cross(centroid, common.pull);
+  on_first.moment = on_first.moment - cross(centroid, on_first.force);
   common.centroid = frame_.origin + (origin + centroid);
   // As for a region: every plane moved by its rounding, growth on the way included. Then each product, and the sums.
-  const double most = std::max(slips[0], slips[1]), grown = 1 + most / least_slack;
+  const double most = std::max(slips[0], slips[1]);
   const double terms = static_cast<double>(most_in_block + facets_.size() / BlockSums::kBlock + 1);
   const double summed = 8 * 0x1p-53 * total.lost / 6 + terms * 0x1p-53 * common.volume;
-  common.volume_error = total.moved * (grown * grown + grown + 1) / 3 + summed;
+  common.volume_error = total.moved * growth(most, least_slack) / 3 + summed;
   common.measured = common.volume_error <= kEnough * common.volume;
-  return common;
+  return true;
 }
 
 /// The lower triangular matrix that makes the identity of a symmetric positive one: m = l lᵀ.
@@ -487,20 +488,29 @@ Tracing& of_this_thread() {
 
 }  // namespace
 
-bool traceable(const Placed& a, const Placed& b) { return has_graph(a.shape) && has_graph(b.shape); }
-
-std::optional<ClippedPair> trace(const Placed& a, const Placed& b, const Pose& pose, double rounding) {
+std::optional<Measures> trace(const Placed& a, const Placed& b) {
+  const bool swapped = comes_before(b, a);
+  const Placed &first = swapped ? b : a, &second = swapped ? a : b;
+  const Relation at = relation(first, second);
+  if (at.apart) return Measures{};
   Tracing& tracing = of_this_thread();
-  const Tracing::Answer answer = tracing.run(a, b, pose, rounding);
+  const Tracing::Answer answer = tracing.run(first, second, at.pose, at.doubt);
+  if (answer == Tracing::Answer::kApart) return Measures{};
   if (answer == Tracing::Answer::kUnknown) return std::nullopt;
-  return answer == Tracing::Answer::kApart ? ClippedPair{} : tracing.measures(rounding);
+  std::optional<Measures> common(std::in_place);
+  Pull on_first{};
+  if (tracing.measure(at.doubt, *common, on_first)) say_in_world(*common, on_first, a, b, swapped);
+  else common.reset();
+  return common;
 }
 
-std::optional<Region> traced_region(const Placed& a, const Placed& b, const Pose& pose, double rounding,
-                                    Vec3 reference) {
+std::optional<Region> traced_region(const Placed& a, const Placed& b, Vec3 reference) {
+  const bool swapped = comes_before(b, a);
+  const Placed &first = swapped ? b : a, &second = swapped ? a : b;
+  const Relation at = relation(first, second);
   Tracing& tracing = of_this_thread();
-  if (tracing.run(a, b, pose, rounding) != Tracing::Answer::kTraced) return std::nullopt;
-  return tracing.region(a, reference);
+  if (tracing.run(first, second, at.pose, at.doubt) != Tracing::Answer::kTraced) return std::nullopt;
+  return tracing.region(first, reference);
 }
 
 }  // namespace overlapper

@@ -1,4 +1,4 @@
-#include "overlap/surface.h"
+#include "overlap/boundary.h"
 
 #include <cstdint>
 #include <limits>
@@ -137,34 +137,34 @@ std::vector<int> contracted(std::span<const int> ring, std::span<const int> grou
 
 }  // namespace
 
-Surface surface_of(const Region& region, int bodies) {
+Boundary boundary_of(const Region& region, int bodies) {
   const Polytope& p = region.polytope;
   int groups = 0;
   const std::vector<int> group = merge_vertices(region, groups);
-  Surface surface;
-  surface.vertices.resize(groups);
+  Boundary boundary;
+  boundary.vertices.resize(groups);
   const std::vector<int> chosen = representatives(p, group, groups);
-  for (int g = 0; g < groups; ++g) surface.vertices[g] = region.to_world(p.vertices[chosen[g]]);
-  surface.ring_start.push_back(0);
+  for (int g = 0; g < groups; ++g) boundary.vertices[g] = region.to_world(p.vertices[chosen[g]]);
+  boundary.ring_start.push_back(0);
   for (int f = 0; f < p.facets(); ++f) {
     const std::vector<int> ring = contracted(p.facet(f), group);
     if (ring.empty()) continue;
-    surface.ring.insert(surface.ring.end(), ring.begin(), ring.end());
-    surface.ring_start.push_back(static_cast<int>(surface.ring.size()));
+    boundary.ring.insert(boundary.ring.end(), ring.begin(), ring.end());
+    boundary.ring_start.push_back(static_cast<int>(boundary.ring.size()));
     const Region::Facet& facet = region.facets[f];
     const double offset = facet.slack + dot(facet.normal, region.frame.origin) + dot(facet.normal, region.reference);
-    surface.planes.push_back({facet.normal, offset});
-    surface.owner.push_back(facet.owner);
+    boundary.planes.push_back({facet.normal, offset});
+    boundary.owner.push_back(facet.owner);
   }
   const Ridges ridges(p);
   std::vector<std::vector<int>> loops;
   for (int owner = 0; owner < (bodies == 2 ? 1 : bodies); ++owner) trace_patch(p, region.facets, ridges, owner, loops);
   for (const auto& loop : loops) {
     std::vector<Vec3> polygon;
-    for (int v : contracted(loop, group)) polygon.push_back(surface.vertices[v]);
-    if (!polygon.empty()) surface.patch.push_back(std::move(polygon));
+    for (int v : contracted(loop, group)) polygon.push_back(boundary.vertices[v]);
+    if (!polygon.empty()) boundary.patch.push_back(std::move(polygon));
   }
-  return surface;
+  return boundary;
 }
 
 }  // namespace overlapper

@@ -7,8 +7,9 @@
 
 namespace overlapper {
 
-/// The surface without the ridges and facets that rounding left of several planes through one point.
-struct Surface {
+/// The boundary of a common set, as it is drawn: its polytope without the ridges and facets that rounding left of
+/// several planes through one point.
+struct Boundary {
   std::vector<Vec3> vertices;
   std::vector<int> ring, ring_start;
   std::vector<Plane> planes;
@@ -19,7 +20,7 @@ struct Surface {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
   }
 };
-/// The surface of the common set of that many bodies.
-Surface surface_of(const Region& region, int bodies);
+/// Of the common set of that many bodies.
+Boundary boundary_of(const Region& region, int bodies);
 
 }  // namespace overlapper

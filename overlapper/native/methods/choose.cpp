@@ -1,0 +1,299 @@
+#include "methods/choose.h"
+
+#include <cassert>
+#include <limits>
+#include <stdexcept>
+
+#include "distance/gjk.h"
+#include "distance/wide_gap.h"
+#include "geometry/expanding_hull.h"
+#include "geometry/predicates.h"
+#include "geometry/rounding.h"
+#include "methods/clipping/clip.h"
+#include "methods/closed_forms.h"
+#include "methods/tracing/close_body.h"
+#include "methods/tracing/trace.h"
+#include "shapes/canonical_order.h"
+#include "shapes/planes_asked.h"
+
+namespace overlapper {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool clippable(const Shape& shape) {
+  if (const Hull* hull = std::get_if<Hull>(&shape))
+    return !hull->data->edges.empty() && hull->data->planes.size() <= kMostFacetsClipped;
+  return std::holds_alternative<Box>(shape) || std::holds_alternative<HalfSpace>(shape);
+}
+
+bool rounded(const Shape& shape) { return std::holds_alternative<RoundedHull>(shape); }
+
+Traits traits(const Shape& shape) {
+  return {1, bounded(shape), clippable(shape), false, smooth(shape) && !rounded(shape), rounded(shape)};
+}
+
+Traits operator+(const Traits& a, const Traits& b) {
+  return {a.bodies + b.bodies, a.bounded || b.bounded, a.clippable && b.clippable, false,
+          a.round || b.round,  a.rounded || b.rounded};
+}
+
+/// Line by line, so that the compiler sees what each asks: a search through pointers is felt by two boxes apart.
+template <size_t kLine>
+const Choice& first_that_fits(const Traits& traits) {
+  constexpr const Choice& choice = kChoices[kLine];
+  if constexpr (kLine + 1 == kChoices.size()) return choice;
+  else return choice.fits(traits) ? choice : first_that_fits<kLine + 1>(traits);
+}
+
+}  // namespace
+
+Traits traits(const Placed& a, const Placed& b) {
+  Traits both = traits(a.shape) + traits(b.shape);
+  both.many_facet_pairs = has_graph(a.shape) && has_graph(b.shape) &&
+                          static_cast<double>(facets(a.shape)) * facets(b.shape) > kLeastPairsTraced;
+  return both;
+}
+
+Traits traits(std::span<const Placed> bodies) {
+  if (bodies.size() == 2) return traits(bodies[0], bodies[1]);
+  Traits all = traits(bodies[0].shape);
+  for (const Placed& body : bodies.subspan(1)) all = all + traits(body.shape);
+  return all;
+}
+
+const Choice& choose(const Traits& traits) { return first_that_fits<0>(traits); }
+
+std::optional<Measures> measure_at_once(const Placed& a, const Placed& b) {
+  const Choice& choice = choose(traits(a, b));
+  if (choice.tries(Way::kTracing))
+    if (auto measures = trace(a, b)) return measures;
+  return choice.tries(Way::kClipping) ? clip(a, b) : std::nullopt;
+}
+
+std::optional<Measures> measure_at_once(std::span<const Placed> bodies) {
+  if (bodies.size() == 2) return measure_at_once(bodies[0], bodies[1]);
+  return choose(traits(bodies)).tries(Way::kClipping) ? clip(bodies) : std::nullopt;
+}
+
+// ------------------------------------------------------------------------------------------------------------- search
+
+Arrangement arranged(std::span<const Placed> bodies) {
+  Arrangement at{canonical_order(bodies), {}, {}};
+  at.reference = bodies[at.order[0]].pose.translation;
+  at.relative.reserve(bodies.size());
+  for (int body : at.order) at.relative.push_back(bodies[body].seen_from(at.reference));
+  return at;
+}
+
+std::vector<WideBody> Arrangement::wide_bodies() const {
+  std::vector<WideBody> bodies;
+  for (const Placed& body : relative) bodies.emplace_back(body, wide(reference));
+  return bodies;
+}
+
+double magnitude(const Placed& relative) {
+  if (const HalfSpace* half = std::get_if<HalfSpace>(&relative.shape))
+    return norm(relative.pose.translation) + std::abs(half->plane.offset);
+  const Bounds box = bounds(relative);
+  return reach(relative, norm(max(abs(box.lower), abs(box.upper)))) + flatness(relative.shape) / rounding(1);
+}
+
+double wide_rounding(double reach) { return 0x1p-96 * reach; }
+
+namespace {
+
+/// True if one of the bodies is bounded, or the half-spaces close up: the origin is strictly inside the hull of their
+/// normals.
+bool bounds_space(std::span<const Placed> bodies) {
+  ExpandingHull normals;
+  for (const Placed& body : bodies) {
+    const HalfSpace* half = std::get_if<HalfSpace>(&body.shape);
+    if (!half) return true;
+    normals.points.push_back(body.pose.rotation * half->plane.normal);
+  }
+  if (!normals.build()) return false;
+  for (const ExpandingHull::Facet& facet : normals.facets) {
+    if (facet.removed()) continue;
+    const auto [a, b, c] = facet.vertex;
+    if (orientation(normals.points[a], normals.points[b], normals.points[c], {}) >= 0) return false;
+  }
+  return true;
+}
+
+void append_planes(const Placed& body, std::vector<Plane>& planes) {
+  append_planes(body.shape, planes);
+  for (Plane& plane : planes) plane = body.pose * plane;
+}
+void append_planes(const WideBody& body, std::vector<WidePlane>& planes) { body.append_planes(planes); }
+
+template <class Body>
+std::vector<Owned<PlaneOf<Body>>> gather_planes(std::span<const Body> bodies) {
+  std::vector<Owned<PlaneOf<Body>>> planes;
+  std::vector<PlaneOf<Body>> own;
+  for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
+    own.clear();
+    append_planes(bodies[i], own);
+    for (const PlaneOf<Body>& plane : own) planes.push_back({plane, i});
+  }
+  planes_asked += planes.size();
+  return planes;
+}
+
+/// Two planes that face each other across the gap of a pair, or across the lens of two smooth bodies.
+std::vector<OwnedPlane> facing_planes(std::span<const Placed> bodies, const Distance& d) {
+  if (norm2(d.normal) == 0) return {};
+  std::vector<OwnedPlane> planes;
+  for (int i = 0; i < 2; ++i) {
+    if (!bounded(bodies[i].shape)) continue;
+    const Vec3 outward = i == 0 ? -d.normal : d.normal;
+    planes.push_back({{outward, dot(outward, bodies[i].support(outward))}, i});
+  }
+  return planes;
+}
+
+/// Where doubles are not sure of a gap or of a common ball. The sizes that count are the same for a mirror image, for
+/// other axes and for another order.
+void settle_in_wide_arithmetic(const Arrangement& at, Search& search) {
+  const double noise = wide_rounding(search.reach);
+  double least_size = kInfinity, largest_size = 0;
+  for (const Placed& body : at.relative) {
+    if (!bounded(body.shape)) continue;
+    const Bounds box = bounds(body);
+    const double size = norm(box.upper - box.lower);
+    least_size = std::min(least_size, size);
+    largest_size = std::max(largest_size, size);
+  }
+  if (!std::isfinite(least_size)) return;
+  const std::vector<WideBody> bodies = at.wide_bodies();
+  // Nearer or thinner than the rounding of their coordinates, bodies touch, but not by 1e-12 of the smaller one's size.
+  const double margin = std::max(4 * noise, std::min(rounding(largest_size / 2), 0x1p-41 * least_size));
+  std::vector<OwnedPlane> hints = search.ball.cuts;
+  if (bodies.size() == 2) {
+    const WideGap gap = wide_gap(bodies[0], bodies[1], noise);
+    if (gap.certified > margin) {
+      search.status = Status::kSeparated;
+      search.way = Way::kWideSeparation;
+      return;
+    }
+    if (norm2(gap.normal) > 0) hints.insert(hints.end(), {{{-gap.normal, 0}, 0}, {{gap.normal, 0}, 1}});
+  }
+  search.wide_ball = wide_deepest_ball(bodies, hints, margin, search.reach, noise);
+  if (search.wide_ball->upper < -margin) search.status = Status::kSeparated, search.way = Way::kWideSeparation;
+  if (search.wide_ball->lower > margin) search.status = Status::kOverlapping, search.way = Way::kWideDual;
+  search.ball.upper = search.wide_ball->upper;
+  search.ball.rounding = noise;
+}
+
+Region owned_as_given(Region region, const Arrangement& at) {
+  for (Region::Facet& facet : region.facets) facet.owner = at.order[facet.owner];
+  return region;
+}
+
+Region grown_about(const WideBall& ball, const Arrangement& at, double reach, double tolerance) {
+  const std::vector<WideBody> bodies = at.wide_bodies();
+  const std::vector<Owned<WidePlane>> planes = gather_planes<WideBody>(bodies);
+  const FrameAbout<WideVector> frame = round_frame<WideBody>(bodies, planes, ball.cuts, ball.centre);
+  return owned_as_given(grow<WideBody>(bodies, planes, frame, tolerance, wide_rounding(reach), at.reference), at);
+}
+
+}  // namespace
+
+Search search(const Arrangement& at) {
+  const std::vector<Placed>& bodies = at.relative;
+  const Choice& choice = choose(traits(bodies));
+  Search search;
+  std::vector<double> reaches;
+  for (const Placed& body : bodies) reaches.push_back(magnitude(body));
+  search.reach = *std::ranges::max_element(reaches);
+  std::vector<OwnedPlane> hints;
+  if (bodies.size() == 2 && (bounded(bodies[0].shape) || bounded(bodies[1].shape))) {
+    const Distance d = distance(bodies[0], bodies[1]);
+    if (d.gap > doubt(search.reach)) return search;
+    hints = facing_planes(bodies, d);
+  }
+  search.planes = gather_planes<Placed>(bodies);
+  search.ball = deepest_ball(bodies, reaches, search.planes, hints);
+  if (search.ball.sure) {
+    search.status = Status::kOverlapping, search.way = Way::kDual;
+  } else if (!search.ball.apart) {
+    search.status = Status::kTouching, search.way = Way::kDoubt;
+    if (choice.in_doubt == Way::kWideDual) settle_in_wide_arithmetic(at, search);
+  }
+  if (search.status != Status::kSeparated && !bounds_space(bodies))
+    throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
+  return search;
+}
+
+double touching_volume(std::span<const Placed> bodies, const DeepestBall& ball) {
+  double least = kInfinity;
+  const double inradius = std::max(0.0, ball.upper) + ball.rounding;
+  for (const Placed& body : bodies) {
+    if (!bounded(body.shape)) continue;
+    const Bounds box = bounds(body);
+    const Vec3 side = box.upper - box.lower;
+    least = std::min(least, 2 * inradius * (side.x * side.y + side.y * side.z + side.z * side.x));
+  }
+  return least;
+}
+
+// ----------------------------------------------------------------------------------------------------------- measures
+
+Region grown(const Arrangement& at, const Search& found, double tolerance) {
+  if (found.wide_ball) return grown_about(*found.wide_ball, at, found.reach, tolerance);
+  const Frame frame = round_frame<Placed>(at.relative, found.planes, found.ball.cuts, found.ball.centre);
+  return owned_as_given(grow<Placed>(at.relative, found.planes, frame, tolerance, rounding(found.reach), at.reference),
+                        at);
+}
+
+namespace {
+
+/// The formula's answer where it is as good as a polytope's: where its terms nearly cancel, that knows more.
+std::optional<Measures> by_formula(const Findings& known, double finest) {
+  const Arrangement& at = known.at;
+  auto measures = closed_form(at.relative[0], at.relative[1], rounding(known.search().reach), at.reference);
+  if (!measures || measures->volume_error > finest * measures->volume) return std::nullopt;
+  if (at.order[0] == 1) std::swap(measures->pulls[0], measures->pulls[1]);
+  return measures;
+}
+
+MeasuresInFull by_region(const Region& region, std::span<const Placed> bodies, Way way) {
+  MeasuresInFull answer = measure(region, bodies);
+  answer.measures.way = way;
+  return answer;
+}
+
+}  // namespace
+
+MeasuresInFull measure_in_full(const Findings& known) {
+  const Arrangement& at = known.at;
+  const bool searched_wide = !known.traced && known.search().wide_ball;
+  if (searched_wide) return by_region(known.region(), known.bodies, Way::kWideDual);
+  const Choice& choice = choose(traits(known.bodies));
+  const double finest = std::max(known.tolerance, kFinest);
+  MeasuresInFull kept;
+  if (auto formula = choice.tries(Way::kClosedForm) ? by_formula(known, finest) : std::nullopt)
+    kept.measures = std::move(*formula);
+  else kept = by_region(known.region(), known.bodies, known.traced ? Way::kTracing : Way::kDual);
+  const auto keep_better = [&](const Region& region) {
+    MeasuresInFull again = by_region(region, known.bodies, Way::kWideDual);
+    if (!widened(kept.measures.way) || again.measures.volume_error < kept.measures.volume_error)
+      kept = std::move(again);
+  };
+  const bool polyhedral = std::ranges::none_of(known.bodies, [](const Placed& body) { return smooth(body.shape); });
+  const auto enough = [&] { return kept.measures.volume_error <= kEnough * kept.measures.volume; };
+  if (polyhedral && !enough())
+    if (auto wide = widened(at.relative, known.region())) keep_better(owned_as_given(std::move(*wide), at));
+  const auto reach = [&] { return known.search().reach; };
+  if (polyhedral ? !enough() : rounding(reach()) * kept.measures.area > finest * kept.measures.volume) {
+    // The point about which the region was grown may not be inside after all, or its frame not be round.
+    const double noise = wide_rounding(reach());
+    const WideBall ball = wide_deepest_ball(at.wide_bodies(), known.search().ball.cuts, 4 * noise, reach(), noise);
+    if (ball.lower > 0) keep_better(grown_about(ball, at, reach(), known.tolerance));
+    else if (polyhedral)
+      kept.measures.volume_error += kept.measures.volume + touching_volume(known.bodies, known.search().ball);
+  }
+  return kept;
+}
+
+}  // namespace overlapper

@@ -1,0 +1,129 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <optional>
+#include <span>
+
+#include "geometry/measures.h"
+#include "methods/dual/deepest_ball.h"
+#include "methods/dual/region.h"
+#include "methods/dual/wide_ball.h"
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// Pairs of facets, one of each body, up to which a table of all signs is sooner filled than a seam is found.
+inline constexpr double kLeastPairsTraced = 2500;
+
+/// Facets of a hull beyond which asking every corner of one body about every plane of the other takes longer than the
+/// hull of the dual points.
+inline constexpr size_t kMostFacetsClipped = 1024;
+
+/// The error of a volume, relative to it, that a region of as many planes as it may have reaches on a round body: a
+/// smaller tolerance is not worth another way.
+inline constexpr double kFinest = 1e-7;
+
+/// What the choice of a way depends on.
+struct Traits {
+  int bodies;
+  bool bounded;           ///< one of them is
+  bool clippable;         ///< half-spaces, boxes, closed hulls of at most kMostFacetsClipped facets
+  bool many_facet_pairs;  ///< two boxes or hulls that can be climbed, with more than kLeastPairsTraced
+  bool round;             ///< one of them is a ball, a capsule or a cylinder
+  bool rounded;           ///< one of them is a rounded hull
+};
+Traits traits(const Placed& a, const Placed& b);
+Traits traits(std::span<const Placed> bodies);
+
+/// A line of the table: which bodies, the ways that are tried in turn until one answers, and what is left where doubles
+/// cannot tell the status. Before kDual, the status is found by a search for a plane between the bodies or a ball
+/// inside all of them; where kDual leaves more than kEnough of the volume in doubt, kWideDual follows it.
+struct Choice {
+  const char* bodies;
+  bool (*fits)(const Traits&);
+  std::array<Way, 4> ways;  ///< up to kDual, which always answers
+  Way in_doubt;
+
+  bool tries(Way way) const { return std::ranges::find(ways, way) != ways.end(); }
+};
+
+/// How bodies are measured. The first line that fits counts, for single calls, batches and groups alike.
+inline constexpr std::array<Choice, 6> kChoices{{
+    {"two boxes or hulls of many facets",
+     [](const Traits& t) { return t.many_facet_pairs && t.clippable; },
+     {Way::kTracing, Way::kClipping, Way::kWideClipping, Way::kDual},
+     Way::kWideDual},
+    {"two boxes or hulls, one of very many facets",
+     [](const Traits& t) { return t.many_facet_pairs; },
+     {Way::kTracing, Way::kDual},
+     Way::kWideDual},
+    {"two or more boxes, hulls and half-spaces",
+     [](const Traits& t) { return t.clippable && t.bounded; },
+     {Way::kClipping, Way::kWideClipping, Way::kDual},
+     Way::kWideDual},
+    {"two, one of them a ball, a capsule or a cylinder, and no rounded hull",
+     [](const Traits& t) { return t.bodies == 2 && t.round && !t.rounded; },
+     {Way::kClosedForm, Way::kDual},
+     Way::kWideDual},
+    // Their oracle knows the nearest point of a polytope in doubles only.
+    {"two or more, with a rounded hull", [](const Traits& t) { return t.rounded; }, {Way::kDual}, Way::kDoubt},
+    {"all others", [](const Traits&) { return true; }, {Way::kDual}, Way::kWideDual},
+}};
+const Choice& choose(const Traits& traits);
+
+/// What the ways before the search give: the status beyond doubt, and the measures where doubles, or corners in
+/// double-doubles, place the volume within kEnough of itself. Nothing where signs are in doubt, and for round bodies.
+std::optional<Measures> measure_at_once(const Placed& a, const Placed& b);
+std::optional<Measures> measure_at_once(std::span<const Placed> bodies);
+
+/// Bodies in the order in which they are computed with, about a reference near them: the bits of an answer then do not
+/// depend on the caller's order, and keep the digits that coordinates of the world would lose.
+struct Arrangement {
+  std::vector<int> order;
+  std::vector<Placed> relative;
+  Vec3 reference;
+
+  std::vector<WideBody> wide_bodies() const;
+};
+Arrangement arranged(std::span<const Placed> bodies);
+
+/// What is found by looking for a plane between the bodies, then for the largest ball inside all of them.
+struct Search {
+  Status status = Status::kSeparated;
+  Way way = Way::kSeparation;      ///< by which the status is known; kDual or kWideDual if overlapping
+  double reach = 0;                ///< how large the numbers are that describe the bodies
+  std::vector<OwnedPlane> planes;  ///< of all bodies
+  DeepestBall ball{};
+  std::optional<WideBall> wide_ball;  ///< where it had to be looked for in double-doubles
+};
+/// Throws std::invalid_argument if the common set is unbounded.
+Search search(const Arrangement& at);
+
+/// m³: what the common set of bodies that only touch may hold. The inradius is rounding, and a convex set's volume is
+/// at most its inradius times its surface, which is no larger than that of a box around any of the bodies.
+double touching_volume(std::span<const Placed> bodies, const DeepestBall& ball);
+
+/// How large the numbers are that describe a body about the point from which `relative` counts, the corners that its
+/// facets miss included.
+double magnitude(const Placed& relative);
+
+/// m: how far rounding in double-double may move a plane of bodies that reach so far.
+double wide_rounding(double reach);
+
+/// The polytope of bodies that overlap, by dual points; owners are numbers of the bodies as given.
+Region grown(const Arrangement& at, const Search& found, double tolerance);
+
+/// Measures of bodies that overlap, where measure_at_once() has none.
+struct Findings {
+  const Arrangement& at;
+  std::span<const Placed> bodies;
+  double tolerance;
+  bool traced;
+  std::function<const Search&()> search;
+  std::function<const Region&()> region;  ///< owners are numbers of `bodies`
+};
+MeasuresInFull measure_in_full(const Findings& known);
+
+}  // namespace overlapper

@@ -1,0 +1,25 @@
+#pragma once
+
+#include "distance/least_translation.h"
+#include "geometry/measures.h"
+#include "methods/choose.h"
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// How a pair touches, or how far it is apart.
+struct Contact {
+  double distance = 0;  ///< m; 0 unless separated
+  double depth = 0;     ///< m; 0 unless overlapping
+  Vec3 normal;          ///< unit, from b to a
+  Vec3 witness_a, witness_b;
+  Plane separating;  ///< a where dot(normal, x) >= offset, b on the other side; meaningless if overlapping
+};
+
+/// The contact of a pair that overlaps beyond the doubt of its signs.
+Penetration penetration_in_order(const Placed& a, const Placed& b);
+
+/// The contact of a pair of which more is in doubt. Method "paper" may call apart what is not, and does not search.
+Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, const WideBall* wide_ball);
+
+}  // namespace overlapper

@@ -1,0 +1,21 @@
+#pragma once
+
+#include "geometry/measures.h"
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// Says in the world what was measured in the coordinates of `a`, or of `b` if `swapped`, with the pull on that body
+/// about the centroid; the other body has the opposite.
+inline void say_in_world(Measures& measures, Pull pull, const Placed& a, const Placed& b, bool swapped) {
+  if (measures.status != Status::kOverlapping) return;
+  const Pose& pose = (swapped ? b : a).pose;
+  measures.centroid = pose * measures.centroid;
+  pull = {pose.rotation * pull.force, pose.rotation * pull.moment};
+  // Not the negatives, which would make negative zeros.
+  if (swapped) pull = {Vec3{} - pull.force, Vec3{} - pull.moment};
+  measures.pulls = {about(pull, measures.centroid, a.position),
+                    about({-pull.force, -pull.moment}, measures.centroid, b.position)};
+}
+
+}  // namespace overlapper
