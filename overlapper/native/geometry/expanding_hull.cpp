@@ -1,6 +1,9 @@
 #include "geometry/expanding_hull.h"
 
+#include <algorithm>
 #include <cassert>
+#include <tuple>
+#include <utility>
 
 #include "geometry/predicates.h"
 
@@ -83,6 +86,52 @@ bool ExpandingHull::start() {
   facets[2].neighbour = {1, 3, 0};
   facets[3].neighbour = {2, 1, 0};
   return true;
+}
+
+bool ExpandingHull::assemble(std::span<const std::array<int, 3>> triangles) {
+  facets.clear();
+  visited_.clear();
+  struct Side {
+    int low, high, facet, number;
+  };
+  std::vector<Side> sides;
+  for (const auto& [a, b, c] : triangles) {
+    if (a == b || b == c || c == a) return false;
+    const int facet = make_facet(a, b, c);
+    for (int i = 0; i < 3; ++i) {
+      const auto [low, high] = std::minmax(facets[facet].vertex[i], facets[facet].vertex[(i + 1) % 3]);
+      sides.push_back({low, high, facet, i});
+    }
+  }
+  std::sort(sides.begin(), sides.end(), [](const Side& s, const Side& t) {
+    return std::tie(s.low, s.high, s.facet) < std::tie(t.low, t.high, t.facet);
+  });
+  if (sides.empty() || sides.size() % 2 != 0) return false;
+  for (size_t i = 0; i < sides.size(); i += 2) {
+    const Side &s = sides[i], &t = sides[i + 1];
+    Facet &f = facets[s.facet], &g = facets[t.facet];
+    const bool again = i > 0 && sides[i - 1].low == s.low && sides[i - 1].high == s.high;
+    if (again || s.low != t.low || s.high != t.high || f.vertex[s.number] == g.vertex[t.number]) return false;
+    f.neighbour[s.number] = t.facet;
+    g.neighbour[t.number] = s.facet;
+    if (sees(s.facet, g.vertex[(t.number + 2) % 3]) || sees(t.facet, f.vertex[(s.number + 2) % 3])) return false;
+  }
+  // Of surfaces in one piece, only a sphere's has Euler's characteristic 2, and only that bounds a convex solid.
+  std::vector<char> met(facets.size(), false), used(points.size(), false);
+  std::vector<int> stack{0};
+  met[0] = true;
+  size_t reached = 0;
+  while (!stack.empty()) {
+    const Facet& f = facets[stack.back()];
+    stack.pop_back();
+    ++reached;
+    for (int i = 0; i < 3; ++i) {
+      used[f.vertex[i]] = true;
+      if (!std::exchange(met[f.neighbour[i]], true)) stack.push_back(f.neighbour[i]);
+    }
+  }
+  const bool all_used = std::ranges::all_of(used, [](char each) { return each; });
+  return reached == facets.size() && all_used && points.size() + facets.size() == sides.size() / 2 + 2;
 }
 
 int ExpandingHull::add(Vec3 point) {

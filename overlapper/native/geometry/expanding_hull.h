@@ -36,6 +36,10 @@ class ExpandingHull {
   /// signs with them.
   bool start();
 
+  /// Takes triangles, of indices of `points`, for its facets, in that order; false unless they are one closed convex
+  /// surface: two run along every ridge, each the other way, and neither sees the third corner of the other.
+  bool assemble(std::span<const std::array<int, 3>> triangles);
+
   /// Adds a point to be inserted later; its number. Coordinates are flushed as by start().
   int add(Vec3 point);
 

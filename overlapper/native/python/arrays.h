@@ -126,6 +126,29 @@ inline double to_double(nb::handle value, const std::string& name) {
   }
 }
 
+/// Whole numbers of any width, in one dimension or in rows: copied, so that nobody can change them meanwhile.
+inline std::vector<std::int64_t> to_indices(nb::handle value, const std::string& name, int columns = 0) {
+  const std::string expected = columns
+                                   ? "must be an array of whole numbers of shape (p, " + std::to_string(columns) + ")"
+                                   : "must be an array of whole numbers";
+  nb::object array;
+  try {
+    const nb::module_ numpy = nb::module_::import_("numpy");
+    array = numpy.attr("asarray")(value);
+    // An empty list has no type of its own.
+    if (nb::cast<size_t>(array.attr("size")) == 0) array = array.attr("astype")("int64");
+    array = array.attr("astype")("int64", "order"_a = "C", "casting"_a = "same_kind");
+  } catch (nb::python_error& error) {
+    if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_TypeError) && !error.matches(PyExc_OverflowError))
+      throw;
+    fail(name, expected);
+  }
+  const auto rows = nb::cast<nb::ndarray<const std::int64_t, nb::c_contig, nb::device::cpu>>(array);
+  const bool in_shape = columns ? rows.ndim() == 2 && rows.shape(1) == static_cast<size_t>(columns) : rows.ndim() == 1;
+  if (!in_shape && rows.size() > 0) fail(name, expected);
+  return {rows.data(), rows.data() + rows.size()};
+}
+
 inline std::vector<Vec3> to_rows(nb::handle value, const std::string& name) {
   const std::string expected = "an array of numbers of shape (n, 3)";
   const Doubles array = to_doubles(value, name, expected);

@@ -9,8 +9,6 @@
 namespace overlapper::python {
 namespace {
 
-using Pairs = nb::ndarray<const int, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-
 std::vector<Shape> to_shapes(nb::handle given) {
   if (!PySequence_Check(given.ptr())) throw nb::type_error("shapes must be a sequence of shapes");
   std::vector<Shape> shapes;
@@ -19,34 +17,24 @@ std::vector<Shape> to_shapes(nb::handle given) {
   return shapes;
 }
 
-/// (k, columns) numbers, one row per shape.
-std::pair<Doubles, std::span<const double>> to_poses(nb::handle given, const char* name, size_t k, size_t columns) {
+/// (k, columns) numbers, one row per shape: copied, as other threads may write to the array while this one works.
+std::vector<double> to_poses(nb::handle given, const char* name, size_t k, size_t columns) {
   const std::string expected = "an array of shape (k, " + std::to_string(columns) + "), one row per shape";
-  Doubles array = to_doubles(given, name, expected);
+  const Doubles array = to_doubles(given, name, expected);
   if (array.ndim() != 2 || array.shape(0) != k || array.shape(1) != columns)
     fail(name, "must be " + expected + ", not of shape " + shape_text(array));
-  return {array, std::span(array.data(), k * columns)};
+  return {array.data(), array.data() + k * columns};
 }
 
-Pairs to_pairs(nb::handle given, size_t k) {
-  nb::object array;
-  const nb::module_ numpy = nb::module_::import_("numpy");
-  try {
-    // An empty list has no type of its own.
-    nb::object as_given = numpy.attr("asarray")(given);
-    if (nb::len(as_given) == 0) as_given = numpy.attr("empty")(nb::make_tuple(0, 2), "dtype"_a = "int32");
-    array =
-        numpy.attr("ascontiguousarray")(as_given.attr("astype")("int32", "casting"_a = "same_kind", "copy"_a = false));
-  } catch (nb::python_error& error) {
-    if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_TypeError)) throw;
-    fail("pairs", "must be an array of whole numbers of shape (p, 2)");
-  }
-  if (nb::cast<int>(array.attr("ndim")) != 2 || nb::cast<size_t>(array.attr("shape")[1]) != 2)
-    fail("pairs", "must be an array of whole numbers of shape (p, 2)");
-  const Pairs pairs = nb::cast<Pairs>(array);
-  for (size_t i = 0; i < 2 * pairs.shape(0); ++i)
-    if (pairs.data()[i] < 0 || pairs.data()[i] >= static_cast<int>(k))
-      fail("pairs", "must index the " + std::to_string(k) + " shapes, not " + std::to_string(pairs.data()[i]));
+std::vector<IndexPair> to_pairs(nb::handle given, size_t k) {
+  const std::vector<std::int64_t> flat = to_indices(given, "pairs", 2);
+  std::vector<IndexPair> pairs;
+  pairs.reserve(flat.size() / 2);
+  for (std::int64_t i : flat)
+    if (i < 0 || i >= static_cast<std::int64_t>(k))
+      fail("pairs", "must index the " + std::to_string(k) + " shapes, not " + std::to_string(i));
+  for (size_t i = 0; i < flat.size(); i += 2)
+    pairs.push_back({static_cast<int>(flat[i]), static_cast<int>(flat[i + 1])});
   return pairs;
 }
 
@@ -67,17 +55,14 @@ nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orienta
                           nb::handle tolerance_given, nb::handle threads_given, nb::handle method_name,
                           bool separated) {
   const size_t k = batch.shapes().size();
-  const auto [position_array, p] = to_poses(positions, "positions", k, 3);
-  const auto [orientation_array, q] = to_poses(orientations, "orientations", k, 4);
+  const std::vector<double> p = to_poses(positions, "positions", k, 3);
+  const std::vector<double> q = to_poses(orientations, "orientations", k, 4);
   const double tolerance = to_double(tolerance_given, "tolerance");
   const int threads = to_threads(threads_given);
   const Method method = to_method(method_name);
-  std::optional<Pairs> given;
-  std::optional<std::span<const IndexPair>> span;
-  if (!pairs.is_none()) {
-    given = to_pairs(pairs, k);
-    span = std::span(reinterpret_cast<const IndexPair*>(given->data()), given->shape(0));
-  }
+  std::optional<std::vector<IndexPair>> given;
+  if (!pairs.is_none()) given = to_pairs(pairs, k);
+  const std::optional<std::span<const IndexPair>> span = given;
   bool finished = false;
   Overlaps found;
   {
@@ -93,8 +78,8 @@ nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orienta
 
 nb::object candidates(Batch& batch, nb::handle positions, nb::handle orientations) {
   const size_t k = batch.shapes().size();
-  const auto [position_array, p] = to_poses(positions, "positions", k, 3);
-  const auto [orientation_array, q] = to_poses(orientations, "orientations", k, 4);
+  const std::vector<double> p = to_poses(positions, "positions", k, 3);
+  const std::vector<double> q = to_poses(orientations, "orientations", k, 4);
   std::vector<IndexPair> pairs;
   {
     const nb::gil_scoped_release release;

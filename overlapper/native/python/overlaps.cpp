@@ -267,10 +267,16 @@ volume in m³. Raises CertificateError where there is none.)");
       nb::sig("def __getstate__(self) -> tuple[object, ...]"));
   cls.def(
       "__setstate__",
-      [](Overlap& self, nb::tuple state) {
+      [](Overlap& self, nb::handle state) {
+        if (!nb::isinstance<nb::tuple>(state) || nb::len(state) != 3 || !nb::isinstance<nb::tuple>(state[0]))
+          throw nb::value_error("state must be that of an overlap");
         std::vector<Placed> bodies;
-        for (nb::handle shape : nb::tuple(state[0])) bodies.push_back(nb::cast<Placed>(shape));
-        new (&self) Overlap(std::move(bodies), nb::cast<double>(state[1]), to_method(state[2]));
+        for (nb::handle shape : state[0]) {
+          if (!nb::isinstance<Placed>(shape)) throw nb::value_error("state must be that of an overlap");
+          bodies.push_back(nb::cast<Placed>(shape));
+        }
+        const double tolerance = to_double(state[1], "tolerance");
+        new (&self) Overlap(std::move(bodies), tolerance, to_method(state[2]));
       },
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }

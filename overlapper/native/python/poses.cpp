@@ -57,18 +57,18 @@ nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handl
     frames.push_back(to_frame(each));
     frames.back().orientation = unit(frames.back().orientation);
   }
-  const auto which = nb::cast<nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>>(which_given);
+  const std::vector<std::int64_t> which = to_indices(which_given, "which");
   const Doubles local_positions = to_doubles(positions_given, "positions", "an array of shape (k, 3)");
   const Doubles local_orientations = to_doubles(orientations_given, "orientations", "an array of shape (k, 4)");
-  const size_t k = which.shape(0);
+  const size_t k = which.size();
   if (local_positions.ndim() != 2 || local_positions.shape(0) != k || local_positions.shape(1) != 3)
     fail("positions", "must have the shape (k, 3), a row for each of `which`");
   if (local_orientations.ndim() != 2 || local_orientations.shape(0) != k || local_orientations.shape(1) != 4)
     fail("orientations", "must have the shape (k, 4), a row for each of `which`");
   std::vector<double> positions(3 * k), orientations(4 * k);
   for (size_t i = 0; i < k; ++i) {
-    if (which(i) < 0 || which(i) >= std::int64_t(frames.size())) fail("which", "must index the frames");
-    const Frame& frame = frames[which(i)];
+    if (which[i] < 0 || which[i] >= std::int64_t(frames.size())) fail("which", "must index the frames");
+    const Frame& frame = frames[which[i]];
     const double *p = local_positions.data() + 3 * i, *q = local_orientations.data() + 4 * i;
     const Vec3 x = frame.position + rotated(frame.orientation, {p[0], p[1], p[2]});
     const Quaternion r = frame.orientation * Quaternion{q[0], q[1], q[2], q[3]};

@@ -1,4 +1,5 @@
 #include <cfloat>
+#include <limits>
 #include <sstream>
 
 #include "geometry/polytope.h"
@@ -143,34 +144,27 @@ nb::tuple hull_state(const Hull& hull) {
       nb::cast(to_numpy(d.corners), nb::rv_policy::move), triples(d.triangles), triples(d.facet_corners));
 }
 
-Hull hull_from_state(nb::tuple state) {
-  auto data = std::make_shared<HullData>();
-  data->origin = to_vec3(state[0], "origin");
-  data->vertices = to_rows(state[1], "vertices");
-  const Doubles planes = to_doubles(state[2], "planes", "an array of shape (k, 4)");
-  for (size_t i = 0; i < planes.shape(0); ++i) {
-    const double* row = planes.data() + 4 * i;
-    data->planes.push_back({{row[0], row[1], row[2]}, -row[3]});
-  }
-  const auto integers = [](nb::handle value) {
-    const auto array = nb::cast<nb::ndarray<const int, nb::ndim<1>, nb::c_contig, nb::device::cpu>>(value);
-    return std::vector<int>(array.data(), array.data() + array.shape(0));
-  };
-  data->ring = integers(state[3]);
-  data->ring_start = integers(state[4]);
-  data->corners = to_rows(state[5], "corners");
-  const auto read_triples = [&](nb::handle value, std::vector<std::array<int, 3>>& rows) {
-    const std::vector<int> flat = integers(value);
-    for (size_t i = 0; i + 2 < flat.size(); i += 3) rows.push_back({flat[i], flat[i + 1], flat[i + 2]});
-  };
-  read_triples(state[6], data->triangles);
-  read_triples(state[7], data->facet_corners);
-  const HullMeasures measures = measure(*data);
-  data->volume = measures.volume;
-  data->centroid = measures.centroid;
-  complete(*data);
-  data->graph = graph_of(*data);
-  return {std::move(data)};
+bool equal(nb::handle a, nb::handle b) {
+  return nb::cast<bool>(nb::module_::import_("numpy").attr("array_equal")(a, b));
+}
+
+/// Only the surface is taken from a state: all else is made anew, and must be what is there.
+Hull hull_from_state(nb::handle given) {
+  constexpr const char* kNoHull = "state must be that of a hull";
+  if (!nb::isinstance<nb::tuple>(given) || nb::len(given) != 8) throw nb::value_error(kNoHull);
+  const nb::tuple state = nb::borrow<nb::tuple>(given);
+  const std::vector<std::int64_t> flat = to_indices(state[6], "triangles");
+  if (flat.size() % 3 != 0) throw nb::value_error(kNoHull);
+  std::vector<std::array<int, 3>> triangles;
+  constexpr std::int64_t kMost = std::numeric_limits<int>::max();
+  const auto index = [&](std::int64_t i) { return i >= 0 && i <= kMost ? static_cast<int>(i) : -1; };
+  for (size_t i = 0; i < flat.size(); i += 3)
+    triangles.push_back({index(flat[i]), index(flat[i + 1]), index(flat[i + 2])});
+  const Hull hull = hull_of_surface(to_vec3(state[0], "origin"), to_rows(state[5], "corners"), triangles);
+  const nb::tuple anew = hull_state(hull);
+  for (size_t i = 0; i < 8; ++i)
+    if (!equal(state[i], anew[i])) throw nb::value_error(kNoHull);
+  return hull;
 }
 
 void define_shape_types(nb::module_& m) {
@@ -281,7 +275,7 @@ ValueError for fewer than four points, for points that are not finite and for po
   define_common(hull);
   hull.def("__getstate__", &hull_state, nb::sig("def __getstate__(self) -> tuple[object, ...]"));
   hull.def(
-      "__setstate__", [](Hull& self, nb::tuple state) { new (&self) Hull(hull_from_state(state)); },
+      "__setstate__", [](Hull& self, nb::handle state) { new (&self) Hull(hull_from_state(state)); },
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
@@ -306,8 +300,11 @@ for Hull and Sphere. Method "paper" does not take it, and it has no certificate.
       nb::sig("def __getstate__(self) -> tuple[object, ...]"));
   rounded.def(
       "__setstate__",
-      [](RoundedHull& self, nb::tuple state) {
-        new (&self) RoundedHull{hull_from_state(nb::cast<nb::tuple>(state[0])), nb::cast<double>(state[1])};
+      [](RoundedHull& self, nb::handle state) {
+        if (!nb::isinstance<nb::tuple>(state) || nb::len(state) != 2)
+          throw nb::value_error("state must be that of a rounded hull");
+        const double radius = make_sphere(to_double(state[1], "radius")).radius;
+        new (&self) RoundedHull{hull_from_state(state[0]), radius};
       },
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }

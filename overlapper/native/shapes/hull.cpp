@@ -278,18 +278,17 @@ void complete(HullData& data) {
   for (Vec3 v : data.vertices) data.radius = std::max(data.radius, norm(v));
 }
 
-std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source) {
-  Vec3 lower = points[0], upper = points[0];
-  for (Vec3 p : points) lower = min(lower, p), upper = max(upper, p);
-  const Vec3 origin = lossless_origin(lower, upper);
-  ExpandingHull hull;
-  hull.points.reserve(points.size());
-  for (Vec3 p : points) hull.points.push_back(p - origin);
-  if (!hull.build()) return nullptr;
+namespace {
 
+/// What a surface of triangles about `origin` makes once coplanar ones are merged; null if it has no inside.
+std::shared_ptr<HullData> merged(const ExpandingHull& hull, Vec3 origin, std::vector<int>* source) {
+  double extent = 0;
+  for (const ExpandingHull::Facet& facet : hull.facets)
+    if (!facet.removed())
+      for (int v : facet.vertex) extent = std::max(extent, max_component(abs(hull.points[v])));
   // Corners computed by a user as centre plus rotated half extents carry a few roundings each, relative to the extent;
   // a plane through three of them misses a fourth by up to about eight of those.
-  const double rounding = 16 * DBL_EPSILON * max_component(max(abs(lower - origin), abs(upper - origin)));
+  const double rounding = 16 * DBL_EPSILON * extent;
   const CoplanarRegions regions = merge_coplanar(hull, rounding);
   std::vector<std::vector<int>> loops = region_loops(regions);
   drop_edge_points(loops, static_cast<int>(hull.points.size()));
@@ -302,6 +301,41 @@ std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>
   // A solid thinner than the rounding of its corners has no inside to speak of.
   if (!(data->volume > rounding * measures.area / 2)) return nullptr;
   return data;
+}
+
+Vec3 origin_of(std::span<const Vec3> points) {
+  Vec3 lower = points[0], upper = points[0];
+  for (Vec3 p : points) lower = min(lower, p), upper = max(upper, p);
+  return lossless_origin(lower, upper);
+}
+
+}  // namespace
+
+std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source) {
+  const Vec3 origin = origin_of(points);
+  ExpandingHull hull;
+  hull.points.reserve(points.size());
+  for (Vec3 p : points) hull.points.push_back(p - origin);
+  return hull.build() ? merged(hull, origin, source) : nullptr;
+}
+
+Hull hull_of_surface(Vec3 origin, std::span<const Vec3> corners, std::span<const std::array<int, 3>> triangles) {
+  constexpr const char* kNoHull = "state must be that of a hull";
+  require(corners.size() >= 4 && triangles.size() >= 4, kNoHull);
+  ExpandingHull hull;
+  std::vector<Vec3> points;
+  for (Vec3 p : corners) {
+    require(finite(p) && finite(p + origin) && max_component(abs(p + origin)) < kLargest, kNoHull);
+    hull.points.push_back(p);
+    points.push_back(p + origin);
+  }
+  for (const auto& triangle : triangles)
+    for (int corner : triangle) require(corner >= 0 && corner < static_cast<int>(corners.size()), kNoHull);
+  require(origin_of(points) == origin && hull.assemble(triangles), kNoHull);
+  auto data = merged(hull, origin, nullptr);
+  require(data != nullptr, kNoHull);
+  data->graph = graph_of(*data);
+  return {std::move(data)};
 }
 
 Hull make_hull(std::span<const Vec3> points) {

@@ -59,6 +59,10 @@ Hull make_hull(std::span<const Vec3> points);
 /// The hull of finite points, or null if they are flat; `source[i]` becomes the index of vertex i among the points.
 std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source = nullptr);
 
+/// The hull whose surface, before coplanar triangles are merged, is that of these corners about `origin`: as it was
+/// built, so that its facets have the same numbers. Throws std::invalid_argument if that is no hull's.
+Hull hull_of_surface(Vec3 origin, std::span<const Vec3> corners, std::span<const std::array<int, 3>> triangles);
+
 /// Fills in what follows from vertices, planes and rings.
 void complete(HullData& data);
 
