@@ -1,0 +1,164 @@
+"""Answers of the core as they were recorded: a change of any figure, or of the work it takes, is a line in a diff.
+
+Counts and words are exact, and measures within MEASURES: the inputs are the same on every machine, but libm is not. The
+rules that answers must keep are tested elsewhere; here, what keeps the rules and is different all the same is seen: a
+bound ten times as wide, a way ten times as long. `pytest tests/native/test_recorded_answers.py --overlapper-record`
+writes what is found, for a change that is meant.
+"""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+from plain_cases import GROUPS, SHAPES, PlainCase, ball_of_points, cloud, plain_cases, quaternion, vector
+
+from overlapper import Batch, Box, Hull, Overlap, overlap, overlaps
+
+RECORDED = Path(__file__).with_name("recorded")
+# How far a measure may be off, relative to itself or in SI units, whichever is more; all else is exact.
+SIZES = dict.fromkeys(("volume", "area", "reach"), (1e-11, 1e-17))
+LENGTHS = dict.fromkeys(("depth", "distance"), (1e-10, 1e-15))
+SUMS = dict.fromkeys(
+    ("inertia", "gradient", "normal", "centroid", "witnesses", "plane", "bounds", "walls", "normals"), (1e-10, 1e-13)
+)
+MEASURES = SIZES | LENGTHS | SUMS | {"error": (1e-6, 0.0)}
+WEIGHTS = np.array([0.59, 0.83, -0.71, 0.37, 0.97, -0.43, 0.61, -0.89, 0.53])
+
+
+def as_one(numbers) -> float:
+    """Numbers as one that changes with any of them."""
+    flat = np.asarray(numbers, float).ravel()
+    return float(sum(flat * np.resize(WEIGHTS, len(flat)))) if len(flat) else 0.0
+
+
+def answer_of(case: PlainCase) -> dict[str, object]:
+    found = overlap(*case.bodies, tolerance=case.tolerance, method=case.method)
+    row: dict[str, object] = {
+        "status": found.status, "widened": found.widened, "touched": found.facets_touched, "planes": planes_asked(case),
+        "volume": found.volume, "error": found.volume_error, "area": found.area, "inertia": as_one(found.inertia),
+        "gradient": as_one(found.gradient),
+    }  # fmt: skip
+    if len(case.bodies) == 2:
+        row |= {"depth": found.depth, "distance": found.distance, "normal": as_one(found.normal)}
+    if found:
+        row |= {"centroid": as_one(found.centroid)}
+        row |= surface_of(found)
+    elif len(case.bodies) == 2:
+        row |= {"witnesses": as_one([found.witness_a, found.witness_b]), "plane": as_one(found.separating_plane)}
+    return row
+
+
+def surface_of(found: Overlap) -> dict[str, object]:
+    arms = found.vertices - found.centroid
+    return {
+        "corners": len(found.vertices), "facets": len(found.facets), "owned": int((found.owner == 0).sum()),
+        "patches": len(found.patch), "patch": sum(len(ring) for ring in found.patch),
+        "reach": float((arms * arms).sum()), "walls": float(found.halfspaces[:, 3].sum()),
+    }  # fmt: skip
+
+
+def planes_asked(case: PlainCase) -> int | None:
+    """The work of a pair where it is counted, in a batch."""
+    if len(case.bodies) != 2:
+        return None
+    bodies = [(body.shape, body.position, body.orientation) for body in case.bodies]
+    shapes, positions, orientations = zip(*bodies)
+    found = overlaps(shapes, positions, orientations, pairs=[(0, 1)], tolerance=case.tolerance, method=case.method)
+    return found.planes_asked
+
+
+def hulls() -> dict[str, dict[str, object]]:
+    rng = Random("hulls")
+    grid = [(x / 4, y / 4, z / 4) for x in range(5) for y in range(5) for z in range(5)]
+    clouds = {f"{count} in a cube": cloud(rng, count) for count in (4, 5, 9, 30, 200)}
+    clouds |= {f"{count} on a sphere": ball_of_points(rng, count) for count in (12, 100, 1000)}
+    clouds |= {
+        "a lattice": np.array(grid),
+        "a lattice turned": np.array(grid) @ [[0.36, 0.48, -0.8], [-0.8, 0.6, 0], [0.48, 0.64, 0.6]],
+    }
+    for gap in (1e-17, 1e-15, 1e-13, 1e-9):
+        for count in (5, 40):
+            flat = cloud(rng, count) * (1, 1, gap)
+            clouds[f"{count} on a base {gap} rough"] = np.vstack([flat, flat * (0.5, 0.5, 1) + (0, 0, 1)])
+    clouds |= {f"a flake {thin} thick": cloud(rng, 20) * (1, 1, thin) for thin in (1e-6, 1e-10, 1e-13)}
+    rows = {}
+    for name, points in clouds.items():
+        hull = Hull(points)
+        rows[name] = {
+            "corners": len(hull.vertices), "exact corners": len(hull.corners), "facets": len(hull.facets),
+            "triangles": len(hull.triangles), "around": sum(len(ring) for ring in hull.facets),
+            "volume": hull.volume, "centroid": as_one(hull.centroid), "bounds": as_one(hull.bounds),
+            "walls": float(hull.halfspaces[:, 3].sum()), "normals": float(abs(hull.halfspaces[:, :3]).sum()),
+        }  # fmt: skip
+    return rows
+
+
+def moving() -> dict[str, dict[str, object]]:
+    """A batch that is asked again and again, as some of its bodies move."""
+    rng = Random("moving")
+    names = ["box", "hull", "ball", "box", "capsule", "fine hull", "cylinder", "hull", "box", "half-space"]
+    shapes = [SHAPES[name](rng) for name in names * 2] + [Box((1, 1, 1)), Hull(ball_of_points(rng, 300))]
+    where = np.array([vector(rng, 1.6) for _ in shapes])
+    turns = np.array([quaternion(rng) for _ in shapes], float)
+    batch, rows = Batch(shapes), {}
+    for step in range(12):
+        found = batch.overlaps(where, turns)
+        rows[f"step {step}"] = {
+            "pairs": len(found), "examined": found.examined, "planes": found.planes_asked,
+            "candidates": len(batch.candidate_pairs(where, turns)), "widened": int(found.widened.sum()),
+            "touched": int(found.facets_touched.sum()), "volume": float(found.volume.sum()),
+            "error": float(found.volume_error.sum()), "area": float(found.area.sum()),
+            "depth": float(found.depth.sum()), "normal": as_one(found.normal), "gradient": as_one(found.gradient),
+        }  # fmt: skip
+        for i in range(len(shapes)):
+            if rng.random() < (0.0 if step == 3 else 0.4):
+                where[i] += vector(rng, rng.choice([1e-9, 1e-2, 0.5]))
+                if rng.random() < 0.5:
+                    turns[i] += [rng.uniform(-0.1, 0.1) for _ in range(4)]
+    return rows
+
+
+def of_group(group: str) -> dict[str, dict[str, object]]:
+    return {case.name: answer_of(case) for case in plain_cases(group)}
+
+
+def written(value: object) -> str:
+    return "" if value is None else f"{value:.17g}" if isinstance(value, float) else str(value)
+
+
+def is_as_recorded(column: str, found: str, recorded: str) -> bool:
+    if found == recorded:
+        return True
+    if column not in MEASURES or not (found and recorded):
+        return False
+    relative, absolute = MEASURES[column]
+    return abs(float(found) - float(recorded)) <= max(relative * abs(float(recorded)), absolute)
+
+
+@pytest.mark.parametrize("group", [*GROUPS, "hulls", "moving"])
+def test_answers_are_as_they_were_recorded(group, request):
+    rows = {"hulls": hulls, "moving": moving}.get(group, lambda: of_group(group))()
+    columns = list(dict.fromkeys(["case", *(column for row in rows.values() for column in row)]))
+    file = RECORDED / f"{group}.csv"
+    if request.config.getoption("overlapper_record"):
+        file.parent.mkdir(exist_ok=True)
+        with file.open("w", newline="") as out:
+            writer = csv.DictWriter(out, columns, lineterminator="\n")
+            writer.writeheader()
+            for name, row in rows.items():
+                writer.writerow({"case": name} | {column: written(value) for column, value in row.items()})
+        return
+    with file.open(newline="") as lines:
+        recorded = {row["case"]: row for row in csv.DictReader(lines)}
+    assert list(rows) == list(recorded)
+    changed = [
+        f"{name}: {column} is {written(row.get(column))}, recorded {recorded[name].get(column)}"
+        for name, row in rows.items()
+        for column in columns[1:]
+        if not is_as_recorded(column, written(row.get(column)), recorded[name].get(column) or "")
+    ]
+    assert not changed, "\n".join(changed[:20])

@@ -1,0 +1,231 @@
+"""Cases whose numbers every machine makes alike, so that answers to them can be recorded.
+
+The families of families.py turn by sines and draw normal deviates, which differ by a unit in the last place from one
+machine to another. Here, all numbers come from Python's own `random` and from sums and products.
+"""
+
+from collections.abc import Callable, Iterator
+from random import Random
+from typing import NamedTuple
+
+import numpy as np
+
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere
+
+CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
+SQUARE = [(x, y) for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
+
+
+class PlainCase(NamedTuple):
+    name: str
+    bodies: list[Placed]
+    tolerance: float = 1e-3
+    method: str = "auto"
+
+
+def vector(rng: Random, size: float = 1.0) -> np.ndarray:
+    return np.array([rng.uniform(-size, size) for _ in range(3)])
+
+
+def sixteenths(rng: Random, low: int, high: int) -> np.ndarray:
+    return np.array([rng.randint(low, high) / 16 for _ in range(3)])
+
+
+def quaternion(rng: Random) -> tuple[int, ...]:
+    """Of small whole numbers, and of any length."""
+    return (*(rng.randint(-9, 9) for _ in range(3)), rng.randint(1, 9))
+
+
+def posed(rng: Random, shape: Shape, reach: float = 0.5) -> Placed:
+    return Placed(shape, vector(rng, reach), quaternion(rng))
+
+
+def cloud(rng: Random, count: int) -> np.ndarray:
+    """Points in a cube."""
+    return np.array([vector(rng) for _ in range(count)])
+
+
+def ball_of_points(rng: Random, count: int) -> np.ndarray:
+    """Points near a sphere, all of them corners but for a few."""
+    points = []
+    while len(points) < count:
+        x, y, z = vector(rng)
+        square = x * x + y * y + z * z
+        if 0.01 < square < 1:
+            points.append(np.array([x, y, z]) / np.sqrt(square))
+    return np.array(points)
+
+
+def wedge(rng: Random, feature: str, sign: int) -> np.ndarray:
+    """A body on the plane z = 0 with a face, an edge or a corner, above it or below."""
+    foot = {
+        "face": [(x / 2, y / 2, 0) for x, y in SQUARE],
+        "edge": [(-0.75, rng.randint(-4, 4) / 16, 0), (0.5, rng.randint(-4, 4) / 16, 0)],
+        "corner": [(0, 0, 0)],
+    }[feature]
+    crown = [(x + rng.randint(-4, 4) / 16, y + rng.randint(-4, 4) / 16, 1 + rng.randint(0, 8) / 16) for x, y in SQUARE]
+    return np.array([*foot, *crown]) * [1, 1, sign]
+
+
+SHAPES: dict[str, Callable[[Random], Shape]] = {
+    "ball": lambda rng: Sphere(rng.uniform(0.3, 1)),
+    "box": lambda rng: Box([rng.uniform(0.3, 1) for _ in range(3)]),
+    "capsule": lambda rng: Capsule(rng.uniform(0.2, 0.7), rng.uniform(0, 2)),
+    "cylinder": lambda rng: Cylinder(rng.uniform(0.2, 1), rng.uniform(0.2, 2)),
+    "hull": lambda rng: Hull(cloud(rng, rng.randint(4, 30))),
+    "fine hull": lambda rng: Hull(ball_of_points(rng, 90)),
+    "rounded hull": lambda rng: RoundedHull(cloud(rng, 8) * 0.6, rng.choice([1e-3, 0.1])),
+    "half-space": lambda rng: HalfSpace(vector(rng), rng.uniform(-0.3, 0.3)),
+}
+
+
+def kinds(rng: Random) -> Iterator[PlainCase]:
+    """Every kind of shape with every other, deep, shallow and apart."""
+    names = list(SHAPES)
+    for i, a in enumerate(names):
+        for b in names[i:]:
+            if a == b == "half-space":
+                continue
+            for reach in (0.3, 0.9, 1.5):
+                bodies = [posed(rng, SHAPES[name](rng), reach) for name in (a, b)]
+                yield PlainCase(f"{a} and {b} within {reach}", bodies if rng.random() < 0.5 else bodies[::-1])
+
+
+def slivers(rng: Random) -> Iterator[PlainCase]:
+    """A feature of a hull sunk into one of another, less and less."""
+    for low in ("face", "edge", "corner"):
+        for high in ("face", "edge", "corner"):
+            for exponent in (1, 3, 6, 8, 10, 11, 12, 13, 14, 15, 16):
+                depth = 10.0**-exponent if exponent < 16 else 0.0
+                pose = (vector(rng), quaternion(rng)) if rng.random() < 0.6 else ()
+                clouds = wedge(rng, low, -1), wedge(rng, high, 1) - [0, 0, depth]
+                yield PlainCase(f"{low} in {high} by {depth:.0e}", [Placed(Hull(points), *pose) for points in clouds])
+
+
+def boxes(rng: Random) -> Iterator[PlainCase]:
+    """Boxes on a lattice, that share planes, edges and corners; turned together, stretched, and far away."""
+    for i in range(60):
+        halves = [sixteenths(rng, 4, 24) * (1, 1, rng.choice([1, 1, 1e-3, 1e-6])) for _ in range(2)]
+        centres = [
+            np.zeros(3),
+            np.round((halves[0] + halves[1]) * [rng.choice([-1, 0, 1]) for _ in range(3)] * 16) / 16,
+        ]
+        slip = rng.choice([0, 0, 1e-15, -1e-12, 1e-9, 1e-6, -1e-3, -0.25])
+        turn = (0, 0, rng.choice([0, 0, 1e-12, 1e-6]), 1)
+        far = rng.choice([0, 0, 1e3, 1e6])
+        bodies = [
+            Placed(Box(halves[0]), centres[0] + far),
+            Placed(Box(halves[1]), centres[1] * (1 + slip) + far, turn),
+        ]
+        yield PlainCase(f"boxes {i}, slip {slip:.0e}, turn {turn[2]:.0e}, far {far:.0e}", bodies)
+
+
+def slender(rng: Random) -> Iterator[PlainCase]:
+    """Needles and plates across each other, up to 1e8 times as long as thick."""
+    for i in range(40):
+        bodies = []
+        for _ in range(2):
+            thin = [10.0 ** -rng.randint(0, 8) for _ in range(3)]
+            thin[rng.randrange(3)] = 1.0
+            shape = Hull(cloud(rng, 8) * thin) if rng.random() < 0.7 else Box(thin)
+            bodies.append(Placed(shape, np.array(thin) * 0.1, quaternion(rng)))
+        yield PlainCase(f"slender {i}", bodies)
+
+
+def many(rng: Random) -> Iterator[PlainCase]:
+    """Three to twelve bodies: with a common part, with a small one, and with none."""
+    names = ["box", "hull", "fine hull", "half-space", "ball", "capsule", "cylinder", "rounded hull"]
+    for i in range(36):
+        count = rng.choice([3, 4, 6, 12])
+        several = [posed(rng, SHAPES[rng.choice(names[: 4 if i % 3 else 8])](rng), 0.3) for _ in range(count)]
+        several[0] = posed(rng, SHAPES["box"](rng), 0.3)
+        push = rng.choice([0, 0, 0.5, 1])
+        several[-1] = posed(rng, SHAPES["hull"](rng), 0.3 + push)
+        yield PlainCase(f"{count} bodies {i}", several)
+    for i in range(12):
+        hole = rng.choice([0, -1e-3, 1e-3, -1e-9, -1e-12, 1e-12])
+        turn = quaternion(rng)
+        slabs = [
+            Hull([(hole, s, t) for s in (-4, 4) for t in (-4, 4)] + [(2, s, t) for s in (-4, 4) for t in (-4, 4)]),
+            Hull([(s, hole, t) for s in (-4, 4) for t in (-4, 4)] + [(s, 2, t) for s in (-4, 4) for t in (-4, 4)]),
+            Hull([(-hole - s, -hole + s, t) for s in (-4, 4) for t in (-4, 4)]
+                 + [(-2 - s, -2 + s, t) for s in (-4, 4) for t in (-4, 4)]),
+        ]  # fmt: skip
+        yield PlainCase(f"around a hole of {hole:.0e} {i}", [Placed(slab, (0, 0, 0), turn) for slab in slabs])
+
+
+def copies(rng: Random) -> Iterator[PlainCase]:
+    """A body with itself, as it is, grown by a little or turned by a little."""
+    for count in (4, 8, 24, 60):
+        points = ball_of_points(rng, count)
+        for change in (0.0, 2.0**-52, 1e-13, 1e-9, 1e-5):
+            yield PlainCase(
+                f"{count} points grown by {change:.0e}", [Placed(Hull(points)), Placed(Hull(points * (1 + change)))]
+            )
+            turn = (change, -change, change, 1)
+            yield PlainCase(
+                f"{count} points turned by {change:.0e}", [Placed(Hull(points)), Placed(Hull(points), (0, 0, 0), turn)]
+            )
+
+
+def fine(rng: Random) -> Iterator[PlainCase]:
+    """Hulls of so many facets that the common part is traced, deep, shallow, hardly and not at all; in a box, too."""
+    for count in (60, 120, 300, 700):
+        for apart in (0.2, 1.0, 1.8, 1.96, 2.2):
+            a, b = Hull(ball_of_points(rng, count)), Hull(ball_of_points(rng, 80))
+            bodies = [Placed(a, (0.1, 0.2, 0.3), quaternion(rng)), Placed(b, (0.1 + apart, 0.2, 0.3), quaternion(rng))]
+            yield PlainCase(f"{count} and 80 corners {apart} apart", bodies)
+        yield PlainCase(
+            f"{count} corners in a box", [Placed(a), Placed(Box((0.6, 0.7, 0.8)), (0.3, 0, 0), (1, 2, 3, 4))]
+        )
+        yield PlainCase(f"{count} corners on a plate", [Placed(a), Placed(HalfSpace((1, 2, 3), rng.uniform(-2, 2)))])
+    for gap in (1e-3, 1e-6, 1e-9, 1e-12):
+        globe = ball_of_points(rng, 200)
+        low, high = globe[:, 2].min(), globe[:, 2].max()
+        bodies = [Placed(Hull(globe - [0, 0, low])), Placed(Hull(globe - [0, 0, high - gap]))]
+        yield PlainCase(f"poles {gap:.0e} in each other", bodies)
+
+
+def round_bodies(rng: Random) -> Iterator[PlainCase]:
+    """Round bodies by tangent planes at other tolerances, and those that a formula measures."""
+    names = ["ball", "capsule", "cylinder", "rounded hull"]
+    for tolerance in (0.3, 1e-2, 1e-4):
+        for name in names:
+            bodies = [posed(rng, SHAPES[name](rng), 0.2), posed(rng, SHAPES[rng.choice(["box", "hull"])](rng), 0.2)]
+            yield PlainCase(f"{name} at {tolerance}", bodies, tolerance)
+    for depth in (1.0, 0.1, 1e-3, 1e-6, 1e-9, 0.0, -0.1):
+        yield PlainCase(f"balls by {depth:.0e}", [Placed(Sphere(0.75)), Placed(Sphere(0.5), (1.25 - depth, 0, 0))])
+        floor = Placed(HalfSpace((0, 0, 1), depth - 0.5))
+        for shape, high in ((Sphere(0.5), 0.0), (Capsule(0.5, 1), 0.5), (Cylinder(0.75, 1), 0.0)):
+            yield PlainCase(
+                f"{type(shape).__name__} on the ground by {depth:.0e}", [floor, Placed(shape, (0, 0, high))]
+            )
+        table = Placed(Box((2, 2, 0.5)), (0, 0, depth - 1.0))
+        yield PlainCase(f"capsule on a table by {depth:.0e}", [table, Placed(Capsule(0.5, 1), (0, 0, 0), (1, 0, 0, 1))])
+
+
+def by_the_article(rng: Random) -> Iterator[PlainCase]:
+    """What the article's method says, also where the common point is on a boundary and has to be shifted."""
+    for i in range(16):
+        bodies = [posed(rng, SHAPES[rng.choice(["box", "hull", "ball", "half-space"])](rng)) for _ in range(2)]
+        bodies[0] = posed(rng, SHAPES["hull"](rng))
+        yield PlainCase(f"article {i}", bodies, method="paper")
+    for x in (-1, 0, 1):
+        for y in (-1, 0, 1):
+            for z in (-1, 0, 1):
+                if (x, y, z) != (0, 0, 0):
+                    bodies = [Placed(Hull(CUBE)), Placed(Hull(CUBE), np.array([x, y, z]) * 1.5)]
+                    yield PlainCase(f"article, cubes along {x} {y} {z}", bodies, method="paper")
+    for count in (3, 5):
+        several = [posed(rng, SHAPES["hull"](rng), 0.2) for _ in range(count)]
+        yield PlainCase(f"article, {count} bodies", several, method="paper")
+
+
+GROUPS = {
+    group.__name__: group
+    for group in (kinds, slivers, boxes, slender, many, copies, fine, round_bodies, by_the_article)
+}
+
+
+def plain_cases(group: str) -> list[PlainCase]:
+    return list(GROUPS[group](Random(group)))
