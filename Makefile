@@ -1,20 +1,50 @@
 # `make run` shows what the project does, `make test` proves it; both make their own environment first.
 
 VENV := .venv
+PYTEST := $(VENV)/bin/pytest
 SCENE := franka_grasp
 FUZZ := -max_total_time=60
+MUTANTS := --seed 0 --count 200
 NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
+# Shares in percent that tests are to reach: of the lines and branches of Python, and of the lines of the core.
+LEAST_OF_PYTHON := 90
+LEAST_OF_CORE := 95
 
-.PHONY: run test fuzz lint format clean
+.PHONY: help run test record coverage coverage-python coverage-core mutants fuzz lint format hooks ci clean
 
-run: $(VENV)/all
+help: ## this list
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
+
+run: $(VENV)/all ## build, run SCENE=franka_grasp, write out/franka_grasp.csv and .html
 	@$(VENV)/bin/overlapper run $(SCENE) --out out/$(SCENE).csv --html out/$(SCENE).html
 
-test: $(VENV)/dev
-	@$(VENV)/bin/pytest --numprocesses=auto
+test: $(VENV)/dev ## build, pass all tests
+	@$(PYTEST) --numprocesses=auto
+
+record: $(VENV)/dev ## write anew what is expected of the scenes and recorded of the core's answers
+	@$(PYTEST) --numprocesses=auto --overlapper-record scenes tests/native/test_recorded_answers.py
+
+coverage: coverage-python coverage-core ## report what the tests reach of Python and of the core
+
+coverage-python: $(VENV)/dev ## pass all tests, report the branches of Python that they reach
+	@$(VENV)/bin/python -m coverage erase
+	@$(MAKE) --no-print-directory test PYTEST="$(VENV)/bin/python -m coverage run -m pytest"
+	@$(VENV)/bin/python -m coverage combine --quiet
+	@$(VENV)/bin/python -m coverage report --fail-under=$(LEAST_OF_PYTHON)
+
+# Counts of the run before would be added to, and what a killed process leaves half written is not worth a failure.
+coverage-core: build/coverage/dev ## report the lines of the core that its own tests reach
+	@find build/coverage/native -name '*.gcda' -delete
+	@build/coverage/venv/bin/python -m pytest --numprocesses=auto --quiet --ignore=tests/native/test_stub.py tests/native
+	@$(VENV)/bin/python -m gcovr --root overlapper/native --object-directory build/coverage/native \
+	  --exclude overlapper/native/fuzz --exclude-throw-branches --gcov-ignore-parse-errors \
+	  --fail-under-line=$(LEAST_OF_CORE)
+
+mutants: $(VENV)/dev ## change one operator of the core at a time, report which changes no test notices
+	@$(VENV)/bin/python tests/native/mutants.py $(MUTANTS)
 
 # Inputs that reach something new stay in build/fuzz/corpus; one that breaks something is left beside it, by name.
-fuzz: build/fuzz/fuzz_overlap
+fuzz: build/fuzz/fuzz_overlap ## give the sanitized core inputs that reach new places, for FUZZ=-max_total_time=60 seconds
 	@mkdir -p build/fuzz/corpus
 	@build/fuzz/fuzz_overlap $(FUZZ) -timeout=20 -max_len=600 -len_control=0 -print_final_stats=1 \
 	  -verbosity=0 -artifact_prefix=build/fuzz/ build/fuzz/corpus overlapper/native/fuzz/corpus
@@ -24,17 +54,23 @@ build/fuzz/fuzz_overlap: $(NATIVE)
 	  -DOVERLAPPER_WERROR=ON --log-level=WARNING
 	@cmake --build build/fuzz --parallel $$(getconf _NPROCESSORS_ONLN)
 
-lint: $(VENV)/dev
+lint: $(VENV)/dev ## check style and types
 	@$(VENV)/bin/ruff check
 	@$(VENV)/bin/ruff format --check
 	@$(VENV)/bin/mypy overlapper
 	@$(VENV)/bin/clang-format --dry-run -Werror $(filter %.h %.cpp,$(NATIVE))
 
-format: $(VENV)/dev
+format: $(VENV)/dev ## write Python and C++ as the formatters have it
 	@$(VENV)/bin/ruff format --quiet
 	@$(VENV)/bin/clang-format -i $(filter %.h %.cpp,$(NATIVE))
 
-clean:
+hooks: $(VENV)/dev ## let every commit be checked and formatted before it is made
+	@$(VENV)/bin/pre-commit install
+
+ci: ## all that a change must pass (20 minutes on 2 cores)
+	@.ci/run
+
+clean: ## remove environments, builds and what was written to out/
 	@rm -rf $(VENV) build out
 
 # The stamps stand for the package with the extra they are named after; `dev` includes `all`. The installation is
@@ -43,6 +79,19 @@ $(VENV)/all $(VENV)/dev: pyproject.toml $(NATIVE) | $(VENV)/bin/python
 	@echo "Building overlapper and installing it with the extra '$(@F)' (a few minutes the first time)"
 	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[$(@F)]'
 	@touch $@ $(VENV)/all
+
+# Another build of the core in an environment of its own, by the name of its CMake option. All but the package is that of
+# $(VENV): what a .pth names is on the path, but its own .pth, of which one is for the package, are not read.
+build/coverage/dev: OPTION := OVERLAPPER_COVERAGE
+build/sanitized/dev: OPTION := OVERLAPPER_SANITIZE
+build/coverage/dev build/sanitized/dev: build/%/dev: $(VENV)/dev
+	@$(VENV)/bin/python -m venv build/$*/venv
+	@$(VENV)/bin/python -c 'import sys; print(*(path for path in sys.path if path.endswith("site-packages")), sep="\n")' \
+	  >"$$(build/$*/venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/others.pth"
+	@SKBUILD_CMAKE_DEFINE="$(if $(SKBUILD_CMAKE_DEFINE),$(SKBUILD_CMAKE_DEFINE);)$(OPTION)=ON" \
+	  SKBUILD_BUILD_DIR=build/$*/native build/$*/venv/bin/python -m pip install --quiet --disable-pip-version-check \
+	  --no-deps --editable .
+	@touch $@
 
 # Every Python on PATH is asked, as the first may be a pyenv shim that does not run.
 PYTHONS = $(PYTHON) $(wildcard $(foreach name,python3.11 python3.10 python3,$(addsuffix /$(name),$(subst :, ,$(PATH)))))

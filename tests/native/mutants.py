@@ -1,0 +1,344 @@
+"""Which small faults of the core its tests notice: `make mutants`.
+
+A mutant is the core with one operator or constant changed: + for -, < for <=, && for ||, min for max, no ! and so on.
+Some are drawn by a seed, built all at once in a copy of the tree under build/mutants, each behind its number, and shown
+to the tests of the core one by one: first to the recorded answers, which notice most within a second or two, then to
+the others. A mutant that no test notices either changes nothing that can be seen, and is then named in EQUIVALENT with
+the reason, or a test is missing. Results are in build/mutants, and what is there is not shown again; `--again` shows
+what survived.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import random
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import venv
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+WORK = ROOT / "build" / "mutants"
+EQUIVALENT = Path(__file__).with_name("equivalent_mutants.csv")
+NOT_THE_CORE = ("python", "fuzz")
+ADDRESS_SPACE = 6 << 30  # bytes: a mutant may ask for memory without end
+
+SWAPS = {
+    "+": "-", "-": "+", "*": "/", "/": "*", "+=": "-=", "-=": "+=", "*=": "/=", "/=": "*=", "<": "<=", "<=": "<",
+    ">": ">=", ">=": ">", "==": "!=", "!=": "==", "&&": "||", "||": "&&", "min": "max", "max": "min", "true": "false",
+    "false": "true", "0": "1", "1": "0", "2": "3", "3": "2", "4": "8", "8": "4", "16": "64", "1.0": "2.0",
+    "0.5": "0.25", "2.0": "1.0",
+}  # fmt: skip
+# Binary operators have a space on both sides, as clang-format writes them; brackets of templates have none.
+TOKEN = re.compile(
+    r"""(?P<skip>//.*|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')
+    |(?<=\s)(?P<binary>[-+*/]=?|[<>]=?|[=!]=|&&|\|\|)(?=\s)
+    |(?P<unary>(?<=[-+*/<>=&|,?:]\s)[-!](?=[\w(])|(?<=[(\[{])[-!](?=[\w(])|(?<=return\s)[-!](?=[\w(]))
+    |\b(?P<word>min|max|true|false)\b
+    |(?<![\w.<])(?P<constant>\d+\.\d+|\d+)(?![\w.>])""",
+    re.VERBOSE,
+)
+NOT_RUN = re.compile(r"^\s*(#|assert\(|static_assert|throw |using |template|///|\*|case )")
+
+# Of the tests of the core, those about what no such fault changes: the stub, databases, memory and signals.
+LEFT_OUT = ("test_stub.py", "test_postgresql.py", "test_out_of_memory.py", "test_mutants.py")
+NOT_ASKED = "not memory and not ctrl_c and not spawn and not process"
+QUICK = "tests/native/test_recorded_answers.py"
+
+
+@dataclass(frozen=True)
+class Mutant:
+    file: str  # below the native folder
+    line: int  # from 0
+    before: str  # the line
+    start: int  # of what is changed in it
+    end: int
+    new: str
+
+    @property
+    def after(self) -> str:
+        return self.before[: self.start] + self.new + self.before[self.end :]
+
+    @property
+    def name(self) -> tuple[str, str, str]:
+        """What it is known by while lines move."""
+        return self.file, self.before.strip(), self.after.strip()
+
+
+def mutants_of(file: str, text: str) -> list[Mutant]:
+    found = []
+    for number, line in enumerate(text.splitlines()):
+        if NOT_RUN.match(line):
+            continue
+        for token in TOKEN.finditer(line):
+            old = token.group()
+            if token["skip"] or (token["constant"] and old not in SWAPS):
+                continue
+            new = "" if token["unary"] else SWAPS[old]
+            found.append(Mutant(file, number, line, token.start(), token.end(), new))
+    return found
+
+
+def all_mutants(native: Path) -> list[Mutant]:
+    files = sorted(path for path in native.rglob("*") if path.suffix in (".cpp", ".h"))
+    names = [path.relative_to(native).as_posix() for path in files]
+    return [
+        mutant
+        for name, path in zip(names, files)
+        if not name.startswith(NOT_THE_CORE)
+        for mutant in mutants_of(name, path.read_text())
+    ]
+
+
+def known_equivalent() -> dict[tuple[str, str, str], str]:
+    """Those that cannot be told from the core, each with the reason."""
+    with EQUIVALENT.open(newline="") as lines:
+        return {(row["file"], row["before"], row["after"]): row["reason"] for row in csv.DictReader(lines)}
+
+
+# All mutants are in one build: where one changes an expression, the expression is chosen by this number.
+SWITCH = """#pragma once
+#include <cstdlib>
+inline const int overlapper_mutant = std::getenv("OVERLAPPER_MUTANT") ? std::atoi(std::getenv("OVERLAPPER_MUTANT")) : 0;
+"""
+OPENING, CLOSING = "([{", ")]}"
+
+
+def expression_around(text: str, start: int, end: int) -> tuple[int, int]:
+    """Where the whole expression begins and ends that has an operator or constant at start:end."""
+    depth, left = 0, start
+    while left > 0:
+        c = text[left - 1]
+        if c in CLOSING:
+            if depth == 0 and c == "}" and text[left : left + 1] == "\n":
+                break  # of a block before
+            depth += 1
+        elif c in OPENING:
+            if depth == 0:
+                break
+            depth -= 1
+        elif depth == 0 and ends_before(text, left):
+            break
+        left -= 1
+    depth, right = 0, end
+    while right < len(text):
+        c = text[right]
+        if c in OPENING:
+            depth += 1
+        elif c in CLOSING:
+            if depth == 0:
+                break
+            depth -= 1
+        elif depth == 0 and (c in ",;?" or is_colon(text, right)):
+            break
+        right += 1
+    whole = text[left:right]
+    return left + len(whole) - len(whole.lstrip()), right - len(whole) + len(whole.rstrip())
+
+
+def ends_before(text: str, at: int) -> bool:
+    """Whether an expression that reaches back to `at` begins there."""
+    before = text[at - 1]
+    if before in ",;?" or is_colon(text, at - 1) or is_assignment(text, at - 1):
+        return True
+    return re.search(r"\b(return|else|case)\s$", text[max(0, at - 8) : at]) is not None
+
+
+def is_colon(text: str, at: int) -> bool:
+    return text[at] == ":" and text[at - 1] != ":" and text[at + 1] != ":"
+
+
+def is_assignment(text: str, at: int) -> bool:
+    return text[at] == "=" and text[at + 1] != "=" and text[at - 1] not in "=!<>"
+
+
+def switched(text: str, mutants: dict[int, Mutant]) -> tuple[str, dict[int, list[int]]]:
+    """A file with some mutants in it, each behind its number, and which there are in each of its lines."""
+    starts = [0]
+    for line in text.splitlines(keepends=True):
+        starts.append(starts[-1] + len(line))
+    spans: list[tuple[int, int, list[int]]] = []
+    for number, mutant in mutants.items():
+        at, upto = starts[mutant.line] + mutant.start, starts[mutant.line] + mutant.end
+        left, right = expression_around(text, at, upto)
+        inside = [number]
+        for span in [span for span in spans if span[0] < right and left < span[1]]:
+            spans.remove(span)
+            left, right, inside = min(left, span[0]), max(right, span[1]), sorted(inside + span[2])
+        spans.append((left, right, inside))
+    lines: dict[int, list[int]] = {}
+    for left, right, inside in sorted(spans, reverse=True):
+        choice = ""
+        for number in inside:
+            mutant = mutants[number]
+            at, upto = starts[mutant.line] + mutant.start, starts[mutant.line] + mutant.end
+            other = text[left:at] + mutant.new + text[upto:right]
+            one_line = " ".join(re.sub("//.*", "", line) for line in other.splitlines())
+            choice += f"overlapper_mutant == {number} ? ({one_line}) : "
+        for line in range(text.count("\n", 0, left), text.count("\n", 0, right) + 1):
+            lines.setdefault(line, []).extend(inside)
+        text = f"{text[:left]}({choice}({text[left:right]})){text[right:]}"
+    return text, lines
+
+
+class Bench:
+    """A copy of the tree, built once with some mutants in it, which are then shown to the tests one by one."""
+
+    def __init__(self, folder: Path, mutants: dict[int, Mutant]) -> None:
+        self.tree, self.build, self.python = folder / "tree", folder / "build", folder / "venv" / "bin" / "python"
+        self.mutants = mutants
+        listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+        names = [name for name in run(listed, ROOT).stdout.split("\0") if name and (ROOT / name).is_file()]
+        shutil.rmtree(self.tree, ignore_errors=True)
+        for name in names:
+            (self.tree / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, self.tree / name)
+        if not self.python.exists():
+            venv.create(folder / "venv", symlinks=True)
+        # What a .pth names is on the path, but its own .pth are not read: so the tree comes before an editable package.
+        site = next((folder / "venv").glob("lib/python*/site-packages"))
+        others = [path for path in sys.path if path.endswith("site-packages")]
+        (site / "tree.pth").write_text("\n".join([str(self.tree), *others]) + "\n")
+        switch = folder / "switch.h"
+        switch.write_text(SWITCH)
+        # Hardly optimised: sooner built, and the same bits.
+        settings = [f"-DPython_EXECUTABLE={sys.executable}", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG"]
+        settings += [f"-DCMAKE_CXX_FLAGS=-w -include {switch}"]
+        run(["cmake", "-S", str(self.native), "-B", str(self.build), *settings], self.tree)
+        self.compile()
+
+    @property
+    def native(self) -> Path:
+        return self.tree / "overlapper" / "native"
+
+    def compile(self) -> None:
+        """Leaves out mutants that do not compile, or not behind a switch."""
+        while True:
+            lines = {}
+            for file in sorted({mutant.file for mutant in self.mutants.values()}):
+                of_file = {number: mutant for number, mutant in self.mutants.items() if mutant.file == file}
+                text, lines[file] = switched((ROOT / "overlapper" / "native" / file).read_text(), of_file)
+                if text != (self.native / file).read_text():
+                    (self.native / file).write_text(text)
+            command = ["cmake", "--build", str(self.build), "--target", "_core", "--parallel", f"{os.cpu_count()}"]
+            done = run([*command, "--", "-k"], self.tree, check=False)
+            if done.returncode == 0:
+                break
+            wrong = set()
+            for file, line in re.findall(
+                r"^(\S+?):(\d+):\d+: +(?:fatal )?error", done.stdout + done.stderr, re.MULTILINE
+            ):
+                name = Path(file).resolve().relative_to(self.native.resolve()).as_posix() if "native" in file else ""
+                wrong |= {*lines.get(name, {}).get(int(line) - 1, [])}
+            if not wrong:
+                raise SystemExit((done.stdout + done.stderr)[-3000:])
+            print(f"{len(wrong)} mutants do not compile", flush=True)
+            for number in wrong:
+                file, line = self.mutants[number].file, self.mutants[number].line
+                del self.mutants[number]
+                if not any(mutant.file == file for mutant in self.mutants.values()):
+                    shutil.copy2(ROOT / "overlapper" / "native" / file, self.native / file)
+        for module in self.build.glob("_core*.so"):
+            shutil.copyfile(module, self.tree / "overlapper" / module.name)
+        if failed := self.tests(0, quick=True, seconds=600):
+            raise SystemExit(f"without a mutant: {failed}")
+
+    def tests(self, number: int, quick: bool, seconds: float) -> str:
+        """Nothing if all pass, or what noticed."""
+        which = [QUICK] if quick else ["tests/native", f"--ignore={QUICK}", "-k", NOT_ASKED]
+        left_out = [f"--ignore=tests/native/{name}" for name in LEFT_OUT]
+        command = [str(self.python), "-m", "pytest", "-q", "-x", "--tb=no", "-p", "no:cacheprovider", *which, *left_out]
+        try:
+            done = run(command, self.tree, seconds, check=False, mutant=number)
+        except subprocess.TimeoutExpired:
+            return f"no end in {seconds:.0f} s"
+        if done.returncode == 0:
+            return ""
+        noticed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+        if noticed:
+            return noticed[1]
+        return f"the process ended by {done.returncode}" if done.returncode < 0 else done.stdout[-300:].strip()
+
+    def noticed(self, number: int) -> str:
+        return self.tests(number, quick=True, seconds=90) or self.tests(number, quick=False, seconds=900)
+
+
+def run(command, folder, seconds=None, check=True, mutant=None):
+    def limit():
+        resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
+
+    alone = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OVERLAPPER_MUTANT": f"{mutant or 0}"}
+    return subprocess.run(
+        command, cwd=folder, env={**os.environ, **alone}, capture_output=True, text=True, errors="replace", check=check,
+        timeout=seconds, preexec_fn=None if mutant is None else limit,
+    )  # fmt: skip
+
+
+COLUMNS = ["file", "line", "before", "after", "noticed_by"]
+
+
+def read_results(path: Path) -> dict[tuple[str, str, str], str]:
+    if not path.exists():
+        return {}
+    with path.open(newline="") as lines:
+        return {(row["file"], row["before"], row["after"]): row["noticed_by"] for row in csv.DictReader(lines)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--count", type=int, default=200, help="mutants drawn that are not known as equivalent")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="mutants shown to the tests at once")
+    parser.add_argument("--again", action="store_true", help="show those once more that survived")
+    chosen = parser.parse_args()
+
+    everything = all_mutants(ROOT / "overlapper" / "native")
+    equivalent = known_equivalent()
+    if gone := equivalent.keys() - {mutant.name for mutant in everything}:
+        raise SystemExit(f"{EQUIVALENT.name} names what is not in the source: {sorted(gone)}")
+    drawn = random.Random(chosen.seed).sample(everything, len(everything))
+    asked = [mutant for mutant in drawn if mutant.name not in equivalent]
+    bench = Bench(WORK, dict(enumerate(asked[: chosen.count], 1)))
+    print(f"{len(bench.mutants)} of {chosen.count} mutants compile", flush=True)
+
+    file = WORK / f"seed-{chosen.seed}.csv"
+    known = {name: by for name, by in read_results(file).items() if by or not chosen.again}
+    results: dict[int, str] = {
+        number: known[mutant.name] for number, mutant in bench.mutants.items() if mutant.name in known
+    }
+
+    def write() -> None:
+        with file.open("w", newline="") as out:
+            writer = csv.writer(out, lineterminator="\n")
+            writer.writerow(COLUMNS)
+            for number, by in sorted(results.items()):
+                mutant = bench.mutants[number]
+                writer.writerow([mutant.name[0], mutant.line + 1, *mutant.name[1:], by])
+
+    def show(number: int) -> None:
+        results[number] = bench.noticed(number)
+        print(f"{len(results)}/{len(bench.mutants)} {results[number] or survivor(bench.mutants[number])}", flush=True)
+        write()
+
+    with ThreadPoolExecutor(chosen.jobs) as jobs:
+        for shown in [jobs.submit(show, number) for number in bench.mutants if number not in results]:
+            shown.result()
+    write()
+    survived = [bench.mutants[number] for number, by in sorted(results.items()) if not by]
+    print(*map(survivor, survived), sep="\n")
+    print(f"{len(results) - len(survived)} of {len(results)} mutants of seed {chosen.seed} are noticed")
+
+
+def survivor(mutant: Mutant) -> str:
+    return f"survived: {mutant.file}:{mutant.line + 1}\n  - {mutant.before.strip()}\n  + {mutant.after.strip()}"
+
+
+if __name__ == "__main__":
+    main()
