@@ -13,6 +13,7 @@ import numpy as np
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere
 
 CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
+WAYS = [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) != (0, 0, 0)]
 SQUARE = [(x, y) for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
 
 
@@ -168,6 +169,22 @@ def copies(rng: Random) -> Iterator[PlainCase]:
             )
 
 
+def rough(rng: Random) -> Iterator[PlainCase]:
+    """Hulls with a base that is nearly flat, on a box and on a tetrahedron by next to nothing, and in a third body."""
+    square = [(x / 4, y / 4) for x in range(-4, 5, 2) for y in range(-4, 5, 2)]
+    bar, spike = Box((0.5, 0.5, 0.5)), Hull([(0, 0, 0.5), (1, 0, -0.5), (-1, 1, -0.5), (-1, -1, -0.5)])
+    for roughness in (1e-16, 1e-15, 1e-14, 1e-13):
+        base = [(x, y, rng.uniform(0, roughness)) for x, y in square]
+        hull = Placed(Hull(base + [(0.3 * x, 0.3 * y, 1) for x, y in SQUARE]))
+        for gap in (5e-17, 1e-15, 4e-15, 2e-14, 1e-13, 3e-13, 1e-12):
+            for below in (bar, spike):
+                for side in (-1, 1):
+                    other = Placed(below, (0.1, 0.05, -0.5 + side * gap))
+                    name = f"{roughness:.0e} rough, {side * gap:.0e} into a {type(below).__name__}"
+                    yield PlainCase(name, [hull, other])
+                    yield PlainCase(f"{name}, and a box", [hull, other, Placed(Box((2, 2, 2)), (0.5, 0.25, 0.125))])
+
+
 def fine(rng: Random) -> Iterator[PlainCase]:
     """Hulls of so many facets that the common part is traced, deep, shallow, hardly and not at all; in a box, too."""
     for count in (60, 120, 300, 700):
@@ -204,18 +221,30 @@ def round_bodies(rng: Random) -> Iterator[PlainCase]:
         yield PlainCase(f"capsule on a table by {depth:.0e}", [table, Placed(Capsule(0.5, 1), (0, 0, 0), (1, 0, 0, 1))])
 
 
+def narrow_tip(way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A pyramid whose apex alone is in a block, five of the article's steps deep: most shifts lead out of it."""
+    up = way / np.sqrt(way @ way)
+    across = np.array([up[2], up[0], up[1]]) if abs(up).min() < abs(up).max() else np.array([1.0, -1, 0]) * up
+    u = across - (across @ up) * up
+    u = u / np.sqrt(u @ u)
+    v = np.array([up[1] * u[2] - up[2] * u[1], up[2] * u[0] - up[0] * u[2], up[0] * u[1] - up[1] * u[0]])
+    tip = np.array([0 * up, *(up + 0.2 * (s * u + t * v) for s, t in SQUARE)])
+    block = np.array([w * up + s * u + t * v for w in (5 * 2.0**-26, -1) for s, t in SQUARE])
+    return tip, block
+
+
 def by_the_article(rng: Random) -> Iterator[PlainCase]:
     """What the article's method says, also where the common point is on a boundary and has to be shifted."""
     for i in range(16):
         bodies = [posed(rng, SHAPES[rng.choice(["box", "hull", "ball", "half-space"])](rng)) for _ in range(2)]
         bodies[0] = posed(rng, SHAPES["hull"](rng))
         yield PlainCase(f"article {i}", bodies, method="paper")
-    for x in (-1, 0, 1):
-        for y in (-1, 0, 1):
-            for z in (-1, 0, 1):
-                if (x, y, z) != (0, 0, 0):
-                    bodies = [Placed(Hull(CUBE)), Placed(Hull(CUBE), np.array([x, y, z]) * 1.5)]
-                    yield PlainCase(f"article, cubes along {x} {y} {z}", bodies, method="paper")
+    for x, y, z in WAYS:
+        bodies = [Placed(Hull(CUBE)), Placed(Hull(CUBE), np.array([x, y, z]) * 1.5)]
+        yield PlainCase(f"article, cubes along {x} {y} {z}", bodies, method="paper")
+    for x, y, z in WAYS:
+        tip, lid = narrow_tip(np.array([x, y, z]))
+        yield PlainCase(f"article, a tip along {x} {y} {z}", [Placed(Hull(tip)), Placed(Hull(lid))], method="paper")
     for count in (3, 5):
         several = [posed(rng, SHAPES["hull"](rng), 0.2) for _ in range(count)]
         yield PlainCase(f"article, {count} bodies", several, method="paper")
@@ -223,7 +252,7 @@ def by_the_article(rng: Random) -> Iterator[PlainCase]:
 
 GROUPS = {
     group.__name__: group
-    for group in (kinds, slivers, boxes, slender, many, copies, fine, round_bodies, by_the_article)
+    for group in (kinds, slivers, boxes, slender, many, copies, rough, fine, round_bodies, by_the_article)
 }
 
 
