@@ -38,7 +38,8 @@ def as_one(numbers) -> float:
 def answer_of(case: PlainCase) -> dict[str, object]:
     found = overlap(*case.bodies, tolerance=case.tolerance, method=case.method)
     row: dict[str, object] = {
-        "status": found.status, "widened": found.widened, "touched": found.facets_touched, "planes": planes_asked(case),
+        "status": found.status, "way": found.way,
+        "widened": found.widened, "touched": found.facets_touched, "planes": planes_asked(case),
         "volume": found.volume, "error": found.volume_error, "area": found.area, "inertia": as_one(found.inertia),
         "gradient": as_one(found.gradient),
     }  # fmt: skip
