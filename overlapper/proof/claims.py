@@ -35,10 +35,34 @@ def require(claim: bool | np.bool_, sentence: str) -> None:
         raise CertificateError(sentence)
 
 
-def require_rational(*values: Exact | Fraction) -> None:
-    """Doubles would be rounded on the way, and NaN would pass for anything."""
-    for number in (x for value in values for x in np.asarray(value, object).flat):
-        require(isinstance(number, int | Fraction), f"numbers must be integers or fractions, not {number!r}")
+def require_number(number: object) -> None:
+    """Doubles would be rounded on the way, NaN would pass for anything, and a subclass may compare as it likes."""
+    whole = type(number) is int
+    if type(number) is Fraction:
+        over, under = number.numerator, number.denominator
+        whole = type(over) is int and type(under) is int and under > 0
+    require(whole, f"numbers must be integers or fractions, not {number!r}")
+
+
+def require_array(name: str, value: object, *shape: int) -> None:
+    """Of numbers; a subclass of arrays may add and multiply as it likes."""
+    is_array = type(value) is np.ndarray and value.shape == shape
+    require(is_array, f"{name} must be an array of shape {shape}")
+    for number in np.asarray(value, object).flat:
+        require_number(number)
+
+
+def require_indices(name: str, value: object, below: int) -> None:
+    in_range = type(value) is np.ndarray and value.ndim == 1 and value.dtype.kind == "i"
+    in_range = in_range and bool(((np.asarray(value) >= 0) & (np.asarray(value) < below)).all())
+    require(in_range, f"{name} must be an array of indices below {below}")
+
+
+def require_bodies(shapes: object) -> None:
+    """A subclass of Placed may tell of another body than the core has."""
+    require(type(shapes) is tuple and len(shapes) > 1, "shapes must be a tuple of two bodies or more")
+    assert isinstance(shapes, tuple)
+    require(all(type(shape) is Placed for shape in shapes), "shapes must be Placed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,17 +75,23 @@ class OwnedPlane:
 
 
 def check_planes(shapes: tuple[Placed, ...], planes: tuple[OwnedPlane, ...]) -> None:
+    require_bodies(shapes)
+    is_tuple = type(planes) is tuple and all(type(plane) is OwnedPlane for plane in planes)
+    require(is_tuple and bool(planes), "planes must be a tuple of OwnedPlane, one or more")
     bodies = [RationalBody(shape) for shape in shapes]
     for number, plane in enumerate(planes):
-        require_rational(plane.normal, plane.offset)
-        require(0 <= plane.owner < len(bodies), f"plane {number} must belong to one of the bodies")
+        require_array("a normal", plane.normal, 3)
+        require_number(plane.offset)
+        require(any(plane.normal), f"plane {number} must have a normal that is not zero")
+        belongs = type(plane.owner) is int and 0 <= plane.owner < len(bodies)
+        require(belongs, f"plane {number} must belong to one of the bodies")
         below = bodies[plane.owner].is_below(plane.normal, plane.offset)
         require(below, f"plane {number} must have all of body {plane.owner} below it")
 
 
 def check_balance(planes: tuple[OwnedPlane, ...]) -> None:
     total = sum(plane.normal for plane in planes)
-    require(bool(planes) and not np.any(total), "normals must add up to zero")
+    require(not np.any(total), "normals must add up to zero")
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +129,12 @@ class Touching:
     def verify(self) -> Bounds:
         check_planes(self.shapes, self.planes)
         check_balance(self.planes)
-        require_rational(self.inradius, self.point, self.nearest, self.miss)
-        lengths = sum(root(plane.normal @ plane.normal)[0] for plane in self.planes)
+        require_number(self.inradius)
+        require_array("point", self.point, 3)
+        require_array("nearest", self.nearest, len(self.shapes), 3)
+        require_number(self.miss)
+        require(self.miss >= 0, "miss must not be negative")
+        lengths = sum(root(plane.normal @ plane.normal)[self.inradius < 0] for plane in self.planes)
         room = sum(plane.offset for plane in self.planes)
         require(room <= self.inradius * lengths, "planes must leave no room for a ball larger than the inradius")
         for number, (shape, point) in enumerate(zip(self.shapes, self.nearest, strict=True)):
@@ -157,7 +191,16 @@ class Overlapping:
 
     def verify(self) -> Bounds:
         check_planes(self.shapes, self.planes)
-        require_rational(self.vertices, self.point, self.margin, self.pull)
+        count = len(self.pull) if type(self.pull) is np.ndarray and self.pull.ndim == 1 else 0
+        require_array("pull", self.pull, count)
+        require_array("vertices", self.vertices, count, 3)
+        require_array("point", self.point, 3)
+        require_number(self.margin)
+        require(type(self.rings) is tuple and len(self.rings) > 3, "rings must be a tuple of four polygons or more")
+        for ring in self.rings:
+            require_indices("a ring", ring, count)
+            require(len(ring) > 2, "a ring must have three corners or more")
+        require_indices("facet", self.facet, len(self.planes))
         triangles = fans(self.rings)
         numbers, unit = integers(np.vstack([self.vertices, self.point]))
         arms, centre = numbers[:-1] - numbers[-1], numbers[-1]

@@ -188,7 +188,7 @@ def test_a_false_gap_is_found(name):
     swapped = replace(first, owner=others[0].owner)
     rejected(claim, "plane 0 must have all of body", planes=(swapped, *others))
     rejected(claim, "one of the bodies", planes=(replace(first, owner=len(claim.shapes)), *others))
-    rejected(claim, "normals must add up", planes=())
+    rejected(claim, "planes must be a tuple", planes=())
 
 
 def test_a_gap_claimed_between_bodies_with_a_common_point_is_found():
