@@ -33,6 +33,13 @@ KINDS = {
     35: "signed distance field",
 }
 
+# The structs in the blocks of each code, as pybullet writes them.
+NAMES = {
+    "MBLC": "btMultiBodyLinkColliderDoubleData",
+    "MBDY": "btMultiBodyDoubleData",
+    "RBDY": "btRigidBodyDoubleData",
+}
+
 NUMBERS = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "float": "<f4", "double": "<f8"}
 
 
@@ -128,23 +135,38 @@ class BulletFile:
         return self._leaves[address]
 
     def _read_bodies(self, blocks: list[Block]) -> tuple[SavedBody, ...]:
+        colliders: dict[int, dict[int, Collider]] = {}  # of each multibody, by link
+        frictions: dict[int, float] = {}  # of each multibody, of its base
+        links = self._first_records(blocks, "MBLC")
+        objects = links["m_colObjData"]
+        for body, link, collider, friction in zip(
+            links["m_multiBody"].tolist(), links["m_link"].tolist(), _colliders(objects), objects["m_friction"].tolist()
+        ):
+            colliders.setdefault(body, {})[link] = collider
+            if link == -1:
+                frictions[body] = friction
+        multibodies = self._first_records(blocks, "MBDY")
+        of_multibodies = zip(
+            multibodies["m_numLinks"].tolist(), multibodies["m_baseWorldPosition"]["m_floats"][:, :3], strict=True
+        )
+        rigid = self._first_records(blocks, "RBDY")["m_collisionObjectData"]
+        of_rigid = zip(_colliders(rigid), rigid["m_friction"].tolist(), strict=True)
         bodies: list[SavedBody] = []
-        colliders: dict[int, dict[int, Any]] = {}  # of each multibody, by link
-        for block in blocks:
-            if block.code == "MBLC":
-                collider = self._records(block)[0]
-                colliders.setdefault(int(collider["m_multiBody"]), {})[int(collider["m_link"])] = collider[
-                    "m_colObjData"
-                ]
         for block in blocks:
             if block.code == "MBDY":
-                body = self._records(block)[0]
-                position = body["m_baseWorldPosition"]["m_floats"][:3]
-                bodies.append(_saved(int(body["m_numLinks"]), position, colliders.get(block.address, {})))
+                count, position = next(of_multibodies)
+                bodies.append(SavedBody(count, position, frictions[block.address], colliders[block.address]))
             elif block.code == "RBDY":
-                collider = self._records(block)[0]["m_collisionObjectData"]
-                bodies.append(_saved(0, collider["m_worldTransform"]["m_origin"]["m_floats"][:3], {-1: collider}))
+                collider, friction = next(of_rigid)
+                bodies.append(SavedBody(0, collider.position, friction, {-1: collider}))
         return tuple(bodies)
+
+    def _first_records(self, blocks: list[Block], code: str) -> NDArray[np.void]:
+        """The first struct of each block of this code, one after the other, as one array."""
+        found = [block for block in blocks if block.code == code]
+        name = self._layouts.names[found[0].layout] if found else NAMES[code]
+        dtype = self._layouts.dtype(name)
+        return np.frombuffer(b"".join(self._data[at.offset : at.offset + dtype.itemsize] for at in found), dtype)
 
     def _flatten(self, address: int, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> list[Leaf]:
         number = int(self._base(address, "btCollisionShapeData")["m_shapeType"])
@@ -215,19 +237,18 @@ class BulletFile:
         return np.frombuffer(self._data, self._layouts.dtype(name), block.length, block.offset)
 
 
-def _saved(links: int, position: NDArray[np.float64], colliders: dict[int, Any]) -> SavedBody:
-    made = {link: _collider(record) for link, record in colliders.items()}
-    return SavedBody(links, position, float(colliders[-1]["m_friction"]), made)
-
-
-def _collider(record: Any) -> Collider:
-    transform = record["m_worldTransform"]
-    return Collider(
-        int(record["m_collisionShape"]),
-        int(record["m_collisionFilterGroup"]),
-        int(record["m_collisionFilterMask"]),
-        transform["m_origin"]["m_floats"][:3],
-        transform["m_basis"]["m_el"]["m_floats"][:, :3],
+def _colliders(records: NDArray[np.void]) -> list[Collider]:
+    """Of collision objects: many at once, as every look at a single struct takes its time."""
+    transforms = records["m_worldTransform"]
+    return list(
+        map(
+            Collider,
+            records["m_collisionShape"].tolist(),
+            records["m_collisionFilterGroup"].tolist(),
+            records["m_collisionFilterMask"].tolist(),
+            transforms["m_origin"]["m_floats"][:, :3],
+            transforms["m_basis"]["m_el"]["m_floats"][:, :, :3],
+        )
     )
 
 
