@@ -152,10 +152,16 @@ std::vector<OwnedPlane> facing_planes(std::span<const Placed> bodies, const Dist
   return planes;
 }
 
-/// Where doubles are not sure of a gap or of a common ball. The sizes that count are the same for a mirror image, for
-/// other axes and for another order.
-void settle_in_wide_arithmetic(const Arrangement& at, Search& search) {
-  const double noise = wide_rounding(search.reach);
+/// What double-doubles say of a gap or of a common ball where doubles are not sure: nothing new where they are not
+/// either.
+struct Settled {
+  Status status = Status::kTouching;
+  std::optional<WideBall> ball;
+};
+
+/// The sizes that count are the same for a mirror image, for other axes and for another order.
+Settled settled_in_wide_arithmetic(const Arrangement& at, double reach, std::vector<OwnedPlane> hints) {
+  const double noise = wide_rounding(reach);
   double least_size = kInfinity, largest_size = 0;
   for (const Placed& body : at.relative) {
     if (!bounded(body.shape)) continue;
@@ -164,25 +170,25 @@ void settle_in_wide_arithmetic(const Arrangement& at, Search& search) {
     least_size = std::min(least_size, size);
     largest_size = std::max(largest_size, size);
   }
-  if (!std::isfinite(least_size)) return;
+  if (!std::isfinite(least_size)) return {};
   const std::vector<WideBody> bodies = at.wide_bodies();
   // Nearer or thinner than the rounding of their coordinates, bodies touch, but not by 1e-12 of the smaller one's size.
   const double margin = std::max(4 * noise, std::min(rounding(largest_size / 2), 0x1p-41 * least_size));
-  std::vector<OwnedPlane> hints = search.ball.cuts;
   if (bodies.size() == 2) {
     const WideGap gap = wide_gap(bodies[0], bodies[1], noise);
-    if (gap.certified > margin) {
-      search.status = Status::kSeparated;
-      search.way = Way::kWideSeparation;
-      return;
-    }
+    if (gap.certified > margin) return {Status::kSeparated, {}};
     if (norm2(gap.normal) > 0) hints.insert(hints.end(), {{{-gap.normal, 0}, 0}, {{gap.normal, 0}, 1}});
   }
-  search.wide_ball = wide_deepest_ball(bodies, hints, margin, search.reach, noise);
-  if (search.wide_ball->upper < -margin) search.status = Status::kSeparated, search.way = Way::kWideSeparation;
-  if (search.wide_ball->lower > margin) search.status = Status::kOverlapping, search.way = Way::kWideDual;
-  search.ball.upper = search.wide_ball->upper;
-  search.ball.rounding = noise;
+  Settled settled{Status::kTouching, wide_deepest_ball(bodies, hints, margin, reach, noise)};
+  if (settled.ball->upper < -margin) settled.status = Status::kSeparated;
+  if (settled.ball->lower > margin) settled.status = Status::kOverlapping;
+  return settled;
+}
+
+/// True if the bodies overlap beyond doubt because the cores of the two are nearer to each other than their radii
+/// reach: a point of one core is then inside the other body, and near it are points inside its own.
+bool cores_reach(const Placed& a, const Placed& b, const Distance& d, double reach) {
+  return core_radius(a.shape) + core_radius(b.shape) > 0 && norm2(d.normal) > 0 && -d.distance > doubt(reach);
 }
 
 Region owned_as_given(Region region, const Arrangement& at) {
@@ -201,28 +207,45 @@ Region grown_about(const WideBall& ball, const Arrangement& at, double reach, do
 
 Search search(const Arrangement& at) {
   const std::vector<Placed>& bodies = at.relative;
-  const Choice& choice = choose(traits(bodies));
   Search search;
-  std::vector<double> reaches;
-  for (const Placed& body : bodies) reaches.push_back(magnitude(body));
-  search.reach = *std::ranges::max_element(reaches);
-  std::vector<OwnedPlane> hints;
+  for (const Placed& body : bodies) search.reaches.push_back(magnitude(body));
+  search.reach = *std::ranges::max_element(search.reaches);
   if (bodies.size() == 2 && (bounded(bodies[0].shape) || bounded(bodies[1].shape))) {
     const Distance d = distance(bodies[0], bodies[1]);
     if (d.gap > doubt(search.reach)) return search;
-    hints = facing_planes(bodies, d);
+    search.hints = facing_planes(bodies, d);
+    if (cores_reach(bodies[0], bodies[1], d, search.reach)) {
+      search.status = Status::kOverlapping, search.way = Way::kDual;
+      return search;
+    }
   }
-  search.planes = gather_planes<Placed>(bodies);
-  search.ball = deepest_ball(bodies, reaches, search.planes, hints);
-  if (search.ball.sure) {
+  Inside inside{gather_planes<Placed>(bodies), {}, {}};
+  inside.ball = deepest_ball(bodies, search.reaches, inside.planes, search.hints);
+  if (inside.ball.sure) {
     search.status = Status::kOverlapping, search.way = Way::kDual;
-  } else if (!search.ball.apart) {
-    search.status = Status::kTouching, search.way = Way::kDoubt;
-    if (choice.in_doubt == Way::kWideDual) settle_in_wide_arithmetic(at, search);
+  } else if (!inside.ball.apart) {
+    Settled settled = settled_in_wide_arithmetic(at, search.reach, inside.ball.cuts);
+    search.status = settled.status;
+    search.way = settled.status == Status::kSeparated     ? Way::kWideSeparation
+                 : settled.status == Status::kOverlapping ? Way::kWideDual
+                                                          : Way::kDoubt;
+    inside.wide_ball = std::move(settled.ball);
+    if (inside.wide_ball) {
+      inside.ball.upper = inside.wide_ball->upper;
+      inside.ball.rounding = wide_rounding(search.reach);
+    }
   }
   if (search.status != Status::kSeparated && !bounds_space(bodies))
     throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
+  search.inside = std::move(inside);
   return search;
+}
+
+Inside look_inside(const Arrangement& at, const Search& found) {
+  Inside inside{gather_planes<Placed>(at.relative), {}, {}};
+  inside.ball = deepest_ball(at.relative, found.reaches, inside.planes, found.hints);
+  if (!inside.ball.sure) inside.wide_ball = settled_in_wide_arithmetic(at, found.reach, inside.ball.cuts).ball;
+  return inside;
 }
 
 double touching_volume(std::span<const Placed> bodies, const DeepestBall& ball) {
@@ -239,11 +262,10 @@ double touching_volume(std::span<const Placed> bodies, const DeepestBall& ball) 
 
 // ----------------------------------------------------------------------------------------------------------- measures
 
-Region grown(const Arrangement& at, const Search& found, double tolerance) {
-  if (found.wide_ball) return grown_about(*found.wide_ball, at, found.reach, tolerance);
-  const Frame frame = round_frame<Placed>(at.relative, found.planes, found.ball.cuts, found.ball.centre);
-  return owned_as_given(grow<Placed>(at.relative, found.planes, frame, tolerance, rounding(found.reach), at.reference),
-                        at);
+Region grown(const Arrangement& at, const Inside& inside, double reach, double tolerance) {
+  if (inside.wide_ball) return grown_about(*inside.wide_ball, at, reach, tolerance);
+  const Frame frame = round_frame<Placed>(at.relative, inside.planes, inside.ball.cuts, inside.ball.centre);
+  return owned_as_given(grow<Placed>(at.relative, inside.planes, frame, tolerance, rounding(reach), at.reference), at);
 }
 
 namespace {
@@ -267,8 +289,9 @@ MeasuresInFull by_region(const Region& region, std::span<const Placed> bodies, W
 
 MeasuresInFull measure_in_full(const Findings& known) {
   const Arrangement& at = known.at;
-  const bool searched_wide = !known.traced && known.search().wide_ball;
-  if (searched_wide) return by_region(known.region(), known.bodies, Way::kWideDual);
+  const auto in_wide_arithmetic = [&] { return !known.traced && known.inside().wide_ball; };
+  if (!known.traced && known.search().inside && in_wide_arithmetic())
+    return by_region(known.region(), known.bodies, Way::kWideDual);
   const Choice& choice = choose(traits(known.bodies));
   const double finest = std::max(known.tolerance, kFinest);
   MeasuresInFull kept;
@@ -288,10 +311,10 @@ MeasuresInFull measure_in_full(const Findings& known) {
   if (polyhedral ? !enough() : rounding(reach()) * kept.measures.area > finest * kept.measures.volume) {
     // The point about which the region was grown may not be inside after all, or its frame not be round.
     const double noise = wide_rounding(reach());
-    const WideBall ball = wide_deepest_ball(at.wide_bodies(), known.search().ball.cuts, 4 * noise, reach(), noise);
+    const WideBall ball = wide_deepest_ball(at.wide_bodies(), known.inside().ball.cuts, 4 * noise, reach(), noise);
     if (ball.lower > 0) keep_better(grown_about(ball, at, reach(), known.tolerance));
     else if (polyhedral)
-      kept.measures.volume_error += kept.measures.volume + touching_volume(known.bodies, known.search().ball);
+      kept.measures.volume_error += kept.measures.volume + touching_volume(known.bodies, known.inside().ball);
   }
   return kept;
 }

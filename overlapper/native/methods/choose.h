@@ -37,39 +37,32 @@ struct Traits {
 Traits traits(const Placed& a, const Placed& b);
 Traits traits(std::span<const Placed> bodies);
 
-/// A line of the table: which bodies, the ways that are tried in turn until one answers, and what is left where doubles
-/// cannot tell the status. Before kDual, the status is found by a search for a plane between the bodies or a ball
-/// inside all of them; where kDual leaves more than kEnough of the volume in doubt, kWideDual follows it.
+/// A line of the table: which bodies, and the ways that are tried in turn until one answers. Before kDual, the status
+/// is found by a search for a plane between the bodies or a ball inside all of them; where kDual leaves more than
+/// kEnough of the volume in doubt, kWideDual follows it.
 struct Choice {
   const char* bodies;
   bool (*fits)(const Traits&);
   std::array<Way, 4> ways;  ///< up to kDual, which always answers
-  Way in_doubt;
 
   bool tries(Way way) const { return std::ranges::find(ways, way) != ways.end(); }
 };
 
 /// How bodies are measured. The first line that fits counts, for single calls, batches and groups alike.
-inline constexpr std::array<Choice, 6> kChoices{{
+inline constexpr std::array<Choice, 5> kChoices{{
     {"two boxes or hulls of many facets",
      [](const Traits& t) { return t.many_facet_pairs && t.clippable; },
-     {Way::kTracing, Way::kClipping, Way::kWideClipping, Way::kDual},
-     Way::kWideDual},
+     {Way::kTracing, Way::kClipping, Way::kWideClipping, Way::kDual}},
     {"two boxes or hulls, one of very many facets",
      [](const Traits& t) { return t.many_facet_pairs; },
-     {Way::kTracing, Way::kDual},
-     Way::kWideDual},
+     {Way::kTracing, Way::kDual}},
     {"two or more boxes, hulls and half-spaces",
      [](const Traits& t) { return t.clippable && t.bounded; },
-     {Way::kClipping, Way::kWideClipping, Way::kDual},
-     Way::kWideDual},
+     {Way::kClipping, Way::kWideClipping, Way::kDual}},
     {"two, one of them a ball, a capsule or a cylinder, and no rounded hull",
      [](const Traits& t) { return t.bodies == 2 && t.round && !t.rounded; },
-     {Way::kClosedForm, Way::kDual},
-     Way::kWideDual},
-    // Their oracle knows the nearest point of a polytope in doubles only.
-    {"two or more, with a rounded hull", [](const Traits& t) { return t.rounded; }, {Way::kDual}, Way::kDoubt},
-    {"all others", [](const Traits&) { return true; }, {Way::kDual}, Way::kWideDual},
+     {Way::kClosedForm, Way::kDual}},
+    {"all others", [](const Traits&) { return true; }, {Way::kDual}},
 }};
 const Choice& choose(const Traits& traits);
 
@@ -89,17 +82,27 @@ struct Arrangement {
 };
 Arrangement arranged(std::span<const Placed> bodies);
 
-/// What is found by looking for a plane between the bodies, then for the largest ball inside all of them.
-struct Search {
-  Status status = Status::kSeparated;
-  Way way = Way::kSeparation;      ///< by which the status is known; kDual or kWideDual if overlapping
-  double reach = 0;                ///< how large the numbers are that describe the bodies
+/// What is found by looking for the largest ball inside all bodies.
+struct Inside {
   std::vector<OwnedPlane> planes;  ///< of all bodies
   DeepestBall ball{};
   std::optional<WideBall> wide_ball;  ///< where it had to be looked for in double-doubles
 };
+
+/// What is found by looking for a plane between the bodies, then, if there may be none, for a ball inside all of them.
+struct Search {
+  Status status = Status::kSeparated;
+  Way way = Way::kSeparation;     ///< by which the status is known; kDual or kWideDual if overlapping
+  std::vector<double> reaches;    ///< how large the numbers are that describe each body
+  double reach = 0;               ///< the largest
+  std::vector<OwnedPlane> hints;  ///< for whoever looks for a ball
+  std::optional<Inside> inside;   ///< nothing where the status was known without
+};
 /// Throws std::invalid_argument if the common set is unbounded.
 Search search(const Arrangement& at);
+
+/// The ball of bodies that overlap, where the search has not looked for it.
+Inside look_inside(const Arrangement& at, const Search& found);
 
 /// m³: what the common set of bodies that only touch may hold. The inradius is rounding, and a convex set's volume is
 /// at most its inradius times its surface, which is no larger than that of a box around any of the bodies.
@@ -113,7 +116,7 @@ double magnitude(const Placed& relative);
 double wide_rounding(double reach);
 
 /// The polytope of bodies that overlap, by dual points; owners are numbers of the bodies as given.
-Region grown(const Arrangement& at, const Search& found, double tolerance);
+Region grown(const Arrangement& at, const Inside& inside, double reach, double tolerance);
 
 /// Measures of bodies that overlap, where measure_at_once() has none.
 struct Findings {
@@ -122,6 +125,7 @@ struct Findings {
   double tolerance;
   bool traced;
   std::function<const Search&()> search;
+  std::function<const Inside&()> inside;
   std::function<const Region&()> region;  ///< owners are numbers of `bodies`
 };
 MeasuresInFull measure_in_full(const Findings& known);

@@ -61,6 +61,11 @@ const Search& Overlap::search() const {
   return lazy().search.get([this] { return overlapper::search(arrangement()); });
 }
 
+const Inside& Overlap::inside() const {
+  if (search().inside) return *search().inside;
+  return lazy().inside.get([this] { return look_inside(arrangement(), search()); });
+}
+
 const Region& Overlap::region() const {
   return lazy().region.get([this] { return region_of_overlap(); });
 }
@@ -82,7 +87,7 @@ Region Overlap::region_of_overlap() const {
       return std::move(*region);
     }
   }
-  return grown(at, search(), tolerance_);
+  return grown(at, inside(), search().reach, tolerance_);
 }
 
 MeasuresInFull Overlap::measured_in_full() const {
@@ -92,6 +97,7 @@ MeasuresInFull Overlap::measured_in_full() const {
     return as_in_paper;
   }
   return measure_in_full({arrangement(), bodies(), tolerance_, traced(), [this]() -> const Search& { return search(); },
+                          [this]() -> const Inside& { return inside(); },
                           [this]() -> const Region& { return region(); }});
 }
 
@@ -109,7 +115,7 @@ double Overlap::volume_error() const {
   if (method_ == Method::kPaper) return lazy().error_of_paper.get([this] { return error_of_paper(); });
   switch (status_) {
     case Status::kSeparated: return 0;
-    case Status::kTouching: return touching_volume(bodies(), search().ball);
+    case Status::kTouching: return touching_volume(bodies(), inside().ball);
     case Status::kOverlapping: return measures().volume_error;
   }
   return 0;
@@ -155,7 +161,8 @@ const Contact& Overlap::contact() const {
       return Contact{0, depth, normal, {}, {}, {}};
     }
     const bool searched = method_ == Method::kAuto && !at_once_;
-    const WideBall* ball = searched && search().wide_ball ? &*search().wide_ball : nullptr;
+    const WideBall* ball =
+        searched && search().inside && search().inside->wide_ball ? &*search().inside->wide_ball : nullptr;
     return contact_of(arrangement(), status_, method_ == Method::kPaper, ball);
   });
 }

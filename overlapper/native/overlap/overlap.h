@@ -69,6 +69,7 @@ class Overlap {
   struct Lazy {
     Once<Arrangement> arrangement;
     Once<Search> search;
+    Once<Inside> inside;
     Once<Region> region;
     Once<MeasuresInFull> in_full;
     Once<Boundary> boundary;
@@ -79,6 +80,7 @@ class Overlap {
   const Lazy& lazy() const;
   const Arrangement& arrangement() const;
   const Search& search() const;
+  const Inside& inside() const;
   const MeasuresInFull& in_full() const;
   Region region_of_overlap() const;
   MeasuresInFull measured_in_full() const;
