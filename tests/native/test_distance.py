@@ -262,7 +262,7 @@ def test_facets_and_arcs_hold_the_way_out_that_epa_finds(tilt):
         a = Placed(Hull(p), (0, 0, 0), orientation)
         b = Placed(Hull(q), rng.normal(size=3) * rng.choice([1e-3, 0.1, 0.4]), orientation + tilt * rng.normal(size=4))
         depth = penetration_depth(a, b)
-        grown = Placed(RoundedHull(p, 1e-90), a.position, a.orientation)
+        grown = Placed(RoundedHull(p, 1e-24), a.position, a.orientation)
         assert depth == pytest.approx(penetration_depth(grown, b), rel=1e-12, abs=64 * EPS)
         assert penetration_depth(b, a) == depth
         deepest = max(deepest, depth)

@@ -341,9 +341,11 @@ Hull hull_of_surface(Vec3 origin, std::span<const Vec3> corners, std::span<const
 Hull make_hull(std::span<const Vec3> points) {
   require(points.size() >= 4, "vertices must hold at least four points, not " + std::to_string(points.size()));
   for (Vec3 p : points) require(finite(p), "vertices must be finite");
-  double largest = 0;
-  for (Vec3 p : points) largest = std::max(largest, max_component(abs(p)));
-  require(largest < kLargest, "vertices must be closer to the origin than 1e100 m");
+  Vec3 lower = points[0], upper = points[0];
+  for (Vec3 p : points) lower = min(lower, p), upper = max(upper, p);
+  require(max_component(max(-lower, upper)) < kLargest, "vertices must be closer to the origin than 1e25 m");
+  const double span = max_component(upper - lower);
+  require(span == 0 || span > kSmallest, "vertices must span more than 1e-25 m");
   auto data = hull_of(points);
   require(data != nullptr, "vertices are flat: they all lie in one plane");
   data->graph = graph_of(*data);

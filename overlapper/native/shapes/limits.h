@@ -5,8 +5,9 @@
 
 namespace overlapper {
 
-/// m: products of a few coordinates, and of their reciprocals, must neither overflow nor underflow.
-inline constexpr double kSmallest = 1e-100, kLargest = 1e100;
+/// m: the sizes and distances that are let in. Products of six lengths, and of their reciprocals, neither overflow nor
+/// underflow, nor does what rounding leaves of them.
+inline constexpr double kSmallest = 1e-25, kLargest = 1e25;
 
 /// Throws std::invalid_argument, with one sentence that names the argument, unless the condition holds.
 inline void require(bool condition, const std::string& message) {

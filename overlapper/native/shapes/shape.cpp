@@ -18,7 +18,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 void require_size(double value, const char* name) {
   require(std::isfinite(value), std::string(name) + " must be finite");
   require(value > 0, std::string(name) + " must be greater than 0, not " + std::to_string(value));
-  require(value > kSmallest && value < kLargest, std::string(name) + " must be between 1e-100 and 1e100 m");
+  require(value > kSmallest && value < kLargest, std::string(name) + " must be between 1e-25 and 1e25 m");
 }
 
 double radial(Vec3 v) { return std::hypot(v.x, v.y); }
@@ -140,6 +140,7 @@ Capsule make_capsule(double radius, double length) {
   require_size(radius, "radius");
   require(std::isfinite(length), "length must be finite");
   require(length >= 0, "length must not be negative, it is " + std::to_string(length));
+  require(length < kLargest, "length must be less than 1e25 m");
   return {radius, length};
 }
 
@@ -154,6 +155,8 @@ HalfSpace make_half_space(Vec3 normal, double offset) {
   require(std::isfinite(offset), "offset must be finite");
   const double length = norm(normal);
   require(length > 0, "normal must not be zero");
+  require(length > kSmallest && length < kLargest, "normal must be of a length between 1e-25 and 1e25");
+  require(std::abs(offset) / length < kLargest, "offset must be closer to the origin than 1e25 m");
   // A normal that is unit but for its last bits stays as given, so that planes read back and built anew are the same.
   if (std::abs(length - 1) <= 2 * DBL_EPSILON) return {{normal, offset}, normal, offset};
   return {{normal / length, offset / length}, normal, offset};
@@ -230,7 +233,7 @@ Placed make_placed(Shape shape, Vec3 position, Quaternion orientation) {
 
 void Placed::move_to(Vec3 new_position, Quaternion q) {
   require(finite(new_position), "position must be finite");
-  require(max_component(abs(new_position)) < kLargest, "position must be closer to the origin than 1e100 m");
+  require(max_component(abs(new_position)) < kLargest, "position must be closer to the origin than 1e25 m");
   require(std::isfinite(q.x) && std::isfinite(q.y) && std::isfinite(q.z) && std::isfinite(q.w),
           "orientation must be finite");
   require(!unturned(q) || q.w != 0, "orientation must not be the zero quaternion");
