@@ -62,9 +62,9 @@ def test_a_box_inside_a_huge_body_has_its_volume(name, power):
 
 
 @pytest.mark.parametrize("name", list(MADE)[:-1])
-def test_a_body_in_another_that_is_24_orders_larger_has_its_volume(name):
-    small = MADE[name](1e-12)
-    found = overlap(small, Box([1e12] * 3))
+def test_the_smallest_body_inside_the_largest_has_its_volume(name):
+    small = MADE[name](1.5e-25)
+    found = overlap(small, Box([0.9e25] * 3))
     assert abs(found.volume - small.volume) <= found.volume_error + 1e-15 * small.volume
 
 

@@ -285,6 +285,9 @@ MeasuresInFull by_region(const Region& region, std::span<const Placed> bodies, W
   return answer;
 }
 
+/// Without bound where rounding has turned the polytope inside out.
+double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 ? m.volume_error : kInfinity; }
+
 }  // namespace
 
 MeasuresInFull measure_in_full(const Findings& known) {
@@ -300,11 +303,10 @@ MeasuresInFull measure_in_full(const Findings& known) {
   else kept = by_region(known.region(), known.bodies, known.traced ? Way::kTracing : Way::kDual);
   const auto keep_better = [&](const Region& region) {
     MeasuresInFull again = by_region(region, known.bodies, Way::kWideDual);
-    if (!widened(kept.measures.way) || again.measures.volume_error < kept.measures.volume_error)
-      kept = std::move(again);
+    if (!widened(kept.measures.way) || error_of(again.measures) < error_of(kept.measures)) kept = std::move(again);
   };
   const bool polyhedral = std::ranges::none_of(known.bodies, [](const Placed& body) { return smooth(body.shape); });
-  const auto enough = [&] { return kept.measures.volume_error <= kEnough * kept.measures.volume; };
+  const auto enough = [&] { return error_of(kept.measures) <= kEnough * kept.measures.volume; };
   if (polyhedral && !enough())
     if (auto wide = widened(at.relative, known.region())) keep_better(owned_as_given(std::move(*wide), at));
   const auto reach = [&] { return known.search().reach; };
