@@ -9,7 +9,8 @@ import platform
 import re
 import time
 import warnings
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import mean, median
@@ -17,7 +18,7 @@ from statistics import mean, median
 import numpy as np
 import pybullet
 
-from overlapper import Box, HalfSpace, Hull, Shape
+from overlapper import Box, HalfSpace, Hull, Overlaps, Shape
 from overlapper.scenes.scene import Scene, load_scene, scenes_in
 from overlapper.simulation import Bodies, Recorder, Report, SkippedShapeWarning
 
@@ -44,6 +45,13 @@ steps, and for how long.
   their volume to 1e-12 of itself.
 - **time**: of `update()` and `overlaps()` at the default tolerance, the median step, on one thread{machine}.
 
+## By which way
+
+Pairs that overlap or touch in a step, on average over all steps, by the
+[way](how.md#which-bodies-are-measured-by-which-way) in which the answer came.
+
+{ways}
+
 `python docs/economy.py` runs the scenes and writes this page. `bodies.report()` has these counts for any scene, and
 `overlapper run` prints them.
 """
@@ -58,6 +66,10 @@ COUNTS = (
 )  # fmt: skip
 
 
+# The ways of what overlaps or touches.
+ANSWERS = [way for way in Overlaps.WAYS if not way.endswith("separation") and way != "paper"]
+
+
 def facets(shape: Shape) -> int:
     return len(shape.facets) if isinstance(shape, Hull) else 6 * isinstance(shape, Box) + isinstance(shape, HalfSpace)
 
@@ -69,6 +81,7 @@ class Economy:
     reports: list[Report] = field(default_factory=list)
     facets_there: list[int] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
+    by_way: Counter[str] = field(default_factory=Counter)  # pairs that overlap or touch, of all steps
 
     def row(self, name: str) -> list[str]:
         last = self.reports[-1]
@@ -80,8 +93,13 @@ class Economy:
         took = f"{1e3 * median(self.seconds):.2g} ms"
         return [name, f"{last.shapes:,}{read}", possible, examined, overlapping, there, asked, touched, widened, took]
 
+    def ways(self, name: str) -> list[str]:
+        return [name, *(rounded(self.by_way[way] / len(self.reports)) if self.by_way[way] else "" for way in ANSWERS)]
+
 
 def rounded(count: float) -> str:
+    if 0 < count < 0.05:
+        return "< 0.1"
     return f"{count:,.0f}" if count >= 10 or count == int(count) else f"{count:.1f}"
 
 
@@ -99,8 +117,9 @@ def economy(scene: Scene) -> Economy:
             pybullet.stepSimulation(client)
             begin = time.process_time()
             bodies.update()
-            bodies.overlaps(pairs=scene.pairs)
+            contacts = bodies.overlaps(pairs=scene.pairs)
             found.seconds.append(time.process_time() - begin)
+            found.by_way.update(Overlaps.WAYS[way] for way in contacts.overlaps.way)
             found.reports.append(bodies.report())
             found.facets_there.append(int(sizes[bodies.pairs(scene.pairs)].sum()))
     finally:
@@ -109,19 +128,21 @@ def economy(scene: Scene) -> Economy:
     return found
 
 
-def table(rows: Iterable[list[str]]) -> str:
-    rule = "|---|" + "--:|" * (len(HEADING) - 1)
-    return "\n".join([f"| {' | '.join(HEADING)} |", rule, *(f"| {' | '.join(row)} |" for row in rows)])
+def table(heading: Sequence[str], rows: Iterable[list[str]]) -> str:
+    rule = "|---|" + "--:|" * (len(heading) - 1)
+    return "\n".join([f"| {' | '.join(heading)} |", rule, *(f"| {' | '.join(row)} |" for row in rows)])
 
 
 def main() -> None:
     warnings.simplefilter("ignore", SkippedShapeWarning)
-    rows = []
+    rows, ways = [], []
     for path in scenes_in(HERE.parent / "scenes"):
         scene = load_scene(path)
-        rows.append(economy(scene).row(scene.name))
+        found = economy(scene)
+        rows.append(found.row(scene.name))
+        ways.append(found.ways(scene.name))
         print("  ".join(rows[-1]), flush=True)
-    text = WORDS.format(table=table(rows), machine=f" of {machine()}")
+    text = WORDS.format(table=table(HEADING, rows), ways=table(("scene", *ANSWERS), ways), machine=f" of {machine()}")
     (HERE / "economy.md").write_text(text, encoding="utf-8")
 
 
