@@ -187,7 +187,7 @@ def main() -> None:
     heading = re.escape(text.splitlines()[0])
     written, count = re.subn(heading + r"\n(?:\|.*\n)+", lambda _: text, page)
     if count != 1:
-        raise SystemExit(f"{PAGE} has not one such table, but {count}")
+        raise SystemExit(f"{PAGE} has {count} such tables, not one")
     PAGE.write_text(written, encoding="utf-8")
     print(text)
 
