@@ -11,7 +11,7 @@ from overlapper.face import lazily
 
 if TYPE_CHECKING:
     from overlapper.simulation.asked_pairs import Among
-    from overlapper.simulation.bodies import Bodies, SkippedShapeWarning
+    from overlapper.simulation.bodies import Bodies, SelfCollisionWarning, SkippedShapeWarning
     from overlapper.simulation.contacts import Contact, Contacts
     from overlapper.simulation.extraction.model import Concave, Decomposed, Skipped, Surface
     from overlapper.simulation.links import LinkContact, link_contacts
@@ -28,6 +28,7 @@ __all__ = [
     "LinkContact",
     "Recorder",
     "Report",
+    "SelfCollisionWarning",
     "Skipped",
     "SkippedShapeWarning",
     "Surface",
@@ -39,7 +40,7 @@ __getattr__ = lazily(
     __name__,
     {
         "asked_pairs": ("Among",),
-        "bodies": ("Bodies", "SkippedShapeWarning"),
+        "bodies": ("Bodies", "SelfCollisionWarning", "SkippedShapeWarning"),
         "contacts": ("Contact", "Contacts"),
         "extraction.model": ("Concave", "Decomposed", "Skipped", "Surface"),
         "links": ("LinkContact", "link_contacts"),

@@ -22,28 +22,28 @@ class AskedPairs:
     """The choice among the pairs of a layout, whose bodies have these `links`; a list is kept for the next step."""
 
     def __init__(self, layout: Layout, links: Mapping[int, Collection[int]]) -> None:
-        self._layout, self._links = layout, links
+        self.layout, self._links = layout, links
         self._listed: tuple[list[tuple[Who, Who]], Codes] | None = None
 
     def chosen(self, pairs: NDArray[np.int32], among: Among, rules: CollisionRules) -> Mask:
         """Which of these pairs of shapes are asked for."""
         first, second = pairs.T
         if among == "all":
-            return np.asarray(self._layout.owners[first] != self._layout.owners[second])
+            return np.asarray(self.layout.owners[first] != self.layout.owners[second])
         if among != "simulated":
-            return np.isin(first * np.int64(len(self._layout.keys)) + second, self._codes(among))
-        a, b = self._layout.colliders[first], self._layout.colliders[second]
+            return np.isin(first * np.int64(len(self.layout.keys)) + second, self._codes(among))
+        a, b = self.layout.colliders[first], self.layout.colliders[second]
         return np.asarray((a != b) & rules.allow(a, b))
 
     def possible(self, among: Among, rules: CollisionRules) -> int:
         """How many pairs of shapes are asked for, wherever they are."""
         if among == "simulated":
-            layout = self._layout
+            layout = self.layout
             return rules.count(np.bincount(layout.colliders, minlength=len(layout.collider_rows)))
         if among != "all":
             return len(self._codes(among))
-        of_each = np.unique(self._layout.owners, return_counts=True)[1]
-        return int(len(self._layout.owners) ** 2 - (of_each**2).sum()) // 2
+        of_each = np.unique(self.layout.owners, return_counts=True)[1]
+        return int(len(self.layout.owners) ** 2 - (of_each**2).sum()) // 2
 
     def _codes(self, among: Iterable[tuple[Who, Who]]) -> Codes:
         """The pairs of a list, as `pair_codes` has them."""
@@ -51,7 +51,7 @@ class AskedPairs:
             raise ValueError(f"pairs must be 'simulated', 'all' or a list of pairs, not {among!r}")
         asked = list(among)
         if not self._listed or self._listed[0] != asked:
-            self._listed = asked, pair_codes(asked, self._layout.keys, self._links)
+            self._listed = asked, pair_codes(asked, self.layout.keys, self._links)
         return self._listed[1]
 
 

@@ -11,9 +11,20 @@ from numpy.typing import NDArray
 
 from overlapper import Overlaps, Placed, Shape, overlaps
 from overlapper.simulation.asked_pairs import Among, AskedPairs
-from overlapper.simulation.collision_rules import RulesInForce
+from overlapper.simulation.bullet_contacts import links_in_contact_with_each_other, touching_within_margins
+from overlapper.simulation.collision_rules import CollisionRules, RulesInForce
 from overlapper.simulation.contacts import Contacts
-from overlapper.simulation.extraction.model import Array, Color, Concave, Decomposed, Settings, Skipped, Surface
+from overlapper.simulation.extraction.model import (
+    BASE,
+    Array,
+    Body,
+    Color,
+    Concave,
+    Decomposed,
+    Settings,
+    Skipped,
+    Surface,
+)
 from overlapper.simulation.ground import Grounds
 from overlapper.simulation.known_bodies import KnownBodies
 from overlapper.simulation.layout import Layout
@@ -23,6 +34,10 @@ from overlapper.simulation.report import Report
 
 class SkippedShapeWarning(UserWarning):
     """A shape of the simulation is not modelled: its overlaps are not found."""
+
+
+class SelfCollisionWarning(UserWarning):
+    """pybullet keeps links of a body apart that are no pair here: their overlaps are not looked for."""
 
 
 class Bodies:
@@ -54,16 +69,22 @@ class Bodies:
     `overlaps` take other choices. Groups and masks are read again with new bodies, when a base becomes static or
     ceases to be, and when a recorder hears of a change.
 
-    Height fields that a recorder has noted are modelled as the prisms below their triangles, near what may meet them,
-    more and more of them as bodies move. `report()` counts all triangles, and as read those modelled.
+    Height fields that a recorder has noted are modelled as the prisms below their triangles, near what may meet them;
+    behind what moves away they are released. `report()` counts all triangles, and as read those modelled.
+
+    That a body collides with itself, and no recorder has heard of it, is seen in pybullet's contact points. overlaps()
+    says so with one SelfCollisionWarning.
+
+    A body without a finite pose is left out, and in `skipped`, until it has one again.
 
     Bodies that come, go or take over the id of another are noticed by `update()`, which marks every body with a user
-    data entry. New bodies are read from a temporary .bullet file; if two stand at the same point, the
-    friction of all is set and restored to tell them apart. Bodies that another process adds to a shared simulation are
-    noticed after `pybullet.syncBodyInfo()`.
+    data entry; `close()`, the end of a `with` or of the last `Bodies` of a client takes the marks off. New bodies are
+    read from a temporary .bullet file; if two stand at the same point, the friction of all is set and restored to tell
+    them apart. Bodies that another process adds to a shared simulation are noticed after `pybullet.syncBodyInfo()`. To
+    those that loadBullet brings pybullet gives no ids; they are counted in `skipped`.
 
-    ValueError if `physicsClientId` is not connected, the recorder is of another client or the simulation has diverged;
-    RuntimeError if the physics server writes where this process cannot read.
+    ValueError if `physicsClientId` is not connected, or the recorder is of another client; RuntimeError if the physics
+    server writes where this process cannot read.
     """
 
     def __init__(
@@ -78,13 +99,20 @@ class Bodies:
         if recorder and recorder.physicsClientId != physicsClientId:
             raise ValueError(f"recorder is of client {recorder.physicsClientId}, not of {physicsClientId}")
         self.physicsClientId = physicsClientId
-        self._known = KnownBodies(physicsClientId, Settings(concave, concave_threshold, surface), recorder)
+        settings = Settings(concave, concave_threshold, surface)
+        self._known = KnownBodies(physicsClientId, settings, recorder)
+        self._settings, self._recorder = settings, recorder
         self._in_force = RulesInForce(recorder)
-        # Of the last overlaps(); how many, if it was a list.
+        self._grounds = Grounds(physicsClientId)
+        self._closed = False
+        self._nowhere: set[int] = set()  # bodies without a finite pose
+        self._told: dict[int, Body] = {}  # that they collide with themselves
+        # Of the last overlaps(): what was asked, how many if it was a list, of whom, and what was found.
         self._asked: Literal["simulated", "all"] | int = "simulated"
+        self._found = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
+        self._last: tuple[Contacts, AskedPairs, Among, CollisionRules] | None = None
         self._arrange()
         self._refresh()
-        self._found = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
 
     def update(self) -> None:
         """Read the shapes of new bodies and changed filters, then all poses. Call it once per step.
@@ -106,12 +134,16 @@ class Bodies:
         for. What is found is kept for the next call: pairs of which neither shape has moved by a bit cost nothing.
         """
         among: Among = pairs if isinstance(pairs, str) else list(pairs)
+        if among == "simulated":
+            self._tell_of_self_collision()
         candidates, layout = self.pairs(among), self._layout
         self._asked = among if isinstance(among, str) else self._pairs.possible(among, self._in_force.rules)
         self._found = layout.batch.overlaps(
             layout.positions, layout.orientations, candidates, tolerance, threads, method, separated=False
         )
-        return Contacts(layout.key_rows, self._found)
+        contacts = Contacts(layout.key_rows, self._found)
+        self._last = contacts, self._pairs, among, self._in_force.rules
+        return contacts
 
     def pairs(self, among: Among = "simulated") -> NDArray[np.int32]:
         """(n, 2) pairs of shapes whose boxes meet, as places in `keys`: each once, the lesser first, sorted.
@@ -130,7 +162,10 @@ class Bodies:
         return self._in_force.rules.partners(np.unique(self._layout.colliders))
 
     def report(self) -> Report:
-        """How much of the scene was read, and how much of it the last `overlaps()` looked at."""
+        """How much of the scene was read, and how much of it the last `overlaps()` looked at.
+
+        Asks for pybullet's contact points, which takes about 3 µs for each.
+        """
         found = self._found
         asked = self._asked
         return Report(
@@ -143,7 +178,19 @@ class Bodies:
             pairs_widened=int(found.widened.sum()),
             facets_touched=int(found.facets_touched.sum()),
             planes_asked=found.planes_asked,
+            pairs_within_margins=self._within_margins(),
         )
+
+    def close(self) -> None:
+        """Take the marks off the bodies, unless another `Bodies` needs them. What was read stays; no update follows."""
+        self._closed = True
+        self._known.close()
+
+    def __enter__(self) -> Bodies:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     @property
     def keys(self) -> list[tuple[int, int, int]]:
@@ -191,29 +238,70 @@ class Bodies:
     @property
     def skipped(self) -> list[Skipped]:
         """What is not modelled, one entry per body and link."""
-        return self._known.skipped
+        return self._known.skipped + [self._lost(id) for id in sorted(self._nowhere)]
 
     def _refresh(self) -> None:
         client = self.physicsClientId
+        if self._closed:
+            raise ValueError(f"this Bodies of physicsClientId {client} is closed")
         if not pybullet.isConnected(client):
             raise ValueError(f"physicsClientId {client} is not connected to a physics server")
         skipped = self._known.refresh(self._layout.poses.bodies)
-        if skipped is not None:
+        if arranged := skipped is not None:
             self._arrange()
-        self._layout.pose()
-        self._in_force.follow(self._known, self._layout, fresh=skipped is not None)
-        grown = self._grounds.grown(self._layout, self._in_force.rules, self._known.by_id)
-        if grown:
-            self._known.by_id |= grown
+        before, self._nowhere = self._nowhere, self._layout.pose() | self._left_out.pose()
+        if self._nowhere != before:
+            arranged = True
             self._arrange()
-            self._layout.pose()
-        for each in skipped or ():
+            self._pose()
+        self._in_force.follow(self._known, self._layout, skipped is not None, arranged)
+        if changed := self._grounds.changed(self._layout, self._in_force.rules, self._known.by_id):
+            self._known.by_id |= changed
+            self._arrange()
+            self._pose()
+            self._in_force.follow(self._known, self._layout, fresh=False, arranged=True)
+        for each in (*(skipped or ()), *(self._lost(id) for id in sorted(self._nowhere - before))):
             message = f"{each.name} (body {each.body}, link {each.link}) is left out: {each.reason}"
             # The caller of update() or of Bodies() is three calls up.
             warnings.warn(message, SkippedShapeWarning, stacklevel=3)
 
+    def _lost(self, id: int) -> Skipped:
+        return Skipped(id, BASE, self._known.by_id[id].name, "it has no finite pose: the simulation has diverged")
+
     def _arrange(self) -> None:
         known = self._known
-        self._layout = Layout(self.physicsClientId, known.by_id, known.hidden)
+        self._nowhere &= known.by_id.keys()
+        placed: dict[int, Body] = {}
+        left_out: dict[int, Body] = {}
+        for id, body in known.by_id.items():
+            (left_out if id in self._nowhere else placed)[id] = body
+        self._layout = Layout(self.physicsClientId, placed, known.hidden)
+        self._left_out = Layout(self.physicsClientId, left_out, known.hidden)
         self._pairs = AskedPairs(self._layout, known.links)
-        self._grounds = Grounds(self.physicsClientId, known.by_id)
+        self._grounds.follow(self._layout, placed)
+
+    def _pose(self) -> None:
+        self._layout.pose()
+        self._left_out.pose()
+
+    def _tell_of_self_collision(self) -> None:
+        """Warn, once for each, of bodies whose links pybullet keeps apart, and no recorder knows of it."""
+        for id in self._layout.of_several_colliders:
+            body = self._known.by_id[id]
+            if (self._recorder and id in self._recorder.self_collision) or self._told.get(id) is body:
+                continue
+            if links := links_in_contact_with_each_other(self.physicsClientId, id):
+                self._told[id] = body
+                a, b = (body.link_names[link] for link in links)
+                message = (
+                    f"{body.name} (body {id}) collides with itself, its {a} with its {b}, and pairs within it are not "
+                    "looked at: set up a Recorder before the body is loaded and give it to Bodies(), or ask for "
+                    f"pairs=[({id}, {id})]"
+                )
+                # The caller of overlaps() is two calls up.
+                warnings.warn(message, SelfCollisionWarning, stacklevel=3)
+
+    def _within_margins(self) -> int:
+        if self._settings.surface == "margin" or not self._last:
+            return 0
+        return touching_within_margins(self.physicsClientId, *self._last)

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import uuid
+import weakref
+from collections import Counter
 from collections.abc import Iterable
 from itertools import repeat
 
 import pybullet
 
+_latest: dict[tuple[int, int], str] = {}
+"""The key of the entry that was last put on a body, by client and body."""
+_held: Counter[str] = Counter()
+"""How many readers know a body by the entry with this key."""
+
 
 class BodyMarks:
-    """A user data entry on every body that has been read. It goes when the body goes.
+    """A user data entry on every body that has been read, shared by all that read the client in this process.
+
+    Each has a key of its own, by which the body is told from a later one with its id. It goes when the body goes, or
+    when the last reader that knows the body by it is closed or collected.
 
     What pybullet tells of user data is what this process has heard: another's changes, and those of bodies after a
     syncBodyInfo, only after a syncUserData, which takes as long as all the rest of an update.
@@ -18,31 +30,46 @@ class BodyMarks:
 
     def __init__(self, client: int) -> None:
         self._client = client
-        self._key = f"overlapper {uuid.uuid4()}"
+        self._keys: dict[int, str] = {}
+        self.close = weakref.finalize(self, _release, client, os.getpid(), self._keys)
         self._ids: list[int] = []
         self._counts: list[int] = []  # of the entries of each body, ours and others'
         self._places: list[int] = []  # of ours among them
         self._entries: list[tuple[object, ...]] = []
 
     def put(self, id: int) -> None:
-        pybullet.addUserData(id, self._key, "", physicsClientId=self._client)
+        """Know the body by its mark, and give it one if it has none. Needs a syncUserData before it."""
+        key = _latest.get((self._client, id))
+        if not key or _entry(self._client, id, key) < 0:
+            key = _latest[self._client, id] = f"overlapper {uuid.uuid4()}"
+            pybullet.addUserData(id, key, "", physicsClientId=self._client)
+        _held[key] += 1
+        if before := self._keys.get(id):
+            _held[before] -= 1
+        self._keys[id] = key
 
     def is_on(self, id: int) -> bool:
-        """Whether the body is marked. Needs a syncUserData before it."""
-        return bool(pybullet.getUserDataId(id, self._key, physicsClientId=self._client) >= 0)
+        """Whether the body is the one that was marked. Needs a syncUserData before it."""
+        return id in self._keys and _entry(self._client, id, self._keys[id]) >= 0
 
     def remember(self, ids: Iterable[int]) -> None:
         """These are all bodies, and each is marked."""
-        client = self._client
+        before = dict(zip(self._ids, zip(self._counts, self._places, self._entries)))
         self._ids = list(ids)
+        for id in self._keys.keys() - {*self._ids}:
+            _held[self._keys.pop(id)] -= 1
         self._counts = self._count()
-        entries = [
-            [pybullet.getUserDataInfo(id, place, client) for place in range(count)]
-            for id, count in zip(self._ids, self._counts)
-        ]
-        key = self._key.encode()
-        self._places = [next(k for k, entry in enumerate(each) if entry[1] == key) for each in entries]
-        self._entries = [each[place] for each, place in zip(entries, self._places)]
+        self._places, self._entries = [], []
+        for id, number in zip(self._ids, self._counts):
+            known, place, entry = before.get(id, (-1, 0, ()))
+            # Most bodies are as they were before.
+            if known != number or pybullet.getUserDataInfo(id, place, self._client) != entry:
+                key = self._keys[id].encode()
+                entries = [pybullet.getUserDataInfo(id, each, self._client) for each in range(number)]
+                place = next(each for each, entry in enumerate(entries) if entry[1] == key)
+                entry = entries[place]
+            self._places.append(place)
+            self._entries.append(entry)
 
     def are_as_remembered(self) -> bool:
         """Whether there are the same bodies as then, as far as this process has heard."""
@@ -55,3 +82,22 @@ class BodyMarks:
 
     def _count(self) -> list[int]:
         return list(map(pybullet.getNumUserData, self._ids, repeat(self._client)))
+
+
+def _entry(client: int, id: int, key: str) -> int:
+    """The id of the entry with this key on the body, -1 if there is none."""
+    return int(pybullet.getUserDataId(id, key, physicsClientId=client))
+
+
+def _release(client: int, process: int, keys: dict[int, str]) -> None:
+    """Remove the entries by which no reader knows these bodies any more."""
+    _held.subtract(keys.values())
+    # A process that was forked off shares a physics server with its parent, whose marks these are.
+    if os.getpid() != process or not pybullet.isConnected(client):
+        return
+    with contextlib.suppress(pybullet.error):  # of a server that has gone
+        # Without it pybullet finds entries of bodies that are gone.
+        pybullet.syncUserData(physicsClientId=client)
+        for id, key in keys.items():
+            if not _held[key] and (entry := _entry(client, id, key)) >= 0:
+                pybullet.removeUserData(entry, client)

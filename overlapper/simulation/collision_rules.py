@@ -44,16 +44,29 @@ class CollisionRules:
         self._colliders = colliders
         self._both = recorder.both_masks_must_agree if recorder else False
         rows = colliders.rows
-        self._filters = {
-            (rows[a], rows[b]): enabled
+        filters = [
+            (rows[a], rows[b], enabled)
             for (a, b), enabled in (recorder.pair_filters if recorder else {}).items()
             if a in rows and b in rows
-        }
-        self._within = {
-            pair
+        ]
+        self._filtered, self._enabled = self._sorted(filters)
+        within = [
+            (*pair, True)
             for body, flags in (recorder.self_collision if recorder else {}).items()
             for pair in self._self(body, flags)
-        }
+        ]
+        self._within = self._sorted(within)[0]
+
+    def _code(self, first: Indices, second: Indices) -> Indices:
+        """Pairs of colliders as one number each."""
+        return np.asarray(first * len(self._colliders.body) + second)
+
+    def _sorted(self, pairs: list[tuple[int, int, bool]]) -> tuple[Indices, Mask]:
+        """The codes of these pairs, sorted, and what is said of each."""
+        first, second, said = np.array(pairs, dtype=np.intp).reshape(-1, 3).T
+        codes = self._code(first, second)
+        order = np.argsort(codes)
+        return codes[order], said[order].astype(bool)
 
     def _self(self, body: int, flags: int) -> list[tuple[int, int]]:
         """The pairs of links of a body that its flags let collide, as btMultiBodyLinkCollider sees them."""
@@ -76,14 +89,13 @@ class CollisionRules:
         """Whether the colliders in these rows may collide, pair by pair; first < second."""
         c = self._colliders
         allowed = self._masks_admit(c.group[first], c.mask[first], c.group[second], c.mask[second])
-        for (a, b), enabled in self._filters.items():
-            allowed[(first == a) & (second == b)] = enabled
         within = c.body[first] == c.body[second]
-        if self._within:
-            for i in np.flatnonzero(within & allowed):
-                allowed[i] = (first[i], second[i]) in self._within
-            return allowed
-        return np.asarray(allowed & ~within)
+        if not len(self._filtered) and not len(self._within):
+            return np.asarray(allowed & ~within)
+        codes = self._code(first, second)
+        place, found = _places(self._filtered, codes)
+        allowed[found] = self._enabled[place[found]]
+        return np.asarray(allowed & (~within | _places(self._within, codes)[1]))
 
     def _masks_admit(self, group: Any, mask: Any, other_group: Any, other_mask: Any) -> Mask:
         admitted, admitting = (group & other_mask) != 0, (other_group & mask) != 0
@@ -110,11 +122,21 @@ class CollisionRules:
         admitted = self._masks_admit(filters[:, None, 0], filters[:, None, 1], filters[None, :, 0], filters[None, :, 1])
         total = shapes.sum(axis=0)
         pairs = int((admitted * (np.outer(total, total) - shapes.T @ shapes)).sum()) // 2
-        for a, b in self._within | {pair for pair in self._filters if c.body[pair[0]] != c.body[pair[1]]}:
-            one = np.array([a]), np.array([b])
-            plainly = c.body[a] != c.body[b] and bool(self._masks_admit(c.group[a], c.mask[a], c.group[b], c.mask[b]))
-            pairs += int(weights[a] * weights[b]) * (int(self.allow(*one)[0]) - plainly)
-        return int(pairs)
+        # What the masks alone do not say, pair by pair.
+        codes = np.union1d(self._filtered, self._within)
+        first, second = np.divmod(codes, max(len(c.body), 1))
+        by_masks = self._masks_admit(c.group[first], c.mask[first], c.group[second], c.mask[second])
+        plainly = by_masks & (c.body[first] != c.body[second])
+        change = self.allow(first, second).astype(np.int64) - plainly
+        return pairs + int((weights[first] * weights[second] * change).sum())
+
+
+def _places(codes: Indices, wanted: Indices) -> tuple[Indices, Mask]:
+    """Where each of `wanted` would be among sorted codes, and whether it is there."""
+    place = np.searchsorted(codes, wanted)
+    found = place < len(codes)
+    found[found] = codes[place[found]] == wanted[found]
+    return place, found
 
 
 def _ancestors(link: int, parents: Mapping[int, int]) -> set[int | None]:
@@ -130,24 +152,33 @@ class RulesInForce:
 
     def __init__(self, recorder: Recorder | None) -> None:
         self._recorder = recorder
+        self._bodies: list[int] = []
         self._static: list[bool] = []
         self._noted = (0, 0)  # of the recorder, changes and masks set
         nobody = np.empty(0, dtype=int)
         self.rules = CollisionRules(Colliders({}, nobody, nobody, nobody, {}), recorder)
 
-    def follow(self, known: KnownBodies, layout: Layout, fresh: bool) -> None:
-        """Take over what has changed since the last step; `fresh` filters have just been read."""
+    def follow(self, known: KnownBodies, layout: Layout, fresh: bool, arranged: bool) -> None:
+        """Take over what has changed since the last step.
+
+        Filters that are `fresh` have just been read; shapes that have been `arranged` anew have other places.
+        """
         # changeDynamics gives a base the group of static or of moving bodies as it becomes one.
-        static = layout.poses.static.copy()
+        bodies, static = layout.poses.bodies, layout.poses.static.copy()
         noted = (self._recorder.changes, self._recorder.masks_set) if self._recorder else (0, 0)
-        changed = static != self._static or noted[1] != self._noted[1]
+        if bodies == self._bodies:
+            changed = static != self._static
+        else:
+            before = dict(zip(self._bodies, self._static))
+            changed = any(before.get(id, now) != now for id, now in zip(bodies, static))
+        changed |= noted[1] != self._noted[1]
         if changed and not fresh:
             known.read_filters()
-        if changed or fresh or noted != self._noted:
+        if changed or fresh or arranged or noted != self._noted:
             filters = [known.filters.get(each, (1, -1)) for each in layout.collider_rows]
             group, mask = np.array(filters, dtype=int).reshape(-1, 2).T
             owners = np.array([id for id, _ in layout.collider_rows], dtype=int)
             parents = {id: body.parents for id, body in known.by_id.items()}
             colliders = Colliders(layout.collider_rows, owners, group, mask, parents)
             self.rules = CollisionRules(colliders, self._recorder)
-        self._static, self._noted = static, noted
+        self._bodies, self._static, self._noted = bodies, static, noted

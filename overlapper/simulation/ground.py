@@ -1,4 +1,4 @@
-"""The ground of height fields, modelled below what may meet it, more and more of it as bodies move."""
+"""The ground of height fields, modelled below what may meet it: more of it where bodies come, none where they were."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
+from overlapper import Shape
 from overlapper.quaternion import composed, rotated
 from overlapper.simulation.collision_rules import CollisionRules, Mask
+from overlapper.simulation.extraction.height_field import Numbers
 from overlapper.simulation.extraction.model import BASE, Array, Body, Ground
 from overlapper.simulation.layout import Layout
 
@@ -17,48 +19,75 @@ from overlapper.simulation.layout import Layout
 class GroundBelow:
     """Which triangles of a height field shapes are near; shapes that have hardly moved are not asked about again."""
 
-    def __init__(self, ground: Ground) -> None:
-        self._ground = ground
-        self._slack = min(ground.field.spacing) / 2
-        self._asked = np.empty((0, 3))
+    def __init__(self, ground: Ground, reach: Array) -> None:
+        """`reach` (n,) in m says how far the shapes reach from their centres."""
+        self.ground = ground
+        self._reach = reach
+        # Ground is modelled so far beyond what a shape meets: it is not asked again until it has come as far.
+        self._slack = np.maximum(min(ground.field.spacing) / 2, reach / 4)
+        self._asked = np.full((len(reach), 3), np.inf)
+        self._near: list[Numbers] = [np.empty(0, dtype=np.int64)] * len(reach)
 
-    def reached(self, position: Array, orientation: Array, centres: Array, reach: Array, meets: Mask) -> set[int]:
-        """Of the shapes that `meets` picks, which lie within `reach` (n,) of `centres` (n, 3) in the world.
+    def moved(self, position: Array, orientation: Array, centres: Array, meets: Mask) -> bool:
+        """Whether any of the shapes that `meets` picks has come to where the ground below it has to be asked for.
 
-        The field's collider is at `position` and `orientation`, xyzw.
+        The field's collider is at `position` and `orientation`, xyzw, the shapes at `centres` (n, 3) in the world.
         """
-        turn = composed(orientation, self._ground.orientation)
-        origin = position + rotated(orientation, self._ground.position)
+        turn = composed(orientation, self.ground.orientation)
+        origin = position + rotated(orientation, self.ground.position)
         local = rotated(turn * [-1.0, -1.0, -1.0, 1.0], centres - origin)
-        if self._asked.shape != local.shape:
-            self._asked = np.full(local.shape, np.inf)
-        moved = meets & np.isfinite(reach) & ~(np.abs(local - self._asked).max(axis=1) <= self._slack)
+        meets = meets & np.isfinite(self._reach)
+        moved = meets & ~(np.abs(local - self._asked).max(axis=1) <= self._slack)
         self._asked[moved] = local[moved]
-        found: set[int] = set()
-        for centre, radius in zip(local[moved], reach[moved] + self._slack):
-            found.update(self._ground.field.under(centre - radius, centre + radius).tolist())
-        return found
+        for k in np.flatnonzero(moved):
+            reach = self._reach[k] + self._slack[k]
+            self._near[k] = self.ground.field.under(local[k] - reach, local[k] + reach)
+        return bool(moved.any())
+
+    def numbers(self) -> set[int]:
+        """Of the triangles that any of the shapes is near."""
+        return set(np.unique(np.concatenate([np.empty(0, dtype=np.int64), *self._near])).tolist())
 
 
 class Grounds:
-    """The height fields among the bodies of a client."""
+    """The height fields among the bodies of a client, and the shapes that may meet them: those of all other bodies."""
 
-    def __init__(self, client: int, bodies: Mapping[int, Body]) -> None:
+    def __init__(self, client: int) -> None:
         self._client = client
-        self._below = {id: GroundBelow(body.ground) for id, body in bodies.items() if body.ground}
+        self._below: dict[int, GroundBelow] = {}
+        self._rows = np.empty(0, dtype=np.intp)
+        self._keys = np.empty((0, 3), dtype=np.int64)
+        self._shapes: list[Shape] = []
 
-    def grown(self, layout: Layout, rules: CollisionRules, bodies: Mapping[int, Body]) -> dict[int, Body]:
-        """The bodies of which the simulator lets something meet more ground than is modelled, with all of that."""
+    def follow(self, layout: Layout, bodies: Mapping[int, Body]) -> None:
+        """Bodies have come or gone, and have these places now."""
+        grounds = {id: body.ground for id, body in bodies.items() if body.ground and (id, BASE) in layout.collider_rows}
+        self._rows = np.flatnonzero(~np.isin(layout.owners, [*grounds]))
+        shapes = [layout.shapes[row] for row in self._rows] if grounds else []
+        keys = layout.key_rows[self._rows]
+        if shapes != self._shapes or not np.array_equal(keys, self._keys):
+            self._below = {}
+        self._shapes, self._keys = shapes, keys
+        same = {id: below for id, below in self._below.items() if below.ground is grounds.get(id)}
+        reach = layout.reach(self._rows) if len(same) < len(grounds) else np.empty(0)
+        self._below = {id: same.get(id) or GroundBelow(ground, reach) for id, ground in grounds.items()}
+
+    def changed(self, layout: Layout, rules: CollisionRules, bodies: Mapping[int, Body]) -> dict[int, Body]:
+        """The bodies of which more ground has to be modelled, or of which most is not needed any more.
+
+        They have what the simulator lets shapes meet, and a little around it.
+        """
         found: dict[int, Body] = {}
+        colliders = layout.colliders[self._rows]
         for id, below in self._below.items():
-            own = np.full(len(layout.colliders), layout.collider_rows[id, BASE])
-            first, second = np.minimum(own, layout.colliders), np.maximum(own, layout.colliders)
-            meets = (layout.owners != id) & rules.allow(first, second)
+            own = np.full(len(colliders), layout.collider_rows[id, BASE])
+            meets = rules.allow(np.minimum(own, colliders), np.maximum(own, colliders))
             position, orientation = map(np.array, pybullet.getBasePositionAndOrientation(id, self._client))
-            numbers = below.reached(position, orientation, layout.positions, layout.reach, meets)
-            body = bodies[id]
-            new = numbers - {part.index for part in body.parts}
-            if new and body.ground:
-                parts = sorted((*body.parts, *map(body.ground.part, new)), key=lambda part: part.index)
-                found[id] = replace(body, parts=tuple(parts))
+            if not below.moved(position, orientation, layout.positions[self._rows], meets):
+                continue
+            modelled, needed = {part.index: part for part in bodies[id].parts}, below.numbers()
+            if needed - modelled.keys() or 2 * len(needed) < len(modelled):
+                ground = below.ground
+                parts = (modelled.get(number) or ground.part(number) for number in sorted(needed))
+                found[id] = replace(bodies[id], parts=tuple(parts))
         return found

@@ -11,7 +11,7 @@ from overlapper.simulation.body_marks import BodyMarks
 from overlapper.simulation.extraction.body import read_body
 from overlapper.simulation.extraction.bullet_file import BulletFile
 from overlapper.simulation.extraction.model import BASE, Body, Color, Decomposed, Settings, Skipped
-from overlapper.simulation.extraction.saved_scene import body_ids, hides_pose, saved_bodies
+from overlapper.simulation.extraction.saved_scene import body_ids, saved_bodies
 from overlapper.simulation.recorder import Recorder
 
 
@@ -26,25 +26,33 @@ class KnownBodies:
         self._client, self._settings, self._recorder = client, settings, recorder
         self._marks = BodyMarks(client)
         self._unidentified = 0
+        self._scenes_loaded = -1  # those that the recorder has noted
         self.by_id: dict[int, Body] = {}
         self.hidden: dict[int, int] = {}
         self.filters: dict[tuple[int, int], tuple[int, int]] = {}
 
     def refresh(self, placed: Collection[int]) -> list[Skipped] | None:
         """Read what is new; None if nothing has come or gone, else what is newly skipped. `placed` ones have shapes."""
-        if not (self._margins_changed(placed) or self._ground_changed() or not self._marks.are_as_remembered()):
+        loaded = self._scene_loaded()
+        changed = self._margins_changed(placed) | self._ground_changed() | loaded
+        if not changed and self._marks.are_as_remembered():
             return None
         # After a syncBodyInfo, pybullet would show the user data of a removed body on the one that inherits its id.
         pybullet.syncUserData(physicsClientId=self._client)
         ids = body_ids(self._client)
-        fresh = ids != self.by_id.keys() or not all(map(self._marks.is_on, ids))
-        skipped = self._read() if fresh else None
+        fresh = changed or ids != self.by_id.keys() or not all(map(self._marks.is_on, ids))
+        skipped = self._read(loaded) if fresh else None
         self._marks.remember(self.by_id)
         return skipped
 
+    def close(self) -> None:
+        """Take the marks off the bodies, unless another reader needs them."""
+        self._marks.close()
+
     def read_filters(self) -> None:
         """Read groups and masks again, of the same bodies."""
-        self._take_filters(*saved_bodies(self._client, sorted(self.by_id)))
+        file, rows, _ = saved_bodies(self._client, sorted(self.by_id))
+        self._take_filters(file, rows)
 
     @property
     def shape_count(self) -> int:
@@ -100,22 +108,33 @@ class KnownBodies:
                 del self.by_id[id]
         return len(grounds) > sum(1 for id in grounds if id in self.by_id)
 
-    def _read(self) -> list[Skipped]:
-        """Read the bodies that are not marked yet, forget those that are gone; what is newly skipped."""
+    def _scene_loaded(self) -> bool:
+        """Whether bodies may have come that pybullet tells nothing of."""
+        loaded = self._recorder.scenes_loaded if self._recorder else 0
+        before, self._scenes_loaded = self._scenes_loaded, loaded
+        return loaded != before
+
+    def _read(self, loaded: bool) -> list[Skipped]:
+        """Read the bodies that are not marked yet, forget those that are gone; what is newly skipped.
+
+        If a scene has been `loaded`, there may be others that pybullet tells nothing of.
+        """
         client = self._client
-        # Of the bodies that createMultiBody makes from batchPositions, only the last is known before a sync.
-        pybullet.syncBodyInfo(client)
-        pybullet.syncUserData(physicsClientId=client)
-        ids = sorted(body_ids(client))
-        known = {id: self.by_id[id] for id in ids if id in self.by_id and self._marks.is_on(id)}
-        fresh = [id for id in ids if id not in known]
-        hidden = [id for id in ids if hides_pose(client, id)]
-        unidentified, self.hidden = (self._unidentified if ids else 0), {}
-        if fresh or hidden:
-            file, rows = saved_bodies(client, ids)
+        ids, known = self._still_known()
+        unidentified = self._unidentified
+        if loaded or not ids or len(known) < len(ids) or self.hidden:
+            file, rows, hidden = saved_bodies(client, ids)
+            if len(rows) < len(file.bodies):
+                # Of the bodies that createMultiBody makes from batchPositions, only the last is known before a sync.
+                # Without them, a sync is left out, as it takes longer than all the rest.
+                pybullet.syncBodyInfo(client)
+                pybullet.syncUserData(physicsClientId=client)
+                ids, known = self._still_known()
+                file, rows, hidden = saved_bodies(client, ids)
             self._take_filters(file, rows)
             unidentified = len(file.bodies) - len(rows)
             self.hidden = {id: rows[id] for id in hidden if id in rows}
+        fresh = [id for id in ids if id not in known]
         for id in fresh:
             body = file.bodies[rows[id]] if id in rows else None
             field = self._recorder.height_field(id) if self._recorder else None
@@ -125,6 +144,11 @@ class KnownBodies:
         grown, self._unidentified = unidentified > self._unidentified, unidentified
         skipped = [each for id in fresh for each in self.by_id[id].skipped]
         return skipped + (self._skipped_unidentified() if grown else [])
+
+    def _still_known(self) -> tuple[list[int], dict[int, Body]]:
+        """The ids of all bodies, sorted, and of those that have been read what they are."""
+        ids = sorted(body_ids(self._client))
+        return ids, {id: self.by_id[id] for id in ids if id in self.by_id and self._marks.is_on(id)}
 
     def _take_filters(self, file: BulletFile, rows: Mapping[int, int]) -> None:
         self.filters = {
@@ -136,8 +160,9 @@ class KnownBodies:
     def _skipped_unidentified(self) -> list[Skipped]:
         if not self._unidentified:
             return []
-        reason = "pybullet does not identify the links of robots in maximal coordinates"
-        return [Skipped(-1, BASE, f"{self._unidentified} rigid bodies", reason)]
+        number = "1 body" if self._unidentified == 1 else f"{self._unidentified} bodies"
+        reason = "pybullet gives no id to what loadBullet brings, nor to links of robots in maximal coordinates"
+        return [Skipped(-1, BASE, number, reason)]
 
 
 def _distinct(names: Mapping[int, str]) -> dict[int, str]:

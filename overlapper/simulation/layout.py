@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from overlapper import Batch, _core
 from overlapper.simulation.collider_poses import ColliderPoses
@@ -17,15 +17,14 @@ class Layout:
     """What is modelled of `bodies`, parallel to `keys`, which are (body, link, shape), sorted.
 
     `key_rows` (k, 3) are the same as an array, `shapes` and `batch` the shapes, `owners` (k,) their bodies, `colliders`
-    (k,) the places of their links in `collider_rows`, by (body, link). `positions` (k, 3) and `orientations` (k, 4) are
-    where `pose` found them.
+    (k,) the places of their links in `collider_rows`, by (body, link). `of_several_colliders` are the bodies that have
+    shapes on more than their base. `positions` (k, 3) and `orientations` (k, 4) are where `pose` found them.
     """
 
     def __init__(self, client: int, bodies: Mapping[int, Body], hidden: Mapping[int, int]) -> None:
         """`hidden` are the places in a .bullet file of those whose poses have no other source."""
         shaped = {id: body.parts for id, body in bodies.items() if body.parts or body.ground}
         parts = [part for each in shaped.values() for part in each]
-        self._names = {id: body.name for id, body in bodies.items()}
         self.keys = [(id, part.link, part.index) for id, each in shaped.items() for part in each]
         self.key_rows = np.array(self.keys, dtype=np.int64).reshape(-1, 3)
         self.shapes = [part.shape for part in parts]
@@ -41,24 +40,20 @@ class Layout:
         frames = {each: row for row, each in enumerate(self.poses.colliders)}
         self._frames = np.array([frames[id, link] for id, link, _ in self.keys], dtype=np.int64)
         self.owners = np.array([id for id, _, _ in self.keys], dtype=int)
+        self.of_several_colliders = [id for id, each in links.items() if each]
 
-    @cached_property
-    def reach(self) -> Array:
-        """(k,) m: how far each shape reaches from its own origin; planes reach everywhere, but meet no ground."""
-        reach = [np.abs(shape.bounds).max(axis=0) for shape in self.shapes]
+    def reach(self, rows: NDArray[np.intp]) -> Array:
+        """(n,) m: how far the shapes in these rows reach from their own origins; planes reach everywhere."""
+        reach = [np.abs(self.shapes[row].bounds).max(axis=0) for row in rows]
         return np.asarray(np.linalg.norm(np.array(reach).reshape(-1, 3), axis=1))
 
-    def pose(self) -> None:
-        """Place the shapes where their colliders are now. ValueError if one is nowhere."""
+    def pose(self) -> set[int]:
+        """Place the shapes where their colliders are now; the bodies of which one is nowhere."""
         self.poses.read()
         self.positions, self.orientations = _core.world_poses(
             self.poses.frames, self._frames, self._local_positions, self._local_orientations
         )
-        if not math.isfinite(self.positions.sum() + self.orientations.sum()):
-            self._look_for_divergence()
-
-    def _look_for_divergence(self) -> None:
+        if math.isfinite(self.positions.sum() + self.orientations.sum()):
+            return set()
         finite = np.isfinite(self.positions).all(axis=1) & np.isfinite(self.orientations).all(axis=1)
-        if not finite.all():
-            body = self.keys[int(np.argmin(finite))][0]
-            raise ValueError(f"body {body} ({self._names[body]}) has no finite pose: the simulation has diverged")
+        return {*self.owners[~finite].tolist()}

@@ -41,6 +41,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("heightfieldData", "numHeightfieldRows", "numHeightfieldColumns", "replaceHeightfieldIndex"),
         "physicsClientId",
     ),
+    "loadBullet": ("bulletFileName", "physicsClientId"),
     "removeBody": ("bodyUniqueId", "physicsClientId"),
     "resetSimulation": ("flags", "physicsClientId"),
     "disconnect": ("physicsClientId",),
@@ -74,6 +75,8 @@ class Recorder:
         """How often anything was noted."""
         self.masks_set = 0
         """How often groups and masks were set."""
+        self.scenes_loaded = 0
+        """How often bodies may have come or gone that pybullet tells nothing of: those of loadBullet."""
         self._forget()
         if not _open:
             _ORIGINALS.update({name: getattr(pybullet, name) for name in CALLS})
@@ -137,7 +140,10 @@ class Recorder:
                     self._note_field(arguments, result)
                 else:
                     self._fields.pop(result, None)
+            case "loadBullet":
+                self.scenes_loaded += 1
             case "resetSimulation" | "disconnect":
+                self.scenes_loaded += 1
                 self._forget()
 
     def _note_field(self, arguments: Arguments, shape: int) -> None:

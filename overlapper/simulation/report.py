@@ -13,6 +13,10 @@ class Report:
     `pairs_possible` are the pairs of modelled shapes it was asked about, by default those that the simulator lets
     collide, then follow pairs whose boxes meet, pairs that overlap, those of them that were measured again in wider
     arithmetic (see `Overlap.widened`), facets that took part, and planes asked for (see `Overlaps.planes_asked`).
+
+    `pairs_within_margins` are the pairs of links, of those asked about, between which pybullet has contact points and
+    `overlaps()` found nothing, as the margins that Bullet lays around hulls hold them apart. With surface="margin"
+    there are none: the margins are then part of the shapes, and such pairs overlap.
     """
 
     bodies: int
@@ -24,12 +28,19 @@ class Report:
     pairs_widened: int
     facets_touched: int
     planes_asked: int
+    pairs_within_margins: int = 0
 
     def __str__(self) -> str:
         widened = f"{self.pairs_widened:,} of them" if self.pairs_widened else "none of them"
-        return (
+        lines = (
             f"{self.bodies:,} bodies, {self.shapes_read:,} of {self.shapes:,} shapes read\n"
             f"{self.pairs_examined:,} of {self.pairs_possible:,} pairs examined, "
             f"{self.planes_asked:,} planes asked, {self.facets_touched:,} facets touched\n"
             f"{self.pairs_overlapping:,} overlap, {widened} measured again in wider arithmetic"
         )
+        if self.pairs_within_margins:
+            lines += (
+                f"\n{self.pairs_within_margins:,} more pairs of links touch only within the margins that Bullet lays "
+                "around hulls; surface 'margin' shows them"
+            )
+        return lines

@@ -60,3 +60,9 @@ def test_what_is_skipped_and_what_was_looked_at_is_told():
     assert first == "1 bodies, 2 of 3 shapes read"
     assert rest[-2:] == ["1 overlap, none of them measured again in wider arithmetic", "Not modelled: net, it is soft."]
     assert "1 of them measured again" in str(Report(1, 3, 2, 1, 1, 1, 1, 9, 8))
+
+
+def test_pairs_that_only_margins_hold_apart_are_told():
+    summary = Summary("pile", report=Report(1, 3, 2, 1, 1, 0, 0, 9, 8, pairs_within_margins=147))
+    assert remarks(summary)[-1].startswith("147 more pairs of links touch only within the margins that Bullet lays")
+    assert summary.as_dict()["report"]["pairs_within_margins"] == 147

@@ -87,7 +87,7 @@ def test_a_ball_in_flat_ground_shares_a_cap_with_it(client, recorder):
     assert {contact.shapeA for contact in pair.contacts} <= set(range(2 * 4 * 4))
 
 
-def test_only_the_ground_near_what_may_meet_it_is_modelled_and_more_as_bodies_move(client, recorder):
+def test_only_the_ground_near_what_may_meet_it_is_modelled(client, recorder):
     ground = field(client, rough(101, 101), scale=[0.1, 0.1, 0.1])
     moving, ghost = ball(client, [-3, -3, 0]), ball(client, [3, -3, 0])
     ball(client, [3, 3, 0], mass=0)
@@ -95,19 +95,59 @@ def test_only_the_ground_near_what_may_meet_it_is_modelled_and_more_as_bodies_mo
     bodies = Bodies(client, recorder=recorder)
     report = bodies.report()
     assert report.shapes == 2 * 100 * 100 + 3 and 10 < report.shapes_read < 100
-    first = modelled(bodies, ground)
     assert all(np.linalg.norm(prism.centroid[:2] + 3) < 1 for prism in prisms(bodies, ground))
-    for x in np.linspace(-3, 2, 11):
-        p.resetBasePositionAndOrientation(moving, [x, -3, 0.02], [0, 0, 0, 1], physicsClientId=client)
+    before = modelled(bodies, ground)
+    p.resetBasePositionAndOrientation(moving, [-3, -2.9, 0.02], [0, 0, 0, 1], physicsClientId=client)
+    bodies.update()
+    after = modelled(bodies, ground)
+    kept = before.keys() & after.keys()
+    assert kept and before.keys() != after.keys() and all(before[number] is after[number] for number in kept)
+
+
+def test_ground_is_released_behind_what_drove_over_it(client, recorder):
+    ground = field(client, rough(21, 401), scale=[0.1, 0.1, 0.1])
+    wheels = [ball(client, [-18, y, 0]) for y in (-0.4, 0.4)]
+    bodies = Bodies(client, recorder=recorder)
+    first, most = len(prisms(bodies, ground)), 0
+    for x in np.linspace(-18, 18, 200):
+        for wheel, y in zip(wheels, (-0.4, 0.4)):
+            p.resetBasePositionAndOrientation(wheel, [x, y, 0.02], [0, 0, 0, 1], physicsClientId=client)
         bodies.update()
         # The heights are between -0.05 and 0.05.
-        assert {contact.bodyB for contact in bodies.overlaps()} == {moving}
-    later = modelled(bodies, ground)
-    assert len(first) < len(later) < 2000
-    assert all(later[number] is prism for number, prism in first.items())
-    p.resetBasePositionAndOrientation(moving, [0, 0, 9], [0, 0, 0, 1], physicsClientId=client)
+        assert {contact.bodyB for contact in bodies.overlaps()} == {*wheels}
+        most = max(most, len(prisms(bodies, ground)))
+        assert all(np.abs(prism.centroid[0] - x) < 1 for prism in prisms(bodies, ground))
+    assert first > 10 and most < 3 * first
+    for wheel in wheels:
+        p.resetBasePositionAndOrientation(wheel, [0, 0, 9], [0, 0, 0, 1], physicsClientId=client)
     bodies.update()
-    assert len(prisms(bodies, ground)) == len(later)
+    assert prisms(bodies, ground) == []
+
+
+def test_ground_is_asked_for_and_arranged_only_once_a_body_has_come_some_way(client, recorder, monkeypatch):
+    field(client, rough(21, 401), scale=[0.1, 0.1, 0.1])
+    wheel = ball(client, [-18, 0, 0], radius=1)
+    bodies = Bodies(client, recorder=recorder)
+    asked, under = [], HeightField.under
+    monkeypatch.setattr(HeightField, "under", lambda *arguments: (asked.append(1), under(*arguments))[1])
+    for x in np.linspace(-18, -8, 500):
+        p.resetBasePositionAndOrientation(wheel, [x, 0, 0], [0, 0, 0, 1], physicsClientId=client)
+        bodies.update()
+    assert 10 < len(asked) < 10 / 0.25 + 5
+
+
+def test_another_body_on_the_ground_has_its_own_ground(client, recorder):
+    ground = field(client, rough(41, 41), scale=[0.1, 0.1, 0.1])
+    small = ball(client, [-1, -1, 0])
+    bodies = Bodies(client, recorder=recorder)
+    before = modelled(bodies, ground)
+    p.removeBody(small, physicsClientId=client)
+    assert ball(client, [-1, -1, 0], radius=0.5) == small
+    bodies.update()
+    assert before.keys() < modelled(bodies, ground).keys()
+    ball(client, [1, 1, 0])
+    bodies.update()
+    assert any(prism.centroid[0] > 0.5 for prism in prisms(bodies, ground))
 
 
 def test_heights_that_are_replaced_are_noticed(client, recorder):

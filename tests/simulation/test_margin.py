@@ -223,3 +223,46 @@ def test_a_margin_that_is_changed_is_noticed(client):
     p.changeDynamics(first, -1, collisionMargin=0, physicsClientId=client)
     bodies.update()
     assert isinstance(bodies.shapes[0], Hull)
+
+
+def test_the_report_counts_pairs_that_only_margins_hold_apart(client):
+    """Cubes of points 1.5 mm apart, and one that overlaps; boxes have no margin around them."""
+    gap = 1.0015
+    ground = body(client, p.GEOM_BOX, halfExtents=[9, 9, 0.5], position=[0, 0, -0.5], mass=0)
+    low, high = (hull(client, CUBE, position=[0, 0, z]) for z in (0.5005, 0.5005 + gap))
+    hull(client, CUBE, position=[3, 0, 0.49])
+    body(client, p.GEOM_BOX, halfExtents=[0.5] * 3, position=[6, 0, 0.5])
+    bodies = Bodies(client)
+    assert bodies.report().pairs_within_margins == 0  # nothing has been asked for
+    bodies.overlaps()
+    assert bodies.report().pairs_within_margins == 0  # pybullet has not looked for contacts
+    p.performCollisionDetection(client)
+    contacts = bodies.overlaps()
+    assert bodies.report().pairs_within_margins == 2
+    assert str(bodies.report()).splitlines()[-1] == (
+        "2 more pairs of links touch only within the margins that Bullet lays around hulls; surface 'margin' shows them"
+    )
+    margined = Bodies(client, surface="margin")
+    assert len(margined.overlaps()) == len(contacts) + 2
+    assert margined.report().pairs_within_margins == 0
+    assert "margins" not in str(margined.report())
+    for among, number in (("all", 2), ([(low, ground)], 1), ([(high, ground)], 0)):
+        bodies.overlaps(pairs=among)
+        assert bodies.report().pairs_within_margins == number
+    p.removeBody(high, physicsClientId=client)
+    p.performCollisionDetection(client)
+    bodies.update()
+    bodies.overlaps()
+    assert bodies.report().pairs_within_margins == 1
+
+
+def test_contacts_of_bodies_that_are_not_known_yet_are_not_counted(client):
+    body(client, p.GEOM_BOX, halfExtents=[9, 9, 0.5], position=[0, 0, -0.5], mass=0)
+    bodies = Bodies(client)
+    bodies.overlaps()
+    hull(client, CUBE, position=[0, 0, 0.5005])
+    p.performCollisionDetection(client)
+    assert bodies.report().pairs_within_margins == 0
+    bodies.update()
+    bodies.overlaps()
+    assert bodies.report().pairs_within_margins == 1

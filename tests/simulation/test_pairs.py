@@ -1,12 +1,16 @@
 """The pairs that are looked at are those that pybullet makes contacts of, or those of the user's list."""
 
+import warnings
+from types import SimpleNamespace
+
 import numpy as np
 import pybullet as p
 import pybullet_data
 import pytest
 from pybullet_utils.bullet_client import BulletClient
 
-from overlapper.simulation import Bodies, Recorder
+from overlapper.simulation import Bodies, Recorder, SelfCollisionWarning
+from overlapper.simulation.collision_rules import Colliders, CollisionRules
 
 SELF = p.URDF_USE_SELF_COLLISION
 LINK = (
@@ -344,3 +348,82 @@ def test_only_pairs_whose_boxes_meet_are_candidates(client):
     box(client), box(client, 1, [0.5, 0, 0]), box(client, 1, [9, 0, 0])
     pairs = Bodies(client).pairs()
     assert pairs.tolist() == [[0, 1]] and pairs.dtype == np.int32
+
+
+# --- what no recorder has heard of
+
+
+def test_a_body_that_collides_with_itself_unrecorded_is_named_once(client, tmp_path):
+    robot = chain(client, tmp_path, flags=SELF)
+    bodies = Bodies(client)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert bodies.overlaps() == []  # and pybullet has not looked for contacts yet
+        p.performCollisionDetection(client)
+        assert bodies.overlaps(pairs=[(robot, robot)]) != []  # asked for as the warning says
+    with pytest.warns(SelfCollisionWarning, match="collides with itself, its l. with its l.,.*Recorder") as told:
+        assert bodies.overlaps() == []
+    assert len(told) == 1 and told[0].filename == __file__ and f"pairs=[({robot}, {robot})]" in str(told[0].message)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        bodies.update()
+        bodies.overlaps()
+    p.removeBody(robot, physicsClientId=client)
+    assert chain(client, tmp_path, flags=SELF) == robot
+    p.performCollisionDetection(client)
+    bodies.update()
+    with pytest.warns(SelfCollisionWarning):
+        bodies.overlaps()
+
+
+def test_a_recorder_that_came_too_late_does_not_silence_the_warning(client, tmp_path):
+    early = chain(client, tmp_path, flags=SELF)
+    with Recorder(client) as recorder:
+        late = chain(client, tmp_path, flags=SELF, basePosition=[9, 0, 0])
+        bodies = Bodies(client, recorder=recorder)
+        p.performCollisionDetection(client)
+        with pytest.warns(SelfCollisionWarning, match=f"body {early}") as told:
+            contacts = bodies.overlaps()
+        assert len(told) == 1 and {(c.bodyA, c.bodyB) for c in contacts} == {(late, late)}
+
+
+def test_contacts_are_asked_only_of_bodies_that_could_collide_with_themselves(client, tmp_path, monkeypatch):
+    for x in range(10):
+        box(client, position=(2 * x, 0, 0))
+    robot = chain(client, tmp_path, basePosition=[0, 9, 0])
+    bodies, asked, original = Bodies(client), [], p.getContactPoints
+    monkeypatch.setattr(p, "getContactPoints", lambda *args, **named: (asked.append(args), original(*args, **named))[1])
+    for _ in range(3):
+        bodies.overlaps()
+    assert asked == [(robot, robot)] * 3
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rules_count_the_pairs_that_they_allow(seed):
+    """With many pair filters and bodies that collide with themselves, pair by pair."""
+    random = np.random.default_rng(seed)
+    links = sorted({(int(body), int(link)) for body, link in random.integers([0, -1], [6, 3], (20, 2))})
+    rows = {each: row for row, each in enumerate(links)}
+    owners = np.array([body for body, _ in links])
+    group, mask = random.choice([1, 2, 3], len(links)), random.choice([0, 1, -1, -3], len(links))
+
+    drawn = [(links[i], links[j]) for i, j in random.integers(0, len(links), (30, 2)) if i != j]
+    told = SimpleNamespace(
+        both_masks_must_agree=bool(seed % 2),
+        self_collision={1: SELF, 4: SELF | p.URDF_USE_SELF_COLLISION_INCLUDE_PARENT},
+        pair_filters={tuple(sorted(pair)): bool(random.integers(2)) for pair in drawn} | {((77, -1), (88, -1)): True},
+    )
+    rules = CollisionRules(Colliders(rows, owners, group, mask, {4: {0: -1, 1: 0, 2: 1}}), told)
+    weights, expected = random.integers(1, 4, len(links)), 0
+    first, second = np.triu_indices(len(links), 1)
+    for i, j, allowed in zip(first, second, rules.allow(first, second)):
+        admitted, admitting = group[i] & mask[j] != 0, group[j] & mask[i] != 0
+        should = (admitted and admitting) if told.both_masks_must_agree else (admitted or admitting)
+        should = told.pair_filters.get((links[i], links[j]), should)
+        same = owners[i] == owners[j]
+        if same:
+            # Body 1 has no parents that are known, body 4 lets all its links collide.
+            should = should and owners[i] in told.self_collision
+        assert bool(allowed) == bool(should), (links[i], links[j])
+        expected += int(weights[i] * weights[j]) * bool(allowed)
+    assert rules.count(weights) == expected

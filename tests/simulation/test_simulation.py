@@ -1,6 +1,7 @@
 """What `Bodies` models is what pybullet collides with, where it collides with it."""
 
 import ctypes
+import gc
 import os
 import subprocess
 import sys
@@ -440,7 +441,7 @@ def test_the_hull_of_unequal_spheres_is_not_taken_for_a_capsule():
 def test_links_without_an_id_are_counted_as_skipped(client):
     """A robot in maximal coordinates: pybullet knows the pose of its base alone."""
     p.loadURDF("r2d2.urdf", useMaximalCoordinates=True, physicsClientId=client)
-    with pytest.warns(SkippedShapeWarning, match="15 rigid bodies.*maximal coordinates") as caught:
+    with pytest.warns(SkippedShapeWarning, match="15 bodies.*maximal coordinates") as caught:
         bodies = Bodies(client)
     assert len(caught) == 1
     assert [key[1] for key in bodies.keys] == [-1]
@@ -449,6 +450,83 @@ def test_links_without_an_id_are_counted_as_skipped(client):
     p.resetSimulation(client)
     bodies.update()
     assert bodies.keys == bodies.skipped == []
+
+
+def test_what_load_bullet_brings_is_counted_as_skipped(client, tmp_path):
+    """pybullet gives it no ids, so that nothing can be asked of it."""
+    p.loadURDF("cube.urdf", physicsClientId=client)
+    path = str(tmp_path / "cube.bullet")
+    p.saveBullet(path, physicsClientId=client)
+    p.resetSimulation(client)
+    with Recorder(client) as recorder:
+        watched = Bodies(client, recorder=recorder)
+        p.loadBullet(path, physicsClientId=client)
+        with pytest.warns(SkippedShapeWarning, match="1 body .*pybullet gives no id to what loadBullet brings"):
+            watched.update()
+        with pytest.warns(SkippedShapeWarning, match="1 body "):
+            bodies = Bodies(client)
+        cube = box(client, position=[0, 0, 0])
+        p.loadBullet(path, physicsClientId=client)
+        with pytest.warns(SkippedShapeWarning, match="2 bodies "):
+            bodies.update()  # without a recorder, it is noticed with the next body
+        assert bodies.keys == [(cube, -1, 0)] and [each.name for each in bodies.skipped] == ["2 bodies"]
+        with pytest.warns(SkippedShapeWarning, match="2 bodies "):
+            watched.update()
+        p.resetSimulation(client)
+        watched.update()
+        assert watched.keys == watched.skipped == []
+
+
+# --- marks
+
+
+def entries(client):
+    return [p.getNumUserData(id, client) for id in range(p.getNumBodies(client))]
+
+
+def test_marks_are_one_per_body_and_go_with_the_last_reader(client):
+    box(client), box(client, position=[3, 0, 0])
+    first, second = Bodies(client), Bodies(client)
+    assert entries(client) == [1, 1]
+    del first
+    gc.collect()
+    box(client, position=[6, 0, 0])
+    second.update()
+    assert entries(client) == [1, 1, 1]
+    with Bodies(client):
+        assert entries(client) == [1, 1, 1]
+    second.close()
+    assert entries(client) == [0, 0, 0]
+    with pytest.raises(ValueError, match=f"this Bodies of physicsClientId {client} is closed"):
+        second.update()
+    assert len(second.keys) == 3
+    assert len(Bodies(client).keys) == 3
+
+
+def test_marks_of_a_client_that_is_gone_do_no_harm(client):
+    box(client)
+    bodies = Bodies(client)
+    p.removeBody(0, physicsClientId=client)
+    other = p.connect(p.DIRECT)
+    box(other)
+    theirs = Bodies(other)
+    p.disconnect(other)
+    del theirs
+    bodies.close()
+    bodies.close()
+    assert entries(client) == []
+
+
+def test_a_process_that_was_forked_off_leaves_the_marks_to_its_parent(client):
+    box(client)
+    bodies = Bodies(client)
+    child = os.fork()
+    if not child:
+        bodies.close()
+        os._exit(entries(client)[0])
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1
+    bodies.close()
+    assert entries(client) == [0]
 
 
 # --- bodies come and go
@@ -537,6 +615,35 @@ def test_shapes_stay_the_same_objects_while_other_bodies_come_and_go(client):
     bodies.update()
     assert bodies.keys == [(first, -1, 0)]
     assert bodies.shapes[0] is shape
+
+
+def test_a_body_that_comes_is_the_only_one_that_is_read(client, monkeypatch):
+    for x in range(20):
+        box(client, position=[3 * x, 0, 0])
+    bodies = Bodies(client)
+    asked = []
+
+    def spy(name):
+        original = getattr(p, name)
+        monkeypatch.setattr(
+            p, name, lambda *args, **named: (asked.append((name, args[:1])), original(*args, **named))[1]
+        )
+
+    for name in ("getCollisionShapeData", "getVisualShapeData", "getBodyInfo", "addUserData", "syncBodyInfo"):
+        spy(name)
+    spy("getUserDataInfo"), spy("saveBullet")
+    new = box(client, position=[0, 3, 0])
+    bodies.update()
+    assert len(bodies.keys) == 21
+    about = [name for name, _ in asked]
+    assert about.count("saveBullet") == 1 and "syncBodyInfo" not in about
+    read = ("getCollisionShapeData", "getVisualShapeData", "getBodyInfo", "addUserData")
+    assert {(name, body) for name, (body,) in asked if name in read} == {(name, new) for name in read}
+    assert about.count("getUserDataInfo") <= 20 + 1
+    asked.clear()
+    p.removeBody(new, physicsClientId=client)
+    bodies.update()
+    assert len(bodies.keys) == 20 and "saveBullet" not in [name for name, _ in asked]
 
 
 def test_a_reset_simulation_is_read_afresh(client):
@@ -685,16 +792,39 @@ def test_positions_and_orientations_are_read_only_and_stay_as_they_were(client):
 
 
 @pytest.mark.parametrize("pose", [([np.nan] * 3, [0, 0, 0, 1]), ([0, 0, 0], [0, 0, 0, 0])])
-def test_a_body_without_a_finite_pose_is_named(client, pose):
-    box(client)
-    lost = box(client, position=[3, 0, 0])
+def test_a_body_without_a_finite_pose_is_named_once_and_left_out_until_it_has_one(client, pose):
+    ids = [box(client, position=[0.9 * x, 0, 0]) for x in range(2)]
+    lost = box(client, position=[5, 0, 0])
     bodies = Bodies(client)
     p.resetBasePositionAndOrientation(lost, *pose, physicsClientId=client)
-    with pytest.raises(ValueError, match=f"body {lost} .*diverged"):
+    with pytest.warns(SkippedShapeWarning, match=f"body {lost} .* no finite pose: the simulation has diverged") as told:
         bodies.update()
+    assert len(told) == 1 and told[0].filename == __file__
+    for _ in range(2):
+        bodies.update()  # a second warning would be an error
+        assert [(c.bodyA, c.bodyB) for c in bodies.overlaps()] == [(0, 1)]
+        assert [key[0] for key in bodies.keys] == ids and [each.body for each in bodies.skipped] == [lost]
+        assert bodies.report().shapes == 3 and bodies.report().shapes_read == 2
+    p.changeDynamics(ids[0], -1, mass=0, physicsClientId=client)
     p.resetBasePositionAndOrientation(lost, [0, 0, 0.9], [0, 0, 0, 1], physicsClientId=client)
     bodies.update()
-    assert len(bodies.overlaps()) == 1
+    assert len(bodies.overlaps()) == 3 and bodies.skipped == []
+    p.resetBasePositionAndOrientation(lost, *pose, physicsClientId=client)
+    with pytest.warns(SkippedShapeWarning):
+        bodies.update()
+    p.removeBody(lost, physicsClientId=client)
+    bodies.update()
+    assert bodies.skipped == [] and len(bodies.overlaps()) == 1
+
+
+def test_bodies_are_read_beside_one_that_has_diverged_before(client):
+    ids = [box(client, position=[0.9 * x, 0, 0]) for x in range(2)]
+    p.resetBasePositionAndOrientation(ids[1], [np.nan] * 3, [0, 0, 0, 1], physicsClientId=client)
+    ids.append(box(client, position=[-0.9, 0, 0]))
+    with pytest.warns(SkippedShapeWarning, match=f"body {ids[1]} "):
+        bodies = Bodies(client)
+    assert [(c.bodyA, c.bodyB) for c in bodies.overlaps()] == [(ids[0], ids[2])]
+    assert [key[0] for key in bodies.keys] == [ids[0], ids[2]]
 
 
 def long_chain(client, folder, position, links=130):

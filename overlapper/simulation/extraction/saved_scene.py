@@ -24,30 +24,27 @@ def body_type(client: int, id: int) -> int:
     return int(pybullet.getDynamicsInfo(id, BASE, client)[10])
 
 
-def saved_bodies(client: int, ids: Sequence[int]) -> tuple[BulletFile, dict[int, int]]:
-    """The scene as a .bullet file, and the place in the file of each of `ids` but the soft ones.
+def saved_bodies(client: int, ids: Sequence[int]) -> tuple[BulletFile, dict[int, int], list[int]]:
+    """The scene as a .bullet file, the place in the file of each of `ids` but the soft ones, and whose pose is hidden.
 
-    The file has no ids. Position and number of links identify a body unless another shares them or pybullet hides
-    its position; then each has a friction of its own while the file is written.
+    The file has no ids. Position and number of links identify a body unless another shares them or pybullet hides its
+    position, as it does of bodies of 128 links and more; then each has a friction of its own while the file is written.
     """
     ids = [id for id in ids if body_type(client, id) != SOFT_BODY]
     file = save(client)
     saved = {(body.links, *body.position.tolist()): row for row, body in enumerate(file.bodies)}
     wanted = {id: (pybullet.getNumJoints(id, client), *_base_position(client, id)) for id in ids}
+    hidden = [id for id, key in wanted.items() if len(key) == 1]
     if len(saved) == len(file.bodies) and len(set(wanted.values())) == len(ids) and saved.keys() >= {*wanted.values()}:
-        return file, {id: saved[key] for id, key in wanted.items()}
+        return file, {id: saved[key] for id, key in wanted.items()}, hidden
 
     taken = {body.friction for body in file.bodies}
     frictions = dict(zip(ids, (float(value) for value in count(1) if value not in taken)))
     with _frictions(client, frictions):
         file = save(client)
     by_friction = {body.friction: row for row, body in enumerate(file.bodies)}
-    return file, {id: by_friction[friction] for id, friction in frictions.items() if friction in by_friction}
-
-
-def hides_pose(client: int, id: int) -> bool:
-    """Whether pybullet tells no poses of this body, as of one with more than 128 links; the .bullet file has them."""
-    return not _base_position(client, id)
+    rows = {id: by_friction[friction] for id, friction in frictions.items() if friction in by_friction}
+    return file, rows, hidden
 
 
 def _base_position(client: int, id: int) -> tuple[float, ...]:

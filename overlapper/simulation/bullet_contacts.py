@@ -1,0 +1,55 @@
+"""What pybullet's own contact points say of pairs in which no overlap is found."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pybullet
+
+from overlapper import Hull
+from overlapper.simulation.asked_pairs import Among, AskedPairs
+from overlapper.simulation.collision_rules import CollisionRules
+from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.recorder import Link
+
+DISTANCE = 8  # of a contact point
+
+
+def links_in_contact_with_each_other(client: int, body: int) -> tuple[int, int] | None:
+    """Two links of a body that Bullet keeps apart, -1 for the base; None if there are none."""
+    points = pybullet.getContactPoints(body, body, physicsClientId=client)
+    return (points[0][3], points[0][4]) if points else None
+
+
+def touching_within_margins(
+    client: int, found: Contacts, asked: AskedPairs, among: Among, rules: CollisionRules
+) -> int:
+    """How many pairs of links that were asked for touch in Bullet and not in `found`, one of them by a hull.
+
+    Bullet lays a margin around hulls, and its contact points are of the surfaces with margins. They are those of its
+    last collision detection.
+    """
+    layout = asked.layout
+    links = _touching(client) - {((a, la), (b, lb)) for a, la, _, b, lb, _ in found.keys.tolist()}
+    starts = np.searchsorted(layout.colliders, np.arange(len(layout.collider_rows) + 1))
+    is_hull = [isinstance(shape, Hull) for shape in layout.shapes]
+    pairs: list[tuple[int, int]] = []
+    number: list[int] = []  # of the links that each is of
+    for k, (a, b) in enumerate(links):
+        if a in layout.collider_rows and b in layout.collider_rows:
+            first, second = (
+                range(starts[row], starts[row + 1]) for row in map(layout.collider_rows.__getitem__, (a, b))
+            )
+            some = [(i, j) for i, j in product(first, second) if is_hull[i] or is_hull[j]]
+            pairs += some
+            number += [k] * len(some)
+    chosen = asked.chosen(np.array(pairs, dtype=np.int32).reshape(-1, 2), among, rules)
+    return len(np.unique(np.array(number, dtype=int)[chosen]))
+
+
+def _touching(client: int) -> set[tuple[Link, Link]]:
+    """The links between which Bullet has contact points at which they touch, the lesser first."""
+    points = pybullet.getContactPoints(physicsClientId=client)
+    pairs = (sorted([(each[1], each[3]), (each[2], each[4])]) for each in points if each[DISTANCE] <= 0)
+    return {(first, second) for first, second in pairs}
