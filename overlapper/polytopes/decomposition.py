@@ -32,9 +32,9 @@ from overlapper.union import union_volume
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
-# Part of a mesh's volume by which it may differ from its hull and still be convex: the corners of a mesh come in
-# single precision, 6e-8 of its size, and a face more or less flat has many of them.
-CONVEX = 1e-6
+# Part of the largest coordinate by which the corners of a mesh are off: half a unit of the sixth digit, with which text
+# formats are written, and half a unit of single precision, in which meshes are read.
+ROUNDING = 5e-6 + 2.0**-24
 
 DIGEST = 32  # bytes of SHA-256
 
@@ -149,28 +149,49 @@ def _volume(vertices: Vertices, faces: Faces) -> float:
 
 
 def _convex_bodies(vertices: Vertices, faces: Faces) -> list[Hull] | None:
-    """The connected parts of a closed surface as hulls, if all of them are convex and none is a hole in another."""
-    labels = _components(faces, len(vertices))
+    """The connected parts of a closed surface as hulls, if all are convex but for rounding and none is a hole.
+
+    Faces are connected by common edges: bodies may touch at a corner.
+    """
+    ends, edges = np.unique(np.sort(_edges(faces), axis=1), axis=0, return_inverse=True)
+    labels = _components(edges.reshape(3, -1).T, len(ends))[edges.reshape(3, -1)[0]]
     hulls: list[Hull] = []
-    for label in np.unique(labels[faces[:, 0]]):
-        shell = faces[labels[faces[:, 0]] == label]
+    for label in np.unique(labels):
+        shell = faces[labels == label]
+        corners = vertices[np.unique(shell)]
         try:
-            hull = Hull(vertices[np.unique(shell)])
+            hull = Hull(corners)
         except ValueError:
             return None
-        if not _volume(vertices, shell) >= (1 - CONVEX) * hull.volume:
+        # Corners that moved by √3 roundings have taken the surface in, or that of the hull out, by as much.
+        layer = 2 * math.sqrt(3) * ROUNDING * float(np.abs(corners).max())
+        missing = hull.volume - _volume(vertices, shell)
+        if not missing <= layer * _area(hull.corners, hull.triangles) or _deepest(hull, corners) > layer:
             return None
         hulls.append(hull)
     return hulls
 
 
-def _components(faces: Faces, count: int) -> Faces:
-    """For each vertex the least vertex that edges join it to."""
+def _deepest(hull: Hull, points: Vertices) -> float:
+    """m: how far below the surface of a hull the deepest of its points lies."""
+    planes, deepest = hull.halfspaces, 0.0
+    for some in np.array_split(points, len(points) * len(planes) // 10**7 + 1):  # 80 MB at a time
+        deepest = max(deepest, float(-(some @ planes[:, :3].T + planes[:, 3]).max(axis=1).min()))
+    return deepest
+
+
+def _area(vertices: Vertices, faces: NDArray[np.integer]) -> float:
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def _components(groups: Faces, count: int) -> Faces:
+    """For each of `count` things the least that it is connected to; each row of `groups` connects what it names."""
     labels = np.arange(count)
     while True:
         least = labels.copy()
-        for k in range(3):
-            np.minimum.at(least, faces[:, k], labels[faces].min(axis=1))
+        for column in groups.T:
+            np.minimum.at(least, column, labels[groups].min(axis=1))
         least = least[least]
         if np.array_equal(least, labels):
             return labels

@@ -172,6 +172,41 @@ def test_convex_bodies_need_no_coacd_and_stay_exact(coacd_is, way):
     assert sorted(part.volume for part in found.parts) == pytest.approx([1, 2])
 
 
+def ball_of_triangles(corners=300, seed=0):
+    """(t, 3, 3) the surface of a polytope with random corners on the unit sphere, facing out."""
+    points = np.random.default_rng(seed).normal(size=(corners, 3))
+    hull = Hull(points / np.linalg.norm(points, axis=1)[:, None])
+    return hull.corners[hull.triangles]
+
+
+@pytest.mark.parametrize("written", ["%.6f", "%.6g", "single"])
+@pytest.mark.parametrize("size", [0.1, 1, 30])
+def test_bodies_that_are_convex_up_to_rounding_stay_as_they_are(coacd_is, written, size):
+    coacd_is("raise RuntimeError")
+    pair = np.concatenate([ball_of_triangles(), ball_of_triangles(seed=1) + [1.2, 0, 0]]) * size
+    text = (lambda x: np.float32(x)) if written == "single" else (lambda x: float(written % x))
+    found = decompose(np.vectorize(text, otypes=[float])(pair))
+    assert len(found.parts) == 2 and found.path is None
+    assert found.mesh_volume == pytest.approx(sum(part.volume for part in found.parts), rel=1e-4)
+
+
+def test_convex_bodies_may_touch_at_a_corner(coacd_is):
+    coacd_is("raise RuntimeError")
+    assert len(decompose(np.concatenate([CUBE, CUBE + 1])).parts) == 2
+
+
+@pytest.mark.parametrize("depth", [1e-3, 1e-4])
+def test_a_dent_deeper_than_rounding_is_not_filled(coacd_is, depth):
+    calls = coacd_is(SAW)
+    top = CUBE[:, :, 2].min(axis=1) == 1
+    middle = np.array([0.5, 0.5, 1 - depth])
+    ends = [edge for face in CUBE[top] for edge in (face[[0, 1]], face[[1, 2]], face[[2, 0]])]
+    outer = [(a, b) for a, b in ends if (a == b).sum() == 2]  # and not the diagonal
+    dented = np.concatenate([CUBE[~top], [[a, b, middle] for a, b in outer]])
+    assert decompose(dented).mesh_volume == pytest.approx(1 - depth / 3)
+    assert calls() == 1
+
+
 def test_a_hole_is_not_filled_by_the_convex_body_around_it(coacd_is):
     calls = coacd_is(SAW.replace("middle = v.max() / 2", "middle = v.max()"))
     hollow = np.concatenate([CUBE, (CUBE / 2 + 0.25)[:, ::-1]])
