@@ -26,11 +26,6 @@ FLOORS = ["python", "batch", "overlap", "methods", "distance", "shapes", "geomet
 # The ways that know nothing of each other.
 APART = ["methods/clipping", "methods/tracing", "methods/dual"]
 
-# What includes what it should not, file by file.
-EXCEPTIONS = {
-    ("distance/portal.h", "methods/tracing/close_body.h"),
-}
-
 
 def contracts(folder: Path) -> tuple[int, str]:
     """The exit code and the report of import-linter on the sources in a folder."""
@@ -97,10 +92,8 @@ def broken_includes(native: Path) -> set[tuple[str, str]]:
 
 def test_the_core_includes_only_downwards():
     found = broken_includes(NATIVE)
-    lines = "\n".join(f"{file} includes {included}" for file, included in sorted(found - EXCEPTIONS))
+    lines = "\n".join(f"{file} includes {included}" for file, included in sorted(found))
     assert not lines, lines
-    mended = "\n".join(f"{file} does not include {included}" for file, included in sorted(EXCEPTIONS - found))
-    assert not mended, f"these are exceptions no more:\n{mended}"
 
 
 @pytest.mark.parametrize(

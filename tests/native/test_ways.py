@@ -11,8 +11,11 @@ from overlapper import Box, Hull, Overlaps, Placed, overlap, overlaps, random_po
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "how.md").read_text(encoding="utf-8")
-CHOOSE = (ROOT / "overlapper" / "native" / "methods" / "choose.h").read_text(encoding="utf-8")
-MEASURES = (ROOT / "overlapper" / "native" / "geometry" / "measures.h").read_text(encoding="utf-8")
+NATIVE = ROOT / "overlapper" / "native"
+CHOOSE = (NATIVE / "methods" / "choose.h").read_text(encoding="utf-8")
+CHOOSING = (NATIVE / "methods" / "choose.cpp").read_text(encoding="utf-8")
+MEASURES = (NATIVE / "geometry" / "measures.h").read_text(encoding="utf-8")
+THRESHOLDS = (NATIVE / "geometry" / "thresholds.h").read_text(encoding="utf-8")
 
 
 def rows_below(*heading):
@@ -42,12 +45,13 @@ def test_every_way_is_explained_once():
     ]
 
 
-def test_limits_are_those_of_the_code():
+def test_limits_are_those_by_which_the_code_chooses():
     on_page = {name.strip("`"): float(value) for name, value, _ in rows_below("limit", "is", "means")}
     in_code = {
         name: float(value)
-        for source in (CHOOSE, MEASURES)
+        for source in (THRESHOLDS, MEASURES)
         for name, value in re.findall(r"^inline constexpr (?:double|size_t) (k\w+) = ([\de.-]+);", source, re.MULTILINE)
+        if re.search(rf"\b{name}\b", CHOOSING)
     }
     assert on_page == in_code
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "geometry/rounding.h"
+#include "geometry/thresholds.h"
 
 namespace overlapper {
 namespace {
@@ -29,9 +30,6 @@ double extent(const Bounds& box) { return max_component(box.upper - box.lower); 
 
 /// How large a box is, in steps of eight times.
 int size_class(const Bounds& box) { return std::ilogb(extent(box)) / 3; }
-
-/// So few boxes are compared with each other sooner than split.
-constexpr int kLeaf = 4;
 
 }  // namespace
 
@@ -68,7 +66,7 @@ void BoxTree::build(std::span<const Enclosure> bodies) {
 void BoxTree::split(std::span<const Enclosure> bodies, int begin, int end) {
   const int node = static_cast<int>(nodes_.size());
   nodes_.push_back({{}, begin, end, -1});
-  if (end - begin <= kLeaf) return;
+  if (end - begin <= kMostBoxesCompared) return;
   Bounds middles{middle(bodies[order_[begin]].box), middle(bodies[order_[begin]].box)};
   for (int k = begin + 1; k < end; ++k) {
     const Vec3 m = middle(bodies[order_[k]].box);

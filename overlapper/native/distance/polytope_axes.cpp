@@ -4,20 +4,12 @@
 #include <vector>
 
 #include "geometry/rounding.h"
+#include "geometry/thresholds.h"
 #include "geometry/wide.h"
 #include "shapes/solid.h"
 
 namespace overlapper {
 namespace {
-
-/// The most facets of both together: beyond, EPA is done sooner, which climbs from vertex to vertex.
-constexpr int kMostFacets = 1024;
-
-/// Vertices that one arc passes on the other body; doubles that stay in doubt would go on.
-constexpr int kMostTurns = 64;
-
-/// Vertices looked at before asking whether more are needed.
-constexpr int kGlance = 8;
 
 /// A direction and how far the other solid reaches against it.
 struct Lowest {
@@ -148,7 +140,7 @@ bool has_edges(const Shape& shape) {
 
 std::optional<Penetration> polytope_penetration(const Placed& a, const Placed& b) {
   if (!has_edges(a.shape) || !has_edges(b.shape)) return std::nullopt;
-  if (facets(a.shape) + facets(b.shape) > kMostFacets) return std::nullopt;
+  if (facets(a.shape) + facets(b.shape) > kMostFacetsParted) return std::nullopt;
   if (facets(b.shape) < facets(a.shape)) {
     auto swapped = polytope_penetration(b, a);
     if (swapped) swapped->normal = Vec3{} - swapped->normal;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "methods/tracing/close_body.h"
+#include "shapes/mesh.h"
 
 namespace overlapper {
 

@@ -1,5 +1,6 @@
 #include "geometry/predicates.h"
 
+#include "geometry/thresholds.h"
 #include "geometry/wide.h"
 
 namespace overlapper {
@@ -87,7 +88,6 @@ Vec3 polar_vertex(Vec3 a, Vec3 b, Vec3 c) {
   const Vec3 normal = cross(u, v);
   // The differences and products lose about eps |u| |v|. Where the normal is less than a hundredth of that, the points
   // are nearly collinear (three planes nearly share a line), and more digits are needed to place the vertex.
-  constexpr double kWellShaped = 1e-2;
   if (!(norm2(normal) > kWellShaped * kWellShaped * norm2(u) * norm2(v))) return wide_polar_vertex(a, b, c);
   // All three have the same product with the normal; the shortest loses least to cancellation.
   const double aa = norm2(a), bb = norm2(b), cc = norm2(c);

@@ -11,9 +11,9 @@
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
 #include "methods/closed_forms.h"
-#include "methods/tracing/close_body.h"
 #include "methods/tracing/trace.h"
 #include "shapes/canonical_order.h"
+#include "shapes/mesh.h"
 #include "shapes/planes_asked.h"
 
 namespace overlapper {

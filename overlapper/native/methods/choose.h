@@ -7,23 +7,13 @@
 #include <span>
 
 #include "geometry/measures.h"
+#include "geometry/thresholds.h"
 #include "methods/dual/deepest_ball.h"
 #include "methods/dual/region.h"
 #include "methods/dual/wide_ball.h"
 #include "shapes/shape.h"
 
 namespace overlapper {
-
-/// Pairs of facets, one of each body, up to which a table of all signs is sooner filled than a seam is found.
-inline constexpr double kLeastPairsTraced = 2500;
-
-/// Facets of a hull beyond which asking every corner of one body about every plane of the other takes longer than the
-/// hull of the dual points.
-inline constexpr size_t kMostFacetsClipped = 1024;
-
-/// The error of a volume, relative to it, that a region of as many planes as it may have reaches on a round body: a
-/// smaller tolerance is not worth another way.
-inline constexpr double kFinest = 1e-7;
 
 /// What the choice of a way depends on.
 struct Traits {

@@ -2,13 +2,11 @@
 
 #include <limits>
 
+#include "geometry/thresholds.h"
 #include "shapes/shape.h"
 
 namespace overlapper {
 namespace {
-
-/// Below it, looking at every element takes no longer than finding out where to climb.
-constexpr int kScan = 48;
 
 /// Rounding of a sum of three products whose factors have lengths with that product.
 double tie(double lengths) { return 16 * 0x1p-53 * lengths; }
@@ -152,13 +150,13 @@ bool convex(const HullData& hull, const HullGraph& graph, double rounding) {
 
 void fill_maps(const HullData& hull, HullGraph& graph) {
   const int vertices = static_cast<int>(hull.vertices.size()), facets = static_cast<int>(hull.planes.size());
-  if (vertices > kScan) {
+  if (vertices > kMostScanned) {
     DirectionMap map(vertices);
     int v = 0;
     for (int cell = 0; cell < map.cells(); ++cell) map.set(cell, v = graph.farthest_vertex(hull, map.centre(cell), v));
     graph.vertex_near = std::move(map);
   }
-  if (facets > kScan) {
+  if (facets > kMostScanned) {
     DirectionMap map(facets);
     int f = 0;
     double gauge;
@@ -198,7 +196,7 @@ Vec3 DirectionMap::centre(int cell) const {
 
 int HullGraph::farthest_vertex(const HullData& hull, Vec3 direction) const {
   const int vertices = static_cast<int>(hull.vertices.size());
-  if (vertices > kScan) return farthest_vertex(hull, direction, vertex_near.near(direction));
+  if (vertices > kMostScanned) return farthest_vertex(hull, direction, vertex_near.near(direction));
   double height;
   return scan(vertices, [&](int v) { return dot(hull.vertices[v], direction); }, height);
 }
@@ -215,7 +213,7 @@ int HullGraph::farthest_vertex(const HullData& hull, Vec3 direction, int start) 
 int HullGraph::facet_towards(const HullData& hull, Vec3 point, double& gauge) const {
   const int facets = static_cast<int>(dual.size());
   const Vec3 from_centroid = point - hull.centroid;
-  if (facets > kScan) return facet_towards(hull, point, gauge, facet_near.near(from_centroid));
+  if (facets > kMostScanned) return facet_towards(hull, point, gauge, facet_near.near(from_centroid));
   return scan(facets, [&](int f) { return dot(dual[f], from_centroid); }, gauge);
 }
 
@@ -228,7 +226,7 @@ int HullGraph::facet_towards(const HullData& hull, Vec3 point, double& gauge, in
 }
 
 int HullGraph::ray_exit(const HullData& hull, Vec3 origin, Vec3 direction, double& rate) const {
-  if (static_cast<int>(dual.size()) <= kScan) return ray_exit(hull, origin, direction, rate, 0);
+  if (static_cast<int>(dual.size()) <= kMostScanned) return ray_exit(hull, origin, direction, rate, 0);
   // Where the ray leaves the ball around the hull is near where it leaves the hull, if that is round.
   const Vec3 from_centroid = origin - hull.centroid;
   const double along = dot(from_centroid, direction), length2 = norm2(direction);
@@ -243,7 +241,7 @@ int HullGraph::ray_exit(const HullData& hull, Vec3 origin, Vec3 direction, doubl
     return dot(plane.normal, direction) / std::max(-signed_distance(plane, origin), std::numeric_limits<double>::min());
   };
   const int facets = static_cast<int>(dual.size());
-  if (facets <= kScan) return scan(facets, value, rate);
+  if (facets <= kMostScanned) return scan(facets, value, rate);
   const int first = climb(start, 0, facets, value, facet_neighbours(*this, hull), rate);
   // Rates near that of the exit have slacks that are rounded alike.
   const double slack = -signed_distance(hull.planes[first], origin);
