@@ -7,8 +7,8 @@ namespace {
 
 class Refinement {
  public:
-  Refinement(const Mesh& a, const Mesh& b, const Pose& pose, double rounding)
-      : a_(a), b_(b), pose_(pose), rounding_(rounding), inner_{a.data().centroid, pose * b.data().centroid} {}
+  Refinement(const Mesh& a, const Mesh& b, const Pose& pose, double doubt)
+      : a_(a), b_(b), pose_(pose), doubt_(doubt), inner_{a.data().centroid, pose * b.data().centroid} {}
 
   Portal run() {
     if (!surround_ray()) return portal_;
@@ -22,7 +22,7 @@ class Refinement {
       const DifferencePoint farther = support(outward);
       if (separates(farther, outward)) break;
       const double moved = dot(outward, farther.difference() - first);
-      if (!(moved > rounding_ * std::sqrt(norm2(outward)))) break;
+      if (!(moved > doubt_ * std::sqrt(norm2(outward)))) break;
       narrow(farther);
     }
     return portal_;
@@ -41,7 +41,7 @@ class Refinement {
   bool separates(const DifferencePoint& farthest, Vec3 direction) {
     const double reached = dot(farthest.difference(), direction);
     if (reached > 0) return false;
-    if (-reached > rounding_ * std::sqrt(norm2(direction))) portal_.answer = Portal::Answer::kApart;
+    if (-reached > doubt_ * std::sqrt(norm2(direction))) portal_.answer = Portal::Answer::kApart;
     return true;
   }
 
@@ -101,7 +101,7 @@ class Refinement {
 
   const Mesh &a_, &b_;
   Pose pose_;
-  double rounding_;
+  double doubt_;
   DifferencePoint inner_;
   std::array<DifferencePoint, 3> corner_;
   Portal portal_;
@@ -109,7 +109,7 @@ class Refinement {
 
 }  // namespace
 
-Portal find_portal(const Mesh& a, const Mesh& b, const Pose& pose, double rounding) {
+Portal find_portal(const Mesh& a, const Mesh& b, const Pose& pose, double doubt) {
   const Vec3 centre_a = a.data().centroid, centre_b = pose * b.data().centroid;
   const Vec3 between = centre_b - centre_a;
   const double apart2 = norm2(between), near = std::max(a.graph().inradius, b.graph().inradius) / 2;
@@ -118,7 +118,7 @@ Portal find_portal(const Mesh& a, const Mesh& b, const Pose& pose, double roundi
     const Vec3 point = a.graph().inradius > b.graph().inradius ? centre_b : centre_a;
     return {Portal::Answer::kCommon, point, apart2 > 0 ? between : Vec3{1, 0, 0}};
   }
-  return Refinement(a, b, pose, rounding).run();
+  return Refinement(a, b, pose, doubt).run();
 }
 
 }  // namespace overlapper

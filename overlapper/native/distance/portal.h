@@ -13,8 +13,8 @@ struct Portal {
 
 /// Minkowski portal refinement (Snethen 2008), with supports found by climbing: a triangle of points of A - B through
 /// which the ray from an inner point to the origin leaves, moved outwards until the origin is behind it or a support
-/// plane proves a gap of more than `rounding`. `pose` places the second body in the first one's own coordinates. The
+/// plane proves a gap of more than `doubt`. `pose` places the second body in the first one's own coordinates. The
 /// common point is a combination of corners and the centroid, whose share is positive, so that it lies inside.
-Portal find_portal(const Mesh& a, const Mesh& b, const Pose& pose, double rounding);
+Portal find_portal(const Mesh& a, const Mesh& b, const Pose& pose, double doubt);
 
 }  // namespace overlapper

@@ -240,14 +240,16 @@ void check_contact(const Overlap& overlap) {
   if (overlap.status() == Status::kOverlapping) return;
   require(finite(c.witness_a) && finite(c.witness_b), "the witness points are finite");
   require(finite(c.separating.normal) && std::isfinite(c.separating.offset), "the separating plane is finite");
-  const double blur = 0x1p-46 * extent(overlap.bodies());
+  const double rounding = 0x1p-46 * extent(overlap.bodies());
   // What the paper's method calls separated need not be.
   if (overlap.status() != Status::kSeparated || overlap.method() == Method::kPaper) return;
   require(c.distance > 0, "separated bodies are apart");
   if (bounded(a.shape))
-    require(signed_distance(c.separating, a.support(-c.normal)) >= -blur, "the separating plane has a on its far side");
+    require(signed_distance(c.separating, a.support(-c.normal)) >= -rounding,
+            "the separating plane has a on its far side");
   if (bounded(b.shape))
-    require(signed_distance(c.separating, b.support(c.normal)) <= blur, "the separating plane has b on its near side");
+    require(signed_distance(c.separating, b.support(c.normal)) <= rounding,
+            "the separating plane has b on its near side");
 }
 
 /// The forces are the area vectors of the facets, which close.

@@ -10,6 +10,9 @@
 /// - *error*: the bound that is stated to the user, such as `volume_error`.
 /// - *flatness*: m; by how much the plane of a facet misses the corners it was made from. It belongs to the body, is no
 ///   rounding, and no more digits lessen it.
+/// - *wide*: in double-doubles, where doubles are in doubt.
+/// - *margin*: a distance from zero that is asked for beyond doubt, so that whoever asks again gets the same answer.
+/// - *certain*, *sure*: of a sign or a status, beyond doubt.
 /// - *certified*, *lower*, *upper*: bounds that hold whatever rounding did.
 namespace overlapper {
 

@@ -161,7 +161,7 @@ struct Settled {
 
 /// The sizes that count are the same for a mirror image, for other axes and for another order.
 Settled settled_in_wide_arithmetic(const Arrangement& at, double reach, std::vector<OwnedPlane> hints) {
-  const double noise = wide_rounding(reach);
+  const double plane_rounding = wide_rounding(reach);
   double least_size = kInfinity, largest_size = 0;
   for (const Placed& body : at.relative) {
     if (!bounded(body.shape)) continue;
@@ -173,13 +173,13 @@ Settled settled_in_wide_arithmetic(const Arrangement& at, double reach, std::vec
   if (!std::isfinite(least_size)) return {};
   const std::vector<WideBody> bodies = at.wide_bodies();
   // Nearer or thinner than the rounding of their coordinates, bodies touch, but not by 1e-12 of the smaller one's size.
-  const double margin = std::max(4 * noise, std::min(rounding(largest_size / 2), 0x1p-41 * least_size));
+  const double margin = std::max(4 * plane_rounding, std::min(rounding(largest_size / 2), 0x1p-41 * least_size));
   if (bodies.size() == 2) {
-    const WideGap gap = wide_gap(bodies[0], bodies[1], noise);
+    const WideGap gap = wide_gap(bodies[0], bodies[1], plane_rounding);
     if (gap.certified > margin) return {Status::kSeparated, {}};
     if (norm2(gap.normal) > 0) hints.insert(hints.end(), {{{-gap.normal, 0}, 0}, {{gap.normal, 0}, 1}});
   }
-  Settled settled{Status::kTouching, wide_deepest_ball(bodies, hints, margin, reach, noise)};
+  Settled settled{Status::kTouching, wide_deepest_ball(bodies, hints, margin, reach, plane_rounding)};
   if (settled.ball->upper < -margin) settled.status = Status::kSeparated;
   if (settled.ball->lower > margin) settled.status = Status::kOverlapping;
   return settled;
@@ -271,16 +271,16 @@ Region grown(const Arrangement& at, const Inside& inside, double reach, double t
 namespace {
 
 /// The formula's answer where it is as good as a polytope's: where its terms nearly cancel, that knows more.
-std::optional<Measures> by_formula(const Findings& known, double finest) {
-  const Arrangement& at = known.at;
-  auto measures = closed_form(at.relative[0], at.relative[1], rounding(known.search().reach), at.reference);
+std::optional<Measures> by_formula(const OverlappingBodies& overlapping, double finest) {
+  const Arrangement& at = overlapping.at;
+  auto measures = closed_form(at.relative[0], at.relative[1], rounding(overlapping.search().reach), at.reference);
   if (!measures || measures->volume_error > finest * measures->volume) return std::nullopt;
   if (at.order[0] == 1) std::swap(measures->pulls[0], measures->pulls[1]);
   return measures;
 }
 
-MeasuresInFull by_region(const Region& region, std::span<const Placed> bodies, Way way) {
-  MeasuresInFull answer = measure(region, bodies);
+MeasuresAndInertia by_region(const Region& region, std::span<const Placed> bodies, Way way) {
+  MeasuresAndInertia answer = measure(region, bodies);
   answer.measures.way = way;
   return answer;
 }
@@ -290,33 +290,36 @@ double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 
 
 }  // namespace
 
-MeasuresInFull measure_in_full(const Findings& known) {
-  const Arrangement& at = known.at;
-  const auto in_wide_arithmetic = [&] { return !known.traced && known.inside().wide_ball; };
-  if (!known.traced && known.search().inside && in_wide_arithmetic())
-    return by_region(known.region(), known.bodies, Way::kWideDual);
-  const Choice& choice = choose(traits(known.bodies));
-  const double finest = std::max(known.tolerance, kFinest);
-  MeasuresInFull kept;
-  if (auto formula = choice.tries(Way::kClosedForm) ? by_formula(known, finest) : std::nullopt)
+MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
+  const Arrangement& at = overlapping.at;
+  const auto in_wide_arithmetic = [&] { return !overlapping.traced && overlapping.inside().wide_ball; };
+  if (!overlapping.traced && overlapping.search().inside && in_wide_arithmetic())
+    return by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);
+  const Choice& choice = choose(traits(overlapping.bodies));
+  const double finest = std::max(overlapping.tolerance, kFinest);
+  MeasuresAndInertia kept;
+  if (auto formula = choice.tries(Way::kClosedForm) ? by_formula(overlapping, finest) : std::nullopt)
     kept.measures = std::move(*formula);
-  else kept = by_region(known.region(), known.bodies, known.traced ? Way::kTracing : Way::kDual);
+  else kept = by_region(overlapping.region(), overlapping.bodies, overlapping.traced ? Way::kTracing : Way::kDual);
   const auto keep_better = [&](const Region& region) {
-    MeasuresInFull again = by_region(region, known.bodies, Way::kWideDual);
+    MeasuresAndInertia again = by_region(region, overlapping.bodies, Way::kWideDual);
     if (!widened(kept.measures.way) || error_of(again.measures) < error_of(kept.measures)) kept = std::move(again);
   };
-  const bool polyhedral = std::ranges::none_of(known.bodies, [](const Placed& body) { return smooth(body.shape); });
+  const bool polyhedral =
+      std::ranges::none_of(overlapping.bodies, [](const Placed& body) { return smooth(body.shape); });
   const auto enough = [&] { return error_of(kept.measures) <= kEnough * kept.measures.volume; };
   if (polyhedral && !enough())
-    if (auto wide = widened(at.relative, known.region())) keep_better(owned_as_given(std::move(*wide), at));
-  const auto reach = [&] { return known.search().reach; };
+    if (auto wide = widened(at.relative, overlapping.region())) keep_better(owned_as_given(std::move(*wide), at));
+  const auto reach = [&] { return overlapping.search().reach; };
   if (polyhedral ? !enough() : rounding(reach()) * kept.measures.area > finest * kept.measures.volume) {
     // The point about which the region was grown may not be inside after all, or its frame not be round.
-    const double noise = wide_rounding(reach());
-    const WideBall ball = wide_deepest_ball(at.wide_bodies(), known.inside().ball.cuts, 4 * noise, reach(), noise);
-    if (ball.lower > 0) keep_better(grown_about(ball, at, reach(), known.tolerance));
+    const double plane_rounding = wide_rounding(reach());
+    const WideBall ball = wide_deepest_ball(at.wide_bodies(), overlapping.inside().ball.cuts, 4 * plane_rounding,
+                                            reach(), plane_rounding);
+    if (ball.lower > 0) keep_better(grown_about(ball, at, reach(), overlapping.tolerance));
     else if (polyhedral)
-      kept.measures.volume_error += kept.measures.volume + touching_volume(known.bodies, known.inside().ball);
+      kept.measures.volume_error +=
+          kept.measures.volume + touching_volume(overlapping.bodies, overlapping.inside().ball);
   }
   return kept;
 }

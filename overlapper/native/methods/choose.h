@@ -108,16 +108,17 @@ double wide_rounding(double reach);
 /// The polytope of bodies that overlap, by dual points; owners are numbers of the bodies as given.
 Region grown(const Arrangement& at, const Inside& inside, double reach, double tolerance);
 
-/// Measures of bodies that overlap, where measure_at_once() has none.
-struct Findings {
+/// Bodies that overlap, with what has been found of them, or is found when asked for.
+struct OverlappingBodies {
   const Arrangement& at;
   std::span<const Placed> bodies;
   double tolerance;
-  bool traced;
+  bool traced;  ///< by measure_at_once()
   std::function<const Search&()> search;
   std::function<const Inside&()> inside;
   std::function<const Region&()> region;  ///< owners are numbers of `bodies`
 };
-MeasuresInFull measure_in_full(const Findings& known);
+/// What measure_at_once() cannot measure well enough.
+MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping);
 
 }  // namespace overlapper

@@ -36,8 +36,8 @@ class Ridges {
 
 /// Closed loops of vertices around every connected part of the surface that belongs to `owner`, counter-clockwise from
 /// outside.
-void trace_patch(const Polytope& polytope, std::span<const Region::Facet> facets, const Ridges& ridges, int owner,
-                 std::vector<std::vector<int>>& loops) {
+void walk_around_patches(const Polytope& polytope, std::span<const Region::Facet> facets, const Ridges& ridges,
+                         int owner, std::vector<std::vector<int>>& loops) {
   std::unordered_map<int, std::vector<int>>
       open;  // vertices that begin border ridges not yet walked, and where they lead
   const auto mine = [&](int facet) { return facets[facet].owner == owner; };
@@ -76,13 +76,13 @@ void trace_patch(const Polytope& polytope, std::span<const Region::Facet> facets
 /// Number of the group of each vertex: vertices joined by ridges that rounding alone may have made.
 std::vector<int> merge_vertices(const Region& region, int& groups) {
   const Polytope& p = region.polytope;
-  std::vector<double> blur(p.vertices.size(), 0);
+  std::vector<double> rounding(p.vertices.size(), 0);
   for (int f = 0; f < p.facets(); ++f) {
     // The plane's rounding in the frame's coordinates, in which its distance from the origin is one over its dual's
     // length.
     const double moved = region.facets[f].rounding / region.facets[f].slack / norm(p.dual[f]);
     // Planes that meet at a small angle move their common vertex by a multiple of that.
-    for (int v : p.facet(f)) blur[v] = std::max(blur[v], std::min(1e-3, 512 * moved));
+    for (int v : p.facet(f)) rounding[v] = std::max(rounding[v], std::min(1e-3, 512 * moved));
   }
   std::vector<int> parent(p.vertices.size());
   std::iota(parent.begin(), parent.end(), 0);
@@ -94,7 +94,7 @@ std::vector<int> merge_vertices(const Region& region, int& groups) {
     const auto ring = p.facet(f);
     for (size_t i = 0; i < ring.size(); ++i) {
       const int u = ring[i], v = ring[(i + 1) % ring.size()];
-      if (norm(p.vertices[u] - p.vertices[v]) <= std::max(blur[u], blur[v]))
+      if (norm(p.vertices[u] - p.vertices[v]) <= std::max(rounding[u], rounding[v]))
         parent[std::max(root(u), root(v))] = std::min(root(u), root(v));
     }
   }
@@ -158,7 +158,8 @@ Boundary boundary_of(const Region& region, int bodies) {
   }
   const Ridges ridges(p);
   std::vector<std::vector<int>> loops;
-  for (int owner = 0; owner < (bodies == 2 ? 1 : bodies); ++owner) trace_patch(p, region.facets, ridges, owner, loops);
+  for (int owner = 0; owner < (bodies == 2 ? 1 : bodies); ++owner)
+    walk_around_patches(p, region.facets, ridges, owner, loops);
   for (const auto& loop : loops) {
     std::vector<Vec3> polygon;
     for (int v : contracted(loop, group)) polygon.push_back(boundary.vertices[v]);

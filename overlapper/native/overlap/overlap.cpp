@@ -70,7 +70,7 @@ const Region& Overlap::region() const {
   return lazy().region.get([this] { return region_of_overlap(); });
 }
 
-const MeasuresInFull& Overlap::in_full() const {
+const MeasuresAndInertia& Overlap::in_full() const {
   return lazy().in_full.get([this] { return measured_in_full(); });
 }
 
@@ -90,9 +90,9 @@ Region Overlap::region_of_overlap() const {
   return grown(at, inside(), search().reach, tolerance_);
 }
 
-MeasuresInFull Overlap::measured_in_full() const {
+MeasuresAndInertia Overlap::measured_in_full() const {
   if (method_ == Method::kPaper) {
-    MeasuresInFull as_in_paper = measure(region(), bodies());
+    MeasuresAndInertia as_in_paper = measure(region(), bodies());
     as_in_paper.measures.way = Way::kPaper;
     return as_in_paper;
   }
@@ -139,7 +139,7 @@ int Overlap::facets_touched() const {
 
 Mat3 Overlap::inertia() const {
   if (in_full().inertia) return *in_full().inertia;
-  const MeasuresInFull of_polytope = measure(region(), bodies());
+  const MeasuresAndInertia of_polytope = measure(region(), bodies());
   const double share = in_full().measures.volume / of_polytope.measures.volume;
   const Mat3& i = *of_polytope.inertia;
   return {share * i.row0, share * i.row1, share * i.row2};

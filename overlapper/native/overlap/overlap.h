@@ -71,7 +71,7 @@ class Overlap {
     Once<Search> search;
     Once<Inside> inside;
     Once<Region> region;
-    Once<MeasuresInFull> in_full;
+    Once<MeasuresAndInertia> in_full;
     Once<Boundary> boundary;
     Once<Contact> contact;
     Once<double> error_of_paper;
@@ -81,9 +81,9 @@ class Overlap {
   const Arrangement& arrangement() const;
   const Search& search() const;
   const Inside& inside() const;
-  const MeasuresInFull& in_full() const;
+  const MeasuresAndInertia& in_full() const;
   Region region_of_overlap() const;
-  MeasuresInFull measured_in_full() const;
+  MeasuresAndInertia measured_in_full() const;
   double error_of_paper() const;
 
   void start();

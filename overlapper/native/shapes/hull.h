@@ -16,8 +16,8 @@ struct Edge {
 };
 
 /// What a convex polytope is made of. Facet f is the polygon ring[ring_start[f] .. ring_start[f + 1]) of vertices,
-/// counter-clockwise from outside, in the plane planes[f]. Coordinates are relative to `origin`: subtracting it lost no
-/// bit, and it keeps the digits of a hull that lies far from where its points are counted from.
+/// counter-clockwise from outside, in the plane planes[f]. Coordinates are relative to `origin`: subtracting it rounded
+/// no bit, and it keeps the digits of a hull that lies far from where its points are counted from.
 struct HullData {
   Vec3 origin;
   std::vector<Vec3> vertices;

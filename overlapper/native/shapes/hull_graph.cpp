@@ -8,8 +8,8 @@
 namespace overlapper {
 namespace {
 
-/// Rounding of a sum of three products whose factors have lengths with that product.
-double tie(double lengths) { return 16 * 0x1p-53 * lengths; }
+/// Rounding of a dot product of vectors whose lengths have that product: two that differ by less may be equal.
+double rounding_of_dot(double lengths) { return 16 * 0x1p-53 * lengths; }
 
 /// Elements already looked at in one flood; one per thread, and forgotten by counting up.
 class Marks {
@@ -206,7 +206,7 @@ int HullGraph::farthest_vertex(const HullData& hull, Vec3 direction, int start) 
   double height;
   // About the centroid, where coordinates are as small as they get.
   return climb(
-      start, tie(size), static_cast<int>(hull.vertices.size()),
+      start, rounding_of_dot(size), static_cast<int>(hull.vertices.size()),
       [&](int v) { return dot(hull.vertices[v] - hull.centroid, direction); }, vertex_neighbours(*this), height);
 }
 
@@ -221,7 +221,7 @@ int HullGraph::facet_towards(const HullData& hull, Vec3 point, double& gauge, in
   const Vec3 from_centroid = point - hull.centroid;
   const double size = std::sqrt(norm2(from_centroid)) / inradius;
   return climb(
-      start, tie(size), static_cast<int>(dual.size()), [&](int f) { return dot(dual[f], from_centroid); },
+      start, rounding_of_dot(size), static_cast<int>(dual.size()), [&](int f) { return dot(dual[f], from_centroid); },
       facet_neighbours(*this, hull), gauge);
 }
 
@@ -245,8 +245,9 @@ int HullGraph::ray_exit(const HullData& hull, Vec3 origin, Vec3 direction, doubl
   const int first = climb(start, 0, facets, value, facet_neighbours(*this, hull), rate);
   // Rates near that of the exit have slacks that are rounded alike.
   const double slack = -signed_distance(hull.planes[first], origin);
-  const double noise = tie(circumradius + norm(origin - hull.centroid)) / std::max(slack, inradius * 0x1p-40);
-  return climb(first, rate * noise, facets, value, facet_neighbours(*this, hull), rate);
+  const double rounding =
+      rounding_of_dot(circumradius + norm(origin - hull.centroid)) / std::max(slack, inradius * 0x1p-40);
+  return climb(first, rate * rounding, facets, value, facet_neighbours(*this, hull), rate);
 }
 
 std::shared_ptr<const HullGraph> graph_of(const HullData& hull) {

@@ -30,8 +30,9 @@ class DirectionMap {
 
 /// Who is next to whom on a hull, so that a query climbs from neighbour to neighbour instead of looking at everything
 /// (Dobkin and Kirkpatrick 1983; their hierarchy of ever smaller polytopes is here one map from directions to remote
-/// elements). A linear function over a polytope has no local maximum but the global one, up to ties; over the facets
-/// this holds for rays from a point inside, whose exit is the support function of the polar dual.
+/// elements). A linear function over a polytope has no local maximum but the global one, which several elements may
+/// share; over the facets this holds for rays from a point inside, whose exit is the support function of the polar
+/// dual.
 struct HullGraph {
   // Half-edge h runs along facet[h] from ring[h] to ring[next[h]]; twin[h] runs back along the facet beside it.
   std::vector<int> next, twin, facet;

@@ -13,7 +13,7 @@ namespace overlapper {
 /// A closed convex solid, known only by asking. Directions need not be unit length.
 template <class T>
 concept ConvexOracle = requires(const T& shape, Vec3 point, Vec3 direction) {
-  { shape.support(direction) } -> std::same_as<Vec3>;  // a farthest point; ties are free
+  { shape.support(direction) } -> std::same_as<Vec3>;  // a farthest point, any of them
   {
     shape.ray_exit(point, direction)
   } -> std::same_as<Plane>;  // supporting plane through which the ray leaves; point strictly inside

@@ -37,20 +37,20 @@ Vec3 centre(std::span<Vec3> vertices) {
 }
 
 /// Two vectors, the coordinates of both side by side.
-struct VecPair {
+struct TwoVectors {
   TwoLanes x, y, z;
 };
-inline VecPair beside(Vec3 a, Vec3 b) { return {TwoLanes{a.x, b.x}, TwoLanes{a.y, b.y}, TwoLanes{a.z, b.z}}; }
-inline VecPair operator+(const VecPair& a, const VecPair& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline VecPair operator-(const VecPair& a, const VecPair& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline VecPair operator/(const VecPair& a, double s) { return {a.x / s, a.y / s, a.z / s}; }
-inline VecPair operator*(TwoLanes s, const VecPair& a) { return {s * a.x, s * a.y, s * a.z}; }
-inline TwoLanes dot(const VecPair& a, const VecPair& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline VecPair cross(const VecPair& a, const VecPair& b) {
+inline TwoVectors beside(Vec3 a, Vec3 b) { return {TwoLanes{a.x, b.x}, TwoLanes{a.y, b.y}, TwoLanes{a.z, b.z}}; }
+inline TwoVectors operator+(const TwoVectors& a, const TwoVectors& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline TwoVectors operator-(const TwoVectors& a, const TwoVectors& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline TwoVectors operator/(const TwoVectors& a, double s) { return {a.x / s, a.y / s, a.z / s}; }
+inline TwoVectors operator*(TwoLanes s, const TwoVectors& a) { return {s * a.x, s * a.y, s * a.z}; }
+inline TwoLanes dot(const TwoVectors& a, const TwoVectors& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline TwoVectors cross(const TwoVectors& a, const TwoVectors& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-inline TwoLanes norm2(const VecPair& a) { return dot(a, a); }
-inline Vec3 lane(const VecPair& a, int k) { return {a.x[k], a.y[k], a.z[k]}; }
+inline TwoLanes norm2(const TwoVectors& a) { return dot(a, a); }
+inline Vec3 lane(const TwoVectors& a, int k) { return {a.x[k], a.y[k], a.z[k]}; }
 
 /// Calls `use(e, f, two)` for edges two by two; of an odd number the last one is alone, and `f` is the same.
 template <class Use>
@@ -61,7 +61,7 @@ void for_each_two(std::span<const Edge> edges, Use use) {
   }
 }
 
-/// Sums over the common polytope that a tracer has left, its vertices counted from a point inside.
+/// Sums over the common polytope that clipping has left, its vertices counted from a point inside.
 class Sums {
  public:
   /// `size` is how far the vertices reach along each axis, or any other unit of length.
@@ -77,7 +77,7 @@ class Sums {
     // Each product of three coordinates is rounded less than eight times, and then comes the sum of the tetrahedra, of
     // which none is negative.
     const double terms = 2 * static_cast<double>(w_.edges.size() + w_.seam.size());
-    rounding_ = 8 * 0x1p-53 * lost_ * size.x * size.y * size.z / 6 + terms * 0x1p-53 * six_volumes_ / 6;
+    rounding_ = 8 * 0x1p-53 * uncancelled_ * size.x * size.y * size.z / 6 + terms * 0x1p-53 * six_volumes_ / 6;
   }
 
   double volume() const { return six_volumes_ / 6; }
@@ -89,7 +89,7 @@ class Sums {
     const Vec3* vertices = w_.vertices.data();
     Pull pull{};
     for_each_two(w_.seam, [&](const Edge& e, const Edge& f, bool two) {
-      const PullOf<VecPair> pulls =
+      const PullOf<TwoVectors> pulls =
           pull_along_border(beside(vertices[e.from], vertices[f.from]), beside(vertices[e.to], vertices[f.to]));
       const auto add_lane = [&](int k) {
         pull.force += lane(pulls.force, k);
@@ -110,34 +110,34 @@ class Sums {
     const int* apex = w_.apex.data();
     double* cone = w_.cone.data();
     Vec3 moment = moment_;
-    double six_volumes = six_volumes_, lost = lost_;
+    double six_volumes = six_volumes_, uncancelled = uncancelled_;
     for_each_two(edges, [&](const Edge& e, const Edge& f, bool two) {
       const int left_e = apex[e.left], left_f = apex[f.left], right_e = apex[e.right], right_f = apex[f.right];
-      const VecPair from = beside(vertices[e.from], vertices[f.from]), to = beside(vertices[e.to], vertices[f.to]);
-      const VecPair left = beside(vertices[left_e], vertices[left_f]), sum = from + to, area = cross(from, to);
-      const VecPair right = beside(vertices[right_e], vertices[right_f]);
+      const TwoVectors from = beside(vertices[e.from], vertices[f.from]), to = beside(vertices[e.to], vertices[f.to]);
+      const TwoVectors left = beside(vertices[left_e], vertices[left_f]), sum = from + to, area = cross(from, to);
+      const TwoVectors right = beside(vertices[right_e], vertices[right_f]);
       const TwoLanes on_left = dot(left, area), on_right = -dot(right, area), on_both = on_left + on_right;
       const TwoLanes products =
           (TwoLanes{extent[left_e], extent[left_f]} + TwoLanes{extent[right_e], extent[right_f]}) *
           TwoLanes{extent[e.from], extent[f.from]} * TwoLanes{extent[e.to], extent[f.to]};
-      const VecPair moments = on_left * (left + sum) + on_right * (right + sum);
+      const TwoVectors moments = on_left * (left + sum) + on_right * (right + sum);
       const auto add_lane = [&](const Edge& edge, int k) {
         cone[edge.left] += on_left[k];
         cone[edge.right] += on_right[k];
-        lost += products[k];
+        uncancelled += products[k];
         six_volumes += on_both[k];
         moment += lane(moments, k);
       };
       add_lane(e, 0);
       if (two) add_lane(f, 1);
     });
-    moment_ = moment, six_volumes_ = six_volumes, lost_ = lost;
+    moment_ = moment, six_volumes_ = six_volumes, uncancelled_ = uncancelled;
   }
 
   Workspace& w_;
   Vec3 moment_;
   double six_volumes_ = 0;
-  double lost_ = 0;  ///< the products that the volume is summed from, were none of their terms to cancel
+  double uncancelled_ = 0;  ///< no less than the six volumes would be if none of their terms cancelled
   double rounding_ = 0;
 };
 
@@ -195,20 +195,21 @@ double area_by_corners(Workspace& w) {
   return area;
 }
 
-/// What a tracer has left, once more about `middle` from corners placed in wider arithmetic. Leaves `common` as it is
-/// where even that is not enough.
+/// Measures what clipping has left once more, about `middle` from corners placed in wider arithmetic. Leaves `common`
+/// as it is where even that is not enough.
 void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reach, double least_slack, Vec3 middle,
                      Measures& measures, Pull& on_first) {
   const Mat3 axes = thin_axes(w, middle);
-  const std::optional<double> noise =
+  const std::optional<double> corner_rounding =
       place_in_wide({a, b, w.first.facets, w.apex, w.corners, middle, reach}, axes, w.vertices, w.wide_planes);
-  if (!noise) return;
+  if (!corner_rounding) return;
   Vec3 size;
   for (Vec3 v : w.vertices) size = max(size, abs(v));
   Sums sums(w, size);
   const double area = area_by_corners(w);
   // The axes are at right angles and of length 1 but for a few roundings.
-  const double error = moved_volume(area, *noise, least_slack) + sums.volume_rounding() + 16 * 0x1p-53 * sums.volume();
+  const double error =
+      moved_volume(area, *corner_rounding, least_slack) + sums.volume_rounding() + 16 * 0x1p-53 * sums.volume();
   if (!(error <= kEnough * sums.volume())) return;
   measures.measured = true;
   measures.way = Way::kWideClipping;

@@ -35,8 +35,8 @@ struct Crossing {
   double at;
 };
 
-/// How much of an edge is inside the other body.
-enum class Inside { kNothing, kPart, kUncertain };
+/// What of an edge the other body keeps.
+enum class Kept { kNothing, kPart, kUncertain };
 
 /// One edge against all planes of the other body: the signed distances of its ends. The planes that it enters or leaves
 /// through are among the few that an end is outside of.
@@ -110,18 +110,18 @@ struct EdgeSigns {
   }
 
   /// Where an edge enters and leaves, of which not both ends are inside.
-  Inside cut(bool from_inside, bool to_inside, Crossing& enter, Crossing& leave) const {
+  Kept cut(bool from_inside, bool to_inside, Crossing& enter, Crossing& leave) const {
     if (from_inside) {
       leave = exit(true);
     } else if (to_inside) {
       enter = exit(false);
     } else {
-      if (outside()) return Inside::kNothing;
+      if (outside()) return Kept::kNothing;
       std::tie(enter, leave) = passage();
-      if (enter.plane < 0 || leave.plane < 0) return Inside::kUncertain;
-      if (misses(enter.plane, leave.plane)) return Inside::kNothing;
+      if (enter.plane < 0 || leave.plane < 0) return Kept::kUncertain;
+      if (misses(enter.plane, leave.plane)) return Kept::kNothing;
     }
-    return Inside::kPart;
+    return Kept::kPart;
   }
 };
 
@@ -243,9 +243,9 @@ class EdgeCutter {
                              outside[e.from],        outside[e.to],
                              signs.stride,           rounding_ + std::max(doubts[e.from], doubts[e.to])};
         Crossing enter{-1, 0}, leave{-1, 0};
-        const Inside inside = edge.cut(from_inside, to_inside, enter, leave);
-        if (inside == Inside::kNothing) continue;
-        if (inside == Inside::kUncertain) return false;
+        const Kept kept = edge.cut(from_inside, to_inside, enter, leave);
+        if (kept == Kept::kNothing) continue;
+        if (kept == Kept::kUncertain) return false;
         const Vec3 from = body.vertex(e.from), along = body.vertex(e.to) - from;
         const double length = std::abs(along.x) + std::abs(along.y) + std::abs(along.z);
         const auto cross = [&](Crossing crossing, bool enters, int& vertex) {

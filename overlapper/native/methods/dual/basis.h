@@ -55,8 +55,8 @@ inline bool has_share(DoubleDouble share) { return share.head > 0x1p-80; }
 inline bool leaves_sooner(const Leaving<double>& a, const Leaving<double>& b) { return a.ratio < b.ratio; }
 /// Double-doubles tell equal ratios from others, and of those the largest share keeps the basis farthest from singular.
 inline bool leaves_sooner(const Leaving<DoubleDouble>& a, const Leaving<DoubleDouble>& b) {
-  const bool tie = b.plane >= 0 && abs(a.ratio - b.ratio).head <= 0x1p-80;
-  return tie ? a.share > b.share : a.ratio < b.ratio;
+  const bool equal = b.plane >= 0 && abs(a.ratio - b.ratio).head <= 0x1p-80;
+  return equal ? a.share > b.share : a.ratio < b.ratio;
 }
 
 /// Four planes at which the optimum of a linear programme lies, the largest ball within all planes seen so far: max r

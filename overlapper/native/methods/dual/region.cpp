@@ -85,7 +85,7 @@ double farthest_vertex(const Polytope& polytope) {
 
 /// A dual point rounded once moves its plane, as seen from the origin, by an ulp at the distance of the vertices.
 double rounding_of_dual(double slack, Vec3 dual, double farthest) {
-  return slack * kWideRounding * std::max(1.0, norm(dual) * farthest);
+  return slack * kLastRounding * std::max(1.0, norm(dual) * farthest);
 }
 
 /// The region's reference and frame, for one about `reference`.
@@ -109,7 +109,7 @@ Region grow(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> 
   std::vector<double> negligible;
   for (const auto& p : planes) {
     growth.add(p);
-    negligible.push_back(4 * rounding / growth.slack(p) + (kWide ? kWideRounding : 0));
+    negligible.push_back(4 * rounding / growth.slack(p) + (kWide ? kLastRounding : 0));
   }
   const bool solid = growth.hull.build(negligible);
   assert(solid);
@@ -144,7 +144,7 @@ std::optional<Region> widened(std::span<const Placed> bodies, const Region& regi
   for (const WideDual& dual : duals) {
     if (!(dual.slack > 0)) return std::nullopt;
     hull.points.push_back(dual.point);
-    negligible.push_back(kWideRounding);
+    negligible.push_back(kLastRounding);
   }
   if (!hull.build(negligible)) return std::nullopt;
 
@@ -187,17 +187,17 @@ double inner_volume(const Region& region) {
 
 /// Inertia tensor tr(S) I - S of the second moments S.
 Mat3 inertia_tensor(const Mat3& s) {
-  const double trace = s.row0.x + s.row1.y + s.row2.z;
+  const double diagonal = s.row0.x + s.row1.y + s.row2.z;
   Mat3 inertia{-s.row0, -s.row1, -s.row2};
-  inertia.row0.x += trace;
-  inertia.row1.y += trace;
-  inertia.row2.z += trace;
+  inertia.row0.x += diagonal;
+  inertia.row1.y += diagonal;
+  inertia.row2.z += diagonal;
   return inertia;
 }
 
 }  // namespace
 
-MeasuresInFull measure(const Region& region, std::span<const Placed> bodies) {
+MeasuresAndInertia measure(const Region& region, std::span<const Placed> bodies) {
   const Moments in_frame = moments(region.polytope);
   const Mat3& axes = region.frame.axes;
   const double scale = determinant(axes);

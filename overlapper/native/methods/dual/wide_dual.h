@@ -8,8 +8,8 @@
 
 namespace overlapper {
 
-/// A few ulps: what is left of rounding where everything before the last step was done in double-double.
-inline constexpr double kWideRounding = 8 * 0x1p-53;
+/// Rounding, relative, where only the last steps are in doubles and all before them in double-double: four ulps.
+inline constexpr double kLastRounding = 8 * 0x1p-53;
 
 /// The dual point of a body's plane in the coordinates of a frame, each coordinate right to an ulp of the point's
 /// length.

@@ -16,7 +16,7 @@ void Seam::begin(CloseBody& first, CloseBody& second) {
   }
   for (int body : {0, 1}) {
     Marks& m = marks_[body];
-    m.farthest = m.slip = 0;
+    m.farthest = m.rounding = 0;
     const size_t edges = bodies_[body]->data().ring.size();
     if (m.entered.size() < edges) m.entered.resize(edges, 0), m.corner.resize(edges);
   }
@@ -106,9 +106,9 @@ Vec3 Seam::meet(int body, int entering, int plane) {
   // shares counts no more than four others.
   const double size = std::sqrt(norm2(at)), interpolated = 0x1p-53 * (std::sqrt(norm2(along)) + size);
   const double away = rest * std::sqrt(norm2(p.at - through)) + share * std::sqrt(norm2(q.at - through));
-  marks_[body].slip = std::max(marks_[body].slip, interpolated);
+  marks_[body].rounding = std::max(marks_[body].rounding, interpolated);
   Marks& others = marks_[1 - body];
-  others.slip = std::max(others.slip, interpolated + (other.normal_rounding() + 8 * 0x1p-53) * away);
+  others.rounding = std::max(others.rounding, interpolated + (other.normal_rounding() + 8 * 0x1p-53) * away);
   reach_ = std::max(reach_, size);
   return at;
 }

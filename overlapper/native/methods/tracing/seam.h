@@ -51,10 +51,10 @@ class Seam {
   /// The largest distance of a corner from the common point.
   double reach() const { return reach_; }
 
-  /// How far corners may lie off the planes of a body's facets, m.
-  double slip(int body) const {
+  /// m: how far rounding may have put corners off the planes of a body's facets.
+  double rounding(int body) const {
     const Marks& m = marks_[body];
-    return bodies_[body]->corner_rounding() * m.farthest + m.slip;
+    return bodies_[body]->corner_rounding() * m.farthest + m.rounding;
   }
 
  private:
@@ -70,7 +70,7 @@ class Seam {
   struct Marks {
     std::vector<int> entered, corner;  ///< per half-edge: the run in which it was last entered, and where
     double farthest = 0;               ///< corner of a facet passed, from the common point
-    double slip = 0;                   ///< without what the rounding of those corners moves its planes
+    double rounding = 0;               ///< m: see rounding(), without what that of those corners moves its planes
   };
 
   std::array<CloseBody*, 2> bodies_{};

@@ -19,10 +19,10 @@ class Tracing {
  public:
   enum class Answer { kApart, kTraced, kUnknown };
 
-  Answer run(const Placed& a, const Placed& b, const Pose& pose, double rounding) {
+  Answer run(const Placed& a, const Placed& b, const Pose& pose, double doubt) {
     meshes_[0].set(a.shape);
     meshes_[1].set(b.shape);
-    const Portal portal = find_portal(meshes_[0], meshes_[1], pose, rounding);
+    const Portal portal = find_portal(meshes_[0], meshes_[1], pose, doubt);
     if (portal.answer == Portal::Answer::kApart) return Answer::kApart;
     const Vec3 normal = unit(portal.normal);
     if (portal.answer == Portal::Answer::kUnknown || !(norm2(normal) > 0)) return Answer::kUnknown;
@@ -78,11 +78,12 @@ class Tracing {
     return static_cast<int>(vertices_.size() + facets_.size()) - static_cast<int>(ring_.size()) / 2 == 2;
   }
 
-  /// How far corners of the common polytope may lie off the planes of the body's facets, counted from the middle.
-  double slip(int body) const {
+  /// m: how far corners of the common polytope, counted from the middle, may lie off the planes of the body's facets:
+  /// rounding, and the flatness of both.
+  double off_planes(int body) const {
     const double reach = std::sqrt(reach2_), kept = bodies_[body].corner_rounding() * reach;
-    return std::max(kept, seam_.slip(body)) + 2 * 0x1p-53 * std::max(reach, seam_.reach()) + bodies_[0].mesh().flat() +
-           bodies_[1].mesh().flat();
+    return std::max(kept, seam_.rounding(body)) + 2 * 0x1p-53 * std::max(reach, seam_.reach()) +
+           bodies_[0].mesh().flat() + bodies_[1].mesh().flat();
   }
   Vec3 middle() const {
     Vec3 sum;
@@ -354,14 +355,15 @@ double extent(Vec3 v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 /// Sums over blocks of facets, which are added up then: of n terms, most are rounded far less than n times.
 struct BlockSums {
   static constexpr int kBlock = 64;  ///< facets
-  double six_volumes = 0, area = 0, lost = 0;
-  double moved = 0;  ///< volume, by the rounding of planes
+  double six_volumes = 0, area = 0;
+  double uncancelled = 0;  ///< no less than the six volumes would be if none of their terms cancelled
+  double moved = 0;        ///< volume, by the rounding of planes
   Vec3 moment;
 
   void add(const BlockSums& other) {
     six_volumes += other.six_volumes;
     area += other.area;
-    lost += other.lost;
+    uncancelled += other.uncancelled;
     moved += other.moved;
     moment += other.moment;
   }
@@ -369,7 +371,7 @@ struct BlockSums {
 
 bool Tracing::measure(double least, Measures& common, Pull& on_first) const {
   const Vec3 origin = middle();
-  const std::array<double, 2> slips{slip(0), slip(1)};
+  const std::array<double, 2> off{off_planes(0), off_planes(1)};
   BlockSums total, block;
   double least_slack = kInfinity;
   size_t in_block = 0, most_in_block = 0;
@@ -391,14 +393,14 @@ bool Tracing::measure(double least, Measures& common, Pull& on_first) const {
     }
     const double area = std::sqrt(norm2(twice_area)) / 2;
     block.area += area;
-    block.moved += area * slips[facets_[f].body];
+    block.moved += area * off[facets_[f].body];
     // The cone's volume tells how far its plane is, at least; only where that might be least is the plane looked at.
-    const double lost = extent(a) * spanned;
-    if (!(cone / 2 - 8 * 0x1p-53 * lost > area * least_slack)) {
+    const double uncancelled = extent(a) * spanned;
+    if (!(cone / 2 - 8 * 0x1p-53 * uncancelled > area * least_slack)) {
       const CloseBody::Side& side = bodies_[facets_[f].body].side(facets_[f].facet);
       least_slack = std::min(least_slack, dot(side.normal, side.through - origin));
     }
-    block.lost += lost;
+    block.uncancelled += uncancelled;
     block.six_volumes += cone;
     if (f % BlockSums::kBlock == BlockSums::kBlock - 1) {
       total.add(block);
@@ -423,9 +425,9 @@ bool Tracing::measure(double least, Measures& common, Pull& on_first) const {
   on_first.moment = on_first.moment - cross(centroid, on_first.force);
   common.centroid = frame_.origin + (origin + centroid);
   // As for a region: every plane moved by its rounding, growth on the way included. Then each product, and the sums.
-  const double most = std::max(slips[0], slips[1]);
+  const double most = std::max(off[0], off[1]);
   const double terms = static_cast<double>(most_in_block + facets_.size() / BlockSums::kBlock + 1);
-  const double summed = 8 * 0x1p-53 * total.lost / 6 + terms * 0x1p-53 * common.volume;
+  const double summed = 8 * 0x1p-53 * total.uncancelled / 6 + terms * 0x1p-53 * common.volume;
   common.volume_error = total.moved * growth(most, least_slack) / 3 + summed;
   common.measured = common.volume_error <= kEnough * common.volume;
   return true;
@@ -474,7 +476,7 @@ Region Tracing::region(const Placed& a, Vec3 reference) {
     const double slack = dot(side.normal, side.through - origin);
     region.polytope.dual.push_back(apply_transposed(l, side.normal) / slack);
     region.polytope.plane.push_back(static_cast<int>(f));
-    region.facets.push_back({a.pose.rotation * side.normal, slack, slip(facets_[f].body), facets_[f].body});
+    region.facets.push_back({a.pose.rotation * side.normal, slack, off_planes(facets_[f].body), facets_[f].body});
   }
   region.inner.assign(vertices_.size(), 1);
   region.facets_touched = static_cast<int>(facets_.size());
