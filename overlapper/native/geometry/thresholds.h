@@ -3,37 +3,69 @@
 #include <cstddef>
 
 /// \file
-/// Thresholds between two ways to the same answer, each with the measurement that set it.
+/// Thresholds between two ways to the same answer, each with the measurement that set it: medians of processor time
+/// over random hulls of corners on the unit sphere, both ways in turn in the same run, on one core with AVX2 unless
+/// said otherwise. How exact a volume has to be is no such threshold: see kEnough.
 namespace overlapper {
 
 /// Pairs of facets, one of each body, up to which a table of all signs is sooner filled than a seam is found.
+///
+/// Centres half a radius apart, 50 / 120 / 200 / 300 facets each: table 5 / 20 / 47 / 100 µs, seam 13 / 38 / 61 / 88
+/// µs; 1.5 radii apart, 50 / 80 / 120 / 200 facets: table 4 / 14 / 22 / 67 µs, seam 7 / 13 / 23 / 45 µs, and without
+/// AVX2 5 / 14 / 26 / 79 µs and 7 / 11 / 20 / 41 µs; 1.9 radii apart, as bodies in contact are, 40 / 50 / 60 / 80
+/// facets: table 1.1 / 1.4 / 3.2 / 7.1 µs, seam 1.0 / 1.1 / 2.2 / 4.0 µs.
 inline constexpr double kLeastPairsTraced = 2500;
 
 /// Facets of a hull beyond which asking every corner of one body about every plane of the other takes longer than the
 /// hull of the dual points.
+///
+/// Two hulls of 256 / 512 / 1024 / 2048 facets: table 0.10 / 0.41 / 2.4 / 12 ms, dual hull 0.30 / 0.54 / 1.0 / 2.0 ms;
+/// a hull of as many and a box: table 10 / 21 / 42 / 75 µs, dual hull 136 / 226 / 385 / 712 µs.
 inline constexpr size_t kMostFacetsClipped = 1024;
 
-/// The error of a volume, relative to it, that a region of as many planes as it may have reaches on a round body: a
-/// smaller tolerance is not worth another way.
+/// Error of a volume by a formula, relative to it, up to which no other way is tried.
+///
+/// A ball in a cylinder, by as many planes as a region may have (2^20, 2.4 s): 3.6e-6; a polytope knows more than a
+/// formula only where that is worse than this.
 inline constexpr double kFinest = 1e-7;
 
 /// Facets of two polytopes together up to which their depth is sooner found among the normals of facets and the
 /// products of edges; beyond, by EPA, which climbs from vertex to vertex.
+///
+/// Centres half a radius apart, 512 / 1024 / 2048 facets together: normals and products 16 / 40 / 85 µs, EPA 33 / 54 /
+/// 80 µs; centres 1.5 radii apart: 14 / 28 / 64 µs and 20 / 27 / 55 µs.
 inline constexpr int kMostFacetsParted = 1024;
 
-/// Vertices that one arc may pass on the other body; doubles that stay in doubt would go on, and EPA answers.
+/// Vertices that one arc between the normals of two facets may pass on the other body; doubles that stay in doubt would
+/// go on, and EPA answers.
+///
+/// No arc of 1320 pairs of 32 to 2048 facets together passed more than 4.
 inline constexpr int kMostTurns = 64;
 
-/// Vertices looked at before asking whether a way is known to be longer than the shortest so far.
+/// Vertices looked at before asking whether the way along a normal is already longer than the shortest known.
+///
+/// The depth of pairs of 300 facets together, by 1 / 4 / 8 / 16 / all vertices: 8.5 / 7.8 / 7.7 / 7.3 / 13 µs; of 1000
+/// together: 39 / 36 / 33 / 34 / 120 µs.
 inline constexpr int kGlance = 8;
 
 /// Vertices or facets of a hull up to which looking at all of them takes no longer than finding out where to climb.
+///
+/// Among 32 / 48 / 64 / 96 / 128: a farthest vertex by looking at all 28 / 39 / 53 / 79 / 111 ns, by climbing 59 / 69 /
+/// 76 / 84 / 83 ns; the facet in a direction 58 / 73 / 87 / 111 / 132 ns and 59 / 61 / 66 / 77 / 70 ns; the facet
+/// through which a ray leaves 105 / 136 / 167 / 221 / 270 ns and 106 / 103 / 114 / 133 / 124 ns.
 inline constexpr int kMostScanned = 48;
 
 /// Boxes up to which each is compared with each sooner than they are split.
+///
+/// The pairs of 200 boxes that hardly move, for leaves of 1 / 2 / 4 / 8 / 16 / 32: 13.9 / 12.5 / 10.8 / 10.2 / 11.7 /
+/// 14.9 µs; of 2000: 436 / 387 / 363 / 347 / 352 / 390 µs.
 inline constexpr int kMostBoxesCompared = 4;
 
-/// The sine between two sides of a triangle of dual points below which doubles place the vertex it stands for badly.
+/// The sine between two sides of a triangle of dual points below which the vertex that it stands for is placed in
+/// double-double.
+///
+/// The largest error of 20000 vertices that doubles place, of sines 0.5 / 0.1 / 0.01 / 0.001: 160 / 480 / 7100 / 81000
+/// half-ulps of the vertex. Doubles take 11 ns, double-doubles 47 ns.
 inline constexpr double kWellShaped = 1e-2;
 
 }  // namespace overlapper
