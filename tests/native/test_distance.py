@@ -235,6 +235,20 @@ def test_depth_of_hulls_of_grid_points_is_the_exact_one(seed):
     assert penetration_depth(q, p) == pytest.approx(truth, rel=1e-14)
 
 
+@pytest.mark.parametrize("power", [0, 10, 20, 30])
+def test_depth_of_hulls_far_from_their_own_origin_is_right_to_the_rounding_of_that_distance(power):
+    rng = np.random.default_rng(power)
+    for _ in range(20):
+        p, q = overlapping_points(rng, low=4, high=10)
+        lever, orientation = 2.0**power * directions(rng, 1)[0], quaternion(rng)
+        far, position = p + lever, -rotation(orientation) @ lever
+        placed_far = exact.hull(exact.placed(far, position, orientation))
+        truth = float(exact.depth_squared(placed_far, exact.hull(q))) ** 0.5
+        assert penetration_depth(Placed(Hull(far), position, orientation), q) == pytest.approx(
+            truth, abs=16 * EPS * 2.0**power
+        )
+
+
 def points_of_small_polytopes(rng):
     """Tetrahedra, hulls of 20 and 80 points, boxes, prisms, needles and plates, each with its own corners."""
     kind = rng.integers(6)

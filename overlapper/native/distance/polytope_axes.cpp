@@ -147,8 +147,8 @@ std::optional<Penetration> polytope_penetration(const Placed& a, const Placed& b
     return swapped;
   }
   const Pose pose = relative_pose(a.pose, b.pose);
-  const double reach = radius(a.shape) + radius(b.shape) + norm(pose.translation);
-  const double of_heights = rounding(reach), flat = flatness(a.shape) + flatness(b.shape);
+  const double between = radius(a.shape) + radius(b.shape) + norm(pose.translation);
+  const double of_heights = rounding(reach(b, reach(a, between))), flat = flatness(a.shape) + flatness(b.shape);
   if (flat > 4 * of_heights) return std::nullopt;
   thread_local Solid solid_a, solid_b;
   constexpr double beyond = std::numeric_limits<double>::infinity();
