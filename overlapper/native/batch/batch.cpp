@@ -58,7 +58,7 @@ Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method 
 /// A shape where it is now, and what does not change as it moves.
 struct Body {
   Placed placed;
-  double radius;              ///< of the shape
+  double radius;              ///< m: of the shape
   std::uint64_t version = 0;  ///< counts the poses it has had
 
   /// How far it reaches along a unit direction of the world, from its own origin.
@@ -263,7 +263,7 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
     }
   }
   const Body &a = bodies[pair.pair[0]], &b = bodies[pair.pair[1]];
-  // The article's method has its own way of telling.
+  // An axis says nothing to the article's method, which has its own way of telling.
   const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].measures.status == Status::kOverlapping;
   const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
   const size_t planes_before = planes_asked;

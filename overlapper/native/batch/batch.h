@@ -18,7 +18,7 @@ namespace overlapper {
 /// Position, then quaternion x, y, z, w as given.
 using PoseNumbers = std::array<double, 7>;
 
-/// What the pairs of one call share, a column per quantity and a row per pair.
+/// The common sets of the pairs of one call, a column per quantity and a row per pair.
 struct Overlaps {
   struct Row {
     Measures measures;
@@ -37,7 +37,7 @@ struct Overlaps {
   std::vector<Vec3> normal;
   std::vector<std::array<std::array<double, 6>, 2>> gradient;
 
-  /// What a row was taken from, while the batch that has it remembers; none where that is quickly made again.
+  /// The pair that a row was taken from, while the batch that has it remembers; none where that is quickly made again.
   std::vector<std::weak_ptr<Overlap>> source;
 
   size_t examined = 0;      ///< pairs that were looked at, with or without a row

@@ -18,12 +18,12 @@ bool meet(const Plane& plane, const Bounds& box) {
 }
 
 bool meet(const Bounds& a, const Bounds& b) {
-  // Without short cuts: which side fails first cannot be predicted.
+  // All sides are compared: which fails first cannot be predicted.
   return (a.lower.x <= b.upper.x) & (b.lower.x <= a.upper.x) & (a.lower.y <= b.upper.y) & (b.lower.y <= a.upper.y) &
          (a.lower.z <= b.upper.z) & (b.lower.z <= a.upper.z);
 }
 
-/// By halves, whose sum cannot overflow.
+/// The middle, as a sum of halves, which cannot overflow.
 Vec3 middle(const Bounds& box) { return box.lower / 2 + box.upper / 2; }
 
 double extent(const Bounds& box) { return max_component(box.upper - box.lower); }
@@ -132,7 +132,7 @@ void BoxTree::between(int a, int b) {
   }
 }
 
-/// By the first body, counting how often each is that; then by the second, of which there are few to each first.
+/// Sorts pairs by the first body, counting how often each is that; then by the second, of which there are few to each.
 void BoxTree::sort(std::vector<IndexPair>& pairs) {
   std::fill(starts_.begin(), starts_.end(), 0);
   for (IndexPair& pair : found_) {

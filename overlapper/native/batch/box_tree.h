@@ -12,10 +12,10 @@ using IndexPair = std::array<int, 2>;
 
 /// What surely holds a placed shape.
 struct Enclosure {
-  /// Grown by what rounding may have moved its sides, so that bodies that touch have boxes that meet; infinite for a
-  /// half-space.
+  /// The box, grown by what rounding may have moved its sides, so that bodies that touch have boxes that meet; infinite
+  /// for a half-space.
   Bounds box;
-  bool open = false;  ///< it is a half-space, that of
+  bool open = false;  ///< it is a half-space, that of `plane`
   Plane plane;
 };
 Enclosure enclosure(const Placed& placed);
@@ -31,8 +31,8 @@ class BoxTree {
   void pairs(std::span<const Enclosure> bodies, std::vector<IndexPair>& pairs);
 
  private:
-  /// Of the bodies order_[begin] ... order_[end - 1]. Nodes stand in the order of a walk, so that the first half of
-  /// node k is node k + 1.
+  /// A box around the bodies order_[begin] ... order_[end - 1]. Nodes stand in the order of a walk, so that the first
+  /// half of node k is node k + 1.
   struct Node {
     Bounds box;
     int begin, end;

@@ -15,7 +15,7 @@ namespace overlapper {
 /// Calls `work(i, thread)` for every i below `count`, on the calling thread and on `threads` - 1 others. They live for
 /// this call only, so that a process forked between calls lacks nothing. `work` returns false if it took long enough to
 /// look at the clock. Every 50 ms the calling thread asks `go_on()`; once that is false, no further i is begun, and so
-/// is the result. Of exceptions, that of the least i is thrown again: blocks are begun in order, and all that were
+/// is the result. The exception of the least i is thrown again: blocks are begun in order, and all that were
 /// begun are finished.
 template <class Work, class GoOn>
 bool for_each_in_parallel(size_t count, int threads, const Work& work, const GoOn& go_on) {

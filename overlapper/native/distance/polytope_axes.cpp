@@ -18,8 +18,8 @@ struct Lowest {
   double height;   ///< of that vertex
 };
 
-/// Per facet of one solid, the way along its normal into the other. Where the first few vertices already show that a
-/// way is longer than the best one known, it ends at the lowest of these.
+/// The ways along the normals of one solid's facets into the other. One that the first few vertices already show to be
+/// longer than the best one known ends at the lowest of these.
 void lowest_along_normals(const Solid& faces, const Solid& other, double best, std::vector<Lowest>& ways) {
   ways.resize(faces.stride);
   for (int f = 0; f < faces.facets; f += 4) {

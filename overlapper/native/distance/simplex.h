@@ -99,7 +99,7 @@ inline bool weigh(const WideVector& a, const WideVector& b, const WideVector& c,
 }
 
 /// Exact signs are better proof that the origin is inside than a face, edge or corner that rounding has put it on.
-/// Without them the fewest corners are.
+/// Where signs are not exact, the fewest corners are.
 template <class Vector>
 inline constexpr bool kInsideIsExact = std::is_same_v<Vector, Vec3>;
 

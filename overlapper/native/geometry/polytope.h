@@ -27,7 +27,8 @@ struct Polytope {
 /// The dual point normal / (offset - dot(normal, origin)) of a plane that has `origin` strictly inside.
 inline Vec3 polar_dual(const Plane& plane, Vec3 origin) { return plane.normal / -signed_distance(plane, origin); }
 
-/// Back from the dual: the hull's facets become vertices, its vertices facets. The origin must be strictly inside.
+/// The polytope whose dual the hull is: the hull's facets become vertices, its vertices facets. The origin must be
+/// strictly inside.
 Polytope polar_dual(const ExpandingHull& hull);
 
 /// Integrals over a solid that has the origin inside.

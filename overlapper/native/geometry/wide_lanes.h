@@ -32,7 +32,7 @@ inline WideLanes two_sum(const Quad& a, const Quad& b) {
   return {sum, (a - a_part) + (b - b_part)};
 }
 
-/// Halves of doubles, whose products are exact (Veltkamp).
+/// Splits doubles into halves whose products are exact (Veltkamp).
 template <class T>
 struct Halves {
   explicit Halves(const T& a) : high(134217729.0 * a), low() {  // 2^27 + 1

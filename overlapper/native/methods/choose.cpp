@@ -285,7 +285,7 @@ MeasuresAndInertia by_region(const Region& region, std::span<const Placed> bodie
   return answer;
 }
 
-/// Without bound where rounding has turned the polytope inside out.
+/// The error of a volume, without bound where rounding has turned the polytope inside out.
 double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 ? m.volume_error : kInfinity; }
 
 }  // namespace

@@ -38,7 +38,8 @@ struct Choice {
   bool tries(Way way) const { return std::ranges::find(ways, way) != ways.end(); }
 };
 
-/// How bodies are measured. The first line that fits counts, for single calls, batches and groups alike.
+/// How bodies are measured. The first line that fits counts, for single calls, batches and groups alike. Numbers of
+/// facets and errors that count are in geometry/thresholds.h.
 inline constexpr std::array<Choice, 5> kChoices{{
     {"two boxes or hulls of many facets",
      [](const Traits& t) { return t.many_facet_pairs && t.clippable; },

@@ -104,7 +104,7 @@ std::vector<int> merge_vertices(const Region& region, int& groups) {
   return group;
 }
 
-/// Of each group, the vertex that lies nearest to the planes of all its facets: planes that meet at a small angle place
+/// The vertex of each group that lies nearest to the planes of all its facets: planes that meet at a small angle place
 /// some of them badly.
 std::vector<int> representatives(const Polytope& p, std::span<const int> group, int groups) {
   std::vector<std::vector<int>> members(groups), facets_of(groups);

@@ -20,7 +20,7 @@ struct Boundary {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
   }
 };
-/// Of the common set of that many bodies.
+/// The boundary of the common set of that many bodies.
 Boundary boundary_of(const Region& region, int bodies);
 
 }  // namespace overlapper

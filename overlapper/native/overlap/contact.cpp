@@ -41,7 +41,7 @@ Plane half_way(const Placed& a, const Placed& b, Vec3 normal, const Distance& d,
   return {normal, level + dot(normal, reference)};
 }
 
-/// Not the negative, which would make negative zeros.
+/// The opposite without negative zeros.
 Vec3 reversed(Vec3 v) { return Vec3{} - v; }
 
 }  // namespace

@@ -50,17 +50,18 @@ class Overlap {
   bool widened() const;        ///< double arithmetic was not enough
   int facets_touched() const;  ///< how many planes took part in the measures
 
-  /// Only for overlapping bodies.
+  /// The polytope of the common set; only for overlapping bodies, as are the next three.
   const Region& region() const;
   const Measures& measures() const;
   /// Inertia tensor about the centroid, unit density; by the polytope where the measures have closed forms.
   Mat3 inertia() const;
   const Boundary& boundary() const;
 
-  /// Per body: d volume / d translation, then / d rotation vector about the body's position; zeros unless overlapping.
+  /// The slopes of the volume, per body: d volume / d translation, then / d rotation vector about the body's position;
+  /// zeros unless overlapping.
   std::vector<std::array<double, 6>> gradient() const;
 
-  /// Only for pairs.
+  /// The contact of a pair; not for more bodies.
   const Contact& contact() const;
 
  private:

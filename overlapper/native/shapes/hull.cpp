@@ -64,8 +64,8 @@ Vec3 lossless_origin(Vec3 lower, Vec3 upper) {
   return {middle(lower.x, upper.x), middle(lower.y, upper.y), middle(lower.z, upper.z)};
 }
 
-/// Which facet each triangle of a hull belongs to. A triangle joins its neighbour's facet if it lies within rounding of
-/// the facet's plane, that of its largest triangle.
+/// The facet that each triangle of a hull belongs to. A triangle joins its neighbour's facet if it lies within rounding
+/// of the facet's plane, that of its largest triangle.
 struct CoplanarRegions {
   const ExpandingHull& hull;
   double rounding;
@@ -169,7 +169,7 @@ Plane supporting_plane(const std::vector<Vec3>& vertices, std::span<const int> r
   return {normal, offset};
 }
 
-/// Per region: the corners of its largest triangle, unless rounding alone has merged others with that.
+/// The corners of the largest triangle of each region, unless rounding alone has merged others with that.
 std::vector<std::array<int, 3>> exact_corners(const CoplanarRegions& regions) {
   const ExpandingHull& hull = regions.hull;
   std::vector<std::array<int, 3>> corners;
@@ -247,8 +247,8 @@ std::vector<Edge> edges_of(const HullData& data) {
   return edges;
 }
 
-/// Of the facets around a vertex: the first, the one at the largest angle to it, and the one that with these spans
-/// most.
+/// Three of the facets around a vertex: the first, the one at the largest angle to it, and the one that with these
+/// spans most.
 std::array<int, 3> well_spread(std::span<const int> around, const std::vector<Plane>& planes) {
   const auto most = [&](auto spread) {
     return *std::max_element(around.begin(), around.end(), [&](int f, int g) { return spread(f) < spread(g); });

@@ -27,7 +27,7 @@ struct HullData {
   /// arithmetic.
   std::vector<Vec3> corners;
   std::vector<std::array<int, 3>> triangles;
-  /// Per facet: three corners whose plane holds all corners of its triangles without any rounding; -1 if there are
+  /// Three corners of each facet whose plane holds all corners of its triangles without any rounding; -1 if there are
   /// none.
   std::vector<std::array<int, 3>> facet_corners;
   double volume = 0;

@@ -14,7 +14,7 @@ struct HullData;
 class DirectionMap {
  public:
   DirectionMap() = default;
-  /// About one direction for every `elements` / 2 elements.
+  /// A map of about one direction for every `elements` / 2 elements.
   explicit DirectionMap(int elements);
 
   int near(Vec3 direction) const { return nearest_[cell(direction)]; }

@@ -84,7 +84,7 @@ class Sums {
   double volume_rounding() const { return rounding_; }
   Vec3 centroid() const { return moment_ / (4 * six_volumes_); }
 
-  /// On the first body, from the seam.
+  /// The pull on the first body, from the seam.
   Pull pull() const {
     const Vec3* vertices = w_.vertices.data();
     Pull pull{};
@@ -221,8 +221,8 @@ void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reac
   on_first = {apply_transposed(axes, pull.force), apply_transposed(axes, pull.moment)};
 }
 
-/// What sums in doubles say, about `middle`. False if a plane passes that nearer than `least_slack`, which becomes the
-/// distance of the nearest.
+/// Measures as sums in doubles say, about `middle`. False if a plane passes that nearer than `least_slack`, which
+/// becomes the distance of the nearest.
 bool measure(Workspace& w, const Sums& sums, Vec3 middle, double rounding, double& least_slack, Measures& common) {
   common.status = Status::kOverlapping;
   common.way = Way::kClipping;
@@ -247,7 +247,7 @@ bool comes_first(const Placed& a, const Placed& b) {
   return facets_a != facets_b ? facets_a > facets_b : !comes_before(b, a);
 }
 
-/// In the coordinates of `a`, with the pull on it; false if doubles cannot tell.
+/// Clips in the coordinates of `a`, and finds the pull on that; false if doubles cannot tell.
 bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_first) {
   const auto [pose, reach, flat, doubt, apart] = relation(a, b);
   if (apart) return true;
@@ -265,7 +265,7 @@ bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_
   return true;
 }
 
-/// The smallest body first; then the order does not depend on the caller's.
+/// The bodies, smallest first, whose order then does not depend on the caller's.
 std::vector<int> from_small_to_large(std::span<const Placed> bodies) {
   std::vector<int> order = canonical_order(bodies);
   const auto size = [&](int i) { return bounded(bodies[i].shape) ? radius(bodies[i].shape) : kInfinity; };

@@ -88,7 +88,7 @@ struct EdgeSigns {
     return found;
   }
 
-  /// For an edge whose ends are both outside, of different planes: where it enters and leaves.
+  /// Where an edge enters and leaves whose ends are both outside, of different planes.
   std::pair<Crossing, Crossing> passage() const {
     Crossing enter{-1, -kInfinity}, leave{-1, kInfinity};
     for_each_plane(from_outside, stride, [&](int j) {

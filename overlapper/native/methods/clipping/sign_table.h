@@ -82,7 +82,8 @@ struct TableClipping {
 
   SignTable first_signs, second_signs;
   std::vector<int> first_vertex, second_vertex;  ///< which common vertex a body's vertex is, or -1
-  /// Per pair of facets: 1 + the vertex at which their common edge begins, minus that if it ends there.
+  /// The open end of each pair of facets: 1 + the vertex at which their common edge begins, minus that if it ends
+  /// there.
   std::vector<int> open;
   int unpaired = 0;
   Solid next;

@@ -162,7 +162,8 @@ class WideCorners {
     for (int n = 0; n < 4; ++n) vertices[at[n]] = {x.head[n], y.head[n], z.head[n]};
   }
 
-  /// From vertices that doubles have placed to where three planes meet; of other corners, nothing that means anything.
+  /// The steps from vertices that doubles have placed to where three planes meet; of other corners, nothing that means
+  /// anything.
   void beside_planes(const std::array<size_t, 4>& at, const QuadVector& vertex, QuadVector& way) {
     const auto planes = [&](int n) {
       const auto plane = [&](size_t i) -> const WideLanes& { return planes_[common_.corners[i].facets[n]]; };

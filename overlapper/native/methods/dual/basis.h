@@ -60,7 +60,7 @@ inline bool leaves_sooner(const Leaving<DoubleDouble>& a, const Leaving<DoubleDo
 }
 
 /// Four planes at which the optimum of a linear programme lies, the largest ball within all planes seen so far: max r
-/// with dot(n, x) + r <= offset. In doubles or in double-doubles; `Cut` has a `plane` with a unit normal.
+/// with dot(n, x) + r <= offset. Scalars are doubles or double-doubles; a `Cut` has a `plane` with a unit normal.
 template <class Cut>
 class Basis {
  public:

@@ -256,11 +256,11 @@ FrameAbout<PointOf<Body>> round_frame(std::span<const Body> bodies, std::span<co
     const double slack = -rounded(signed_distance(worst.plane, frame.origin));
     const double safe_slack = -rounded(signed_distance(worst.plane, safe));
     if (slack > 0) continue;
-    // Back towards the safe point, to the middle of what the new plane leaves.
+    // The centre goes back towards the safe point, to the middle of what the new plane leaves.
     const double reach = safe_slack / (safe_slack - slack);
     centre.restart(safe + reach / 2 * (frame.origin - safe));
   }
-  // Not seen to happen: the axes stay, about the point known to be inside.
+  // The axes stay, about the point known to be inside; this is not seen to happen.
   return {safe, centre.frame().axes};
 }
 

@@ -51,8 +51,9 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double>
 /// planes sum to zero and their second moments to the identity.
 inline constexpr double kEccentricity = 16;
 
-/// From a point strictly inside all bodies and the cuts, planes that bound the common set; `planes` as above. For
-/// Placed and for WideBody, whose planes say what rounding to doubles would hide: a sliver as thin as that.
+/// The frame is found from a point strictly inside all bodies and the cuts, planes that bound the common set; `planes`
+/// as above. Bodies are Placed or WideBody, whose planes say what rounding to doubles would hide: a sliver as thin as
+/// that.
 template <class Body>
 FrameAbout<PointOf<Body>> round_frame(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> planes,
                                       std::vector<Owned<PlaneOf<Body>>> cuts, const PointOf<Body>& inside);

@@ -51,7 +51,7 @@ struct Growth {
     return first;
   }
 
-  /// Tangent planes where a vertex reaches too far out of a smooth body, until none does.
+  /// Adds tangent planes where a vertex reaches too far out of a smooth body, until none does.
   void refine(double tolerance) {
     constexpr int kMostPlanes = 1 << 20;  // what is left beyond it is in the error bound
     inner.assign(hull.facets.size(), 1);
@@ -236,9 +236,9 @@ MeasuresAndInertia measure(const Region& region, std::span<const Placed> bodies)
     farthest = std::max(farthest, facet.rounding);
     least_slack = std::min(least_slack, facet.slack);
   }
-  // First order: every plane moved by its rounding; then the area on the way.
+  // The error is, to first order, what all planes moved by their rounding add; then by the area that grows on the way.
   moved *= growth(farthest, least_slack) / 3;
-  // Then the sums themselves, whose vertices are placed to about a hundred roundings.
+  // The sums themselves follow, whose vertices are placed to about a hundred roundings.
   m.volume_error = 7.0 / 12.0 * (outer - inner) + moved + 256 * DBL_EPSILON * outer;
   return {std::move(m), inertia_tensor(spread)};
 }

@@ -13,7 +13,7 @@ namespace overlapper {
 
 /// Grows the dual hull of the bodies' common set, whose round frame is given, until vertices reach out of smooth bodies
 /// by no more than the fraction `tolerance`. Bodies, planes and frame relative to `reference`; `rounding` is how far a
-/// plane may be off, in m. For Placed and for WideBody.
+/// plane may be off, in m. Bodies are Placed or WideBody.
 template <class Body>
 Region grow(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> planes,
             const FrameAbout<PointOf<Body>>& frame, double tolerance, double rounding, Vec3 reference);
@@ -28,7 +28,7 @@ struct MeasuresAndInertia {
   Measures measures;
   std::optional<Mat3> inertia;  ///< about the centroid, at unit density
 };
-/// By Way::kDual; owners of the region's facets are numbers of `bodies`.
+/// Measures of a region by Way::kDual; owners of the region's facets are numbers of `bodies`.
 MeasuresAndInertia measure(const Region& region, std::span<const Placed> bodies);
 
 }  // namespace overlapper

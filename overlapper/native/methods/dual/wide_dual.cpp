@@ -19,8 +19,8 @@ class BodyDuals {
              apply_transposed(rotation_, wide(columns.row2))};
   }
 
-  /// True if the plane of a triangle certainly keeps farther from the origin than `reach` in the frame. In doubles, and
-  /// with their rounding taken for granted: most planes of a large mesh need no more.
+  /// True if the plane of a triangle certainly keeps farther from the origin than `reach` in the frame. Doubles
+  /// answer, their rounding taken for granted: most planes of a large mesh need no more.
   bool far(Vec3 a, Vec3 b, Vec3 c, double reach) const {
     const Vec3 normal = cross(b - a, c - a), away = a - rounded(origin_);
     const double slack = dot(normal, away) - 0x1p-46 * norm(b - a) * norm(c - a) * (norm(a) + norm(away));

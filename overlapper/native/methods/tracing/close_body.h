@@ -12,7 +12,7 @@ namespace overlapper {
 /// The rotation from the second body's axes to those of the first, each entry right to half an ulp.
 struct CloseFrame {
   Mat3 turn;
-  Vec3 origin;                            ///< of the first body's own coordinates: the point, a plain double
+  Vec3 origin;                            ///< the common point in the first body's own coordinates, plain doubles
   Vec3 origin_in_second, rest_in_second;  ///< the same point in the second body's, as head and tail
 };
 CloseFrame close_frame(const Placed& first, const Placed& second, Vec3 origin);
@@ -31,8 +31,9 @@ class CloseBody {
   /// The rounding of a normal's direction: three half-ulps as it was made, and the turn.
   double normal_rounding() const { return (turned_ ? 10 : 3) * 0x1p-53; }
 
-  /// Of a signed distance: both corners, the normal over their distance, and four half-ulps of that for difference,
-  /// product and sums: 9 (|v| + |c|) + (10 + 4) |v - c| or less.
+  /// Rounding of a signed distance, as a share of both corners' distances from the common point: that of the corners,
+  /// of the normal over their distance, and four half-ulps of that for difference, product and sums: 9 (|v| + |c|) +
+  /// (10 + 4) |v - c| or less.
   static constexpr double kSign = 32 * 0x1p-53;
 
   void set(const Mesh& mesh, const CloseFrame& frame, bool is_second);
@@ -66,15 +67,15 @@ class CloseBody {
   struct Side {
     Vec3 normal;
     Vec3 through;     ///< the facet's corner that is nearest to the common point
-    double size;      ///< its distance from that
-    double farthest;  ///< that of the farthest
+    double size;      ///< the distance of that corner from the common point
+    double farthest;  ///< the distance of the farthest
   };
   const Side& side(int facet) {
     if (side_placed_[facet] != now_) place_side(facet);
     return sides_[facet];
   }
 
-  /// From these coordinates to the body's own, and directions.
+  /// A point of these coordinates in the body's own, and a direction.
   Vec3 own_point(Vec3 at) const { return own_direction(at) + origin_; }
   Vec3 own_direction(Vec3 direction) const { return turned_ ? apply_transposed(turn_, direction) : direction; }
 

@@ -87,8 +87,8 @@ bool Seam::crosses(CrossingFacets facets, std::array<int, 2> exit) {
     } while ((height(self, self.end(h), other, plane) > 0) != (body == 0));
     return h;
   };
-  // For the first body, both its crossings as seen from the second's facet: the one at the exit comes after that facet
-  // begins, the one at the entry before it ends.
+  // The first body's two crossings are seen from the second's facet: the one at the exit comes after that facet begins,
+  // the one at the entry before it ends.
   return order(0, exit[0], entry_edge(1)) > 0 && order(0, bodies_[0]->twin(entry_edge(0)), exit[1]) > 0 && certain_;
 }
 
@@ -113,7 +113,7 @@ Vec3 Seam::meet(int body, int entering, int plane) {
   return at;
 }
 
-/// Past the nearer of the two exits, with a new corner.
+/// Steps past the nearer of the two exits and adds a corner there.
 bool Seam::step(CrossingFacets& at, std::array<int, 2>& exit) {
   const int body = order(0, exit[0], exit[1]) > 0 ? 0 : 1;
   const CloseBody& self = *bodies_[body];

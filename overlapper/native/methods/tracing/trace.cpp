@@ -165,7 +165,7 @@ CrossingFacets Tracing::between(Vec3 first, Vec3 second) const {
   return *last;
 }
 
-/// A first line of the seam; or, where one body seems to lie inside the other, one of its vertices that does.
+/// Finds a first line of the seam; or, where one body seems to lie inside the other, one of its vertices that does.
 bool Tracing::find_seam(Vec3 normal) {
   seed_.reset();
   const Vec3 side = any_orthogonal(normal), other_side = cross(normal, side);
@@ -175,7 +175,7 @@ bool Tracing::find_seam(Vec3 normal) {
   for (size_t i = 0; i < directions.size(); ++i) {
     e = exit(directions[i]);
     leaves_first[i] = e.leaves_first();
-    // With those of other axes: between opposite directions there is no middle.
+    // Only directions along other axes are compared with: between opposite ones there is no middle.
     for (size_t j = 0; j < (i & ~size_t{1}); ++j)
       if (leaves_first[j] != leaves_first[i])
         return seam_.follow(leaves_first[i] ? between(directions[i], directions[j])
@@ -185,7 +185,7 @@ bool Tracing::find_seam(Vec3 normal) {
   return begin_inside(body, body == 0 ? e.facets.first : e.facets.second, directions.back());
 }
 
-/// The body lies inside the other where the ray leaves through the facet; elsewhere it may not.
+/// Begins from a body that lies inside the other where the ray leaves through the facet; elsewhere it may not.
 bool Tracing::begin_inside(int body, int facet, Vec3 direction) {
   const int vertex = bodies_[body].data().ring[bodies_[body].data().ring_start[facet]];
   const Vec3 at = bodies_[body].corner(vertex).at;
@@ -197,8 +197,8 @@ bool Tracing::begin_inside(int body, int facet, Vec3 direction) {
 
 // -------------------------------------------------------------------------------------------------------- what they keep
 
-/// Every vertex that is kept is asked of the other body. One that is outside shows a line of the seam that was not
-/// known: then once more.
+/// Puts the common polytope together. Every vertex that is kept is asked of the other body; one that is outside shows
+/// a line of the seam that was not known, and all begins once more.
 bool Tracing::complete() {
   for (int round = 0; round < 64; ++round) {
     outside_.reset();
@@ -258,7 +258,7 @@ bool Tracing::assemble() {
   return spread(0) && spread(1);
 }
 
-/// A line within one facet, of which it cuts out a piece.
+/// Adds the piece of a facet that a line of the seam cuts out, all of which lies within the facet.
 bool Tracing::add_whole_line(int body, const Seam::Line& line) {
   const std::vector<SeamCorner>& corners = seam_.corners();
   const CrossingFacets& facets = corners[line.first_corner].ahead;
@@ -273,8 +273,8 @@ bool Tracing::add_whole_line(int body, const Seam::Line& line) {
   return true;
 }
 
-/// The facet in which the seam goes on from a corner on its border: along the seam to the border, along the border to
-/// where the seam comes in again.
+/// Adds what is kept of the facet in which the seam goes on from a corner on its border: along the seam to the border,
+/// along the border to where the seam comes in again.
 bool Tracing::add_cut_facet(int body, int first_corner) {
   const std::vector<SeamCorner>& corners = seam_.corners();
   const CloseBody& self = bodies_[body];
@@ -424,7 +424,8 @@ bool Tracing::measure(double least, Measures& common, Pull& on_first) const {
   }
   on_first.moment = on_first.moment - cross(centroid, on_first.force);
   common.centroid = frame_.origin + (origin + centroid);
-  // As for a region: every plane moved by its rounding, growth on the way included. Then each product, and the sums.
+  // The error is, as for a region, what all planes moved by their rounding add, growth on the way included; then that
+  // of each product, and of the sums.
   const double most = std::max(off[0], off[1]);
   const double terms = static_cast<double>(most_in_block + facets_.size() / BlockSums::kBlock + 1);
   const double summed = 8 * 0x1p-53 * total.uncancelled / 6 + terms * 0x1p-53 * common.volume;
@@ -446,7 +447,7 @@ Mat3 cholesky(const Mat3& m, double least) {
   return l;
 }
 
-/// About the middle of its vertices, in axes in which these spread evenly.
+/// The region in a frame about the middle of its vertices, in whose axes these spread evenly.
 Region Tracing::region(const Placed& a, Vec3 reference) {
   const Vec3 origin = middle();
   Mat3 spread{{}, {}, {}};
