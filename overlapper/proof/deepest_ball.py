@@ -22,7 +22,7 @@ def room(planes: Sequence[OwnedPlane]) -> Fraction:
 
 
 class DeepestBall:
-    """The largest ball in the common part, by cutting planes in rational arithmetic (see methods/dual/deepest_ball.h of the core).
+    """The largest ball in the common part, by cutting planes in rational arithmetic (see methods/dual/deepest_ball.h).
 
     The linear programme is: the largest r with normal . x + length r <= offset for all supporting planes, `length`
     being that of the normal to rounding. Its dual weighs four planes so that the weighted normals add up to zero.
