@@ -36,7 +36,7 @@ try:
     from timed_peers import FEW, METHODS
     from workloads import FAMILIES, MORE, pairs_of
 except ImportError as error:
-    print(f"overlapper: the chart needs {error.name}: pip install 'overlapper[bench]'", file=sys.stderr)
+    print(f"overlapper: the chart needs {error.name}: pip install '.[bench]'", file=sys.stderr)
     sys.exit(2)
 
 
@@ -124,7 +124,7 @@ def main() -> None:
     try:
         from speed_page import Results, write_page
     except ImportError as error:
-        print(f"overlapper: the pictures need {error.name}: pip install 'overlapper[bench]'", file=sys.stderr)
+        print(f"overlapper: the pictures need {error.name}: pip install '.[bench]'", file=sys.stderr)
         sys.exit(2)
     named = str(folder.relative_to(ROOT)) if folder.is_relative_to(ROOT) else str(folder)
     print(f"Written: {write_page(Results(named, *results_in(folder)), chosen.out or ROOT / 'docs')}")

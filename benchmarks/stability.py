@@ -34,7 +34,7 @@ try:
 
     from overlapper import Placed
 except ImportError as error:
-    print(f"overlapper: the stability chart needs {error.name}: pip install 'overlapper[bench]'", file=sys.stderr)
+    print(f"overlapper: the stability chart needs {error.name}: pip install '.[bench]'", file=sys.stderr)
     sys.exit(2)
 
 RESULTS = HERE / "results" / "stability.csv"
@@ -165,7 +165,7 @@ def main() -> None:
     try:
         from stability_page import write_page
     except ImportError as error:
-        print(f"overlapper: the pictures need {error.name}: pip install 'overlapper[bench]'", file=sys.stderr)
+        print(f"overlapper: the pictures need {error.name}: pip install '.[bench]'", file=sys.stderr)
         sys.exit(2)
     print(f"Written: {write_page(results, chosen.out or ROOT / 'docs')}")
 

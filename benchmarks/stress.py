@@ -35,7 +35,7 @@ try:
     import rules
     from watched import Watched
 except ImportError as error:
-    print(f"overlapper: the stress run needs {error.name}: pip install 'overlapper[bench]'", file=sys.stderr)
+    print(f"overlapper: the stress run needs {error.name}: pip install '.[bench]'", file=sys.stderr)
     sys.exit(2)
 
 ROWS, TABLE = ROOT / "out" / "stress.csv", HERE / "results" / "stress.csv"

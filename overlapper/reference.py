@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, RoundedHull, Shape, Sphere
+from overlapper.install import hint
 from overlapper.process import Ended, Worker
 from overlapper.proof.signed_distance import signed_distance_bounds
 
@@ -81,7 +82,7 @@ class Fcl:
 
     def __init__(self, time_limit: float = 10.0) -> None:
         if fcl is None:
-            raise ImportError("overlapper.reference needs python-fcl: pip install 'overlapper[check]'")
+            raise ImportError(f"overlapper.reference needs {hint('python-fcl')}")
         self.time_limit = time_limit
         self._worker: Worker | None = None
 

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from overlapper._core import Hull, Placed
+from overlapper.install import hint
 from overlapper.process import Ended, Worker
 from overlapper.union import union_volume
 
@@ -201,7 +202,7 @@ def _components(groups: Faces, count: int) -> Faces:
 def _kept_or_made(vertices: Vertices, faces: Faces, threshold: float, time_limit: float) -> tuple[Path, list[Vertices]]:
     """CoACD's parts, from the file where they are kept if that is sound, and that file."""
     if importlib.util.find_spec("coacd") is None:
-        raise NotDecomposed("a concave mesh needs CoACD: pip install 'overlapper[concave]'")
+        raise NotDecomposed(f"a concave mesh needs {hint('coacd')}")
     version = importlib.metadata.version("coacd")
     settings = repr((version, float(threshold), vertices.shape, faces.shape)).encode()
     key = hashlib.sha256(settings + vertices.tobytes() + faces.tobytes()).hexdigest()

@@ -8,6 +8,7 @@ makes a 32-gon hull). Pairs are those that the simulator lets collide.
 from typing import TYPE_CHECKING
 
 from overlapper.face import lazily
+from overlapper.install import hint
 
 if TYPE_CHECKING:
     from overlapper.simulation.asked_pairs import Among
@@ -47,5 +48,5 @@ __getattr__ = lazily(
         "recorder": ("Recorder",),
         "report": ("Report",),
     },
-    needs="pybullet: pip install 'overlapper[sim]'",
+    needs=hint("pybullet"),
 )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import HalfSpace, Overlap, Placed
+from overlapper.install import hint
 from overlapper.viewer.look import (
     BOTTOM,
     FIELD_OF_VIEW,
@@ -31,7 +32,7 @@ try:
     from meshcat import geometry
     from meshcat.transformations import quaternion_matrix, rotation_matrix, translation_matrix
 except ImportError as missing:
-    raise ImportError("overlapper.viewer needs meshcat: pip install 'overlapper[view]'") from missing
+    raise ImportError(f"overlapper.viewer needs {hint('meshcat')}") from missing
 
 Array = NDArray[np.float64]
 FRONT, BACK, BOTH = 0, 1, 2  # three.js: the sides from which a face is seen

@@ -178,4 +178,4 @@ def test_a_missing_package_is_named_in_one_sentence():
     program = f"import sys, runpy; sys.modules['hypothesis'] = None; runpy.run_path({script!r}, run_name='__main__')"
     alone = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     assert alone.returncode == 2
-    assert alone.stderr == "overlapper: the stability chart needs hypothesis: pip install 'overlapper[bench]'\n"
+    assert alone.stderr == "overlapper: the stability chart needs hypothesis: pip install '.[bench]'\n"

@@ -159,7 +159,7 @@ def test_however_coacd_ends_there_is_a_reason(coacd_is, source, reason):
 
 def test_without_coacd_a_concave_mesh_is_refused_by_name(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(NotDecomposed, match=r"pip install 'overlapper\[concave\]'"):
+    with pytest.raises(NotDecomposed, match=r"needs coacd: pip install coacd$"):
         decompose(bent())
 
 

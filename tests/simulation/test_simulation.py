@@ -942,7 +942,7 @@ def test_a_server_that_writes_elsewhere_is_an_error_of_one_sentence(client, monk
 def test_a_missing_pybullet_is_one_clear_sentence():
     code = "import sys; sys.modules['pybullet'] = None; from overlapper.simulation import Bodies"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    sentence = "ImportError: overlapper.simulation needs pybullet: pip install 'overlapper[sim]'"
+    sentence = "ImportError: overlapper.simulation needs pybullet: pip install pybullet"
     assert run.stderr.strip().endswith(sentence)
 
 
