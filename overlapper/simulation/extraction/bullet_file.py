@@ -8,6 +8,8 @@ between blocks are those old addresses.
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from os import PathLike
@@ -15,6 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from overlapper.printable import first_line
 
 # Bullet's BroadphaseNativeTypes, as far as pybullet creates them.
 KINDS = {
@@ -39,6 +43,10 @@ NAMES = {
     "MBDY": "btMultiBodyDoubleData",
     "RBDY": "btRigidBodyDoubleData",
 }
+
+# Bytes of figures for each byte of a file, beyond which shapes are not what they seem: three corners in doubles, 72
+# bytes, are three indices of 4 bytes in the file.
+MOST_READ = 64
 
 NUMBERS = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "float": "<f4", "double": "<f8"}
 
@@ -104,6 +112,7 @@ class SavedBody:
 
 class Block(NamedTuple):
     code: str
+    size: int
     address: int
     layout: int
     length: int
@@ -113,7 +122,7 @@ class Block(NamedTuple):
 class BulletFile:
     """The bodies of one .bullet file in the order of the file, and their shapes by address.
 
-    ValueError if it is not a .bullet file with 64-bit pointers, doubles and little-endian numbers.
+    ValueError if it is not a .bullet file with 64-bit pointers, doubles and little-endian numbers, or is damaged.
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -121,17 +130,23 @@ class BulletFile:
             self._data = file.read()
         if not self._data.startswith(b"BULLETd-v"):
             raise ValueError(f"path {str(path)!r} is not a 64-bit little-endian .bullet file in double precision")
-        blocks = _blocks(self._data)
-        dna = blocks.pop()
-        self._layouts = _layouts(self._data[dna.offset :])
-        self._by_address = {block.address: block for block in blocks}
         self._leaves: dict[int, tuple[Leaf, ...]] = {}
-        self.bodies = self._read_bodies(blocks)
+        self._room = MOST_READ * len(self._data)
+        with _damage():
+            blocks = _blocks(self._data)
+            dna = blocks.pop()
+            self._layouts = _layouts(self._data[dna.offset :])
+            self._by_address = {block.address: block for block in blocks}
+            self.bodies = self._read_bodies(blocks)
 
     def leaves(self, address: int) -> tuple[Leaf, ...]:
-        """Leaf shapes of the collider shape at `address`, in the order in which pybullet lists them."""
+        """Leaf shapes of the collider shape at `address`, in the order in which pybullet lists them.
+
+        ValueError if the file is damaged there.
+        """
         if address not in self._leaves:
-            self._leaves[address] = tuple(self._flatten(address, np.zeros(3), np.eye(3)))
+            with _damage():
+                self._leaves[address] = tuple(self._flatten(address, np.zeros(3), np.eye(3)))
         return self._leaves[address]
 
     def _read_bodies(self, blocks: list[Block]) -> tuple[SavedBody, ...]:
@@ -166,6 +181,8 @@ class BulletFile:
         found = [block for block in blocks if block.code == code]
         name = self._layouts.names[found[0].layout] if found else NAMES[code]
         dtype = self._layouts.dtype(name)
+        if any(block.size < dtype.itemsize for block in found):
+            raise ValueError(f"path is a damaged .bullet file: a block {code} is smaller than its struct")
         return np.frombuffer(b"".join(self._data[at.offset : at.offset + dtype.itemsize] for at in found), dtype)
 
     def _flatten(self, address: int, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> list[Leaf]:
@@ -173,6 +190,9 @@ class BulletFile:
         kind = KINDS.get(number, f"shape of Bullet's type {number}")
         if kind != "compound":
             kind, figures = self._figures(kind, address)
+            self._room -= figures.nbytes + 1
+            if self._room < 0:
+                raise ValueError("path is a damaged .bullet file: its shapes are made of each other without end")
             convex = self._base(address, "btConvexInternalShapeData") if kind == "hull" else None
             # The shortest decimal of a single precision number is the double that was once rounded to it.
             margin = float(str(convex["m_collisionMargin"])) if convex is not None else 0.0
@@ -237,6 +257,19 @@ class BulletFile:
         return np.frombuffer(self._data, self._layouts.dtype(name), block.length, block.offset)
 
 
+@contextmanager
+def _damage() -> Iterator[None]:
+    """What bytes that no simulator has written lead to, wherever it is noticed, as one ValueError."""
+    causes = (KeyError, IndexError, StopIteration, struct.error, RecursionError, OverflowError, TypeError, MemoryError)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            yield
+    except (ValueError, *causes) as error:
+        if str(error).startswith("path "):
+            raise
+        raise ValueError(f"path is a damaged .bullet file ({type(error).__name__}: {first_line(error)})") from error
+
+
 def _colliders(records: NDArray[np.void]) -> list[Collider]:
     """Of collision objects: many at once, as every look at a single struct takes its time."""
     transforms = records["m_worldTransform"]
@@ -260,7 +293,9 @@ def _blocks(data: bytes) -> list[Block]:
         if start + 24 > len(data):
             raise ValueError("path is a .bullet file cut short: the block that describes its structs is missing")
         code, size, address, layout, length = struct.unpack_from("<4siQii", data, start)
-        blocks.append(Block(code.rstrip(b"\0").decode(), address, layout, length, start + 24))
+        blocks.append(Block(code.rstrip(b"\0").decode(), size, address, layout, length, start + 24))
+        if blocks[-1].code != "DNA1" and (size < 0 or length < 0 or layout < 0):
+            raise ValueError("path is a damaged .bullet file: a block of it has a negative size")
         start += 24 + size
     return blocks
 
@@ -279,7 +314,8 @@ class Layouts:
             return np.dtype(NUMBERS[name])
         if name not in self._made:
             made = np.dtype([self._field(kind, declared) for kind, declared in self._structs[name]])
-            assert made.itemsize == self._sizes[name], f"{name} has holes"
+            if made.itemsize != self._sizes[name]:
+                raise ValueError(f"path is a damaged .bullet file: {name} has holes")
             self._made[name] = made
         return self._made[name]
 
