@@ -16,12 +16,14 @@ from typing import Any
 import numpy as np
 
 from overlapper import Overlap
+from overlapper.process import START_LIMIT, Worker
 from overlapper.viewer.labels import Bodies, Contact, body_paths, pairs
 from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, boxes, volume_text
 from overlapper.viewer.recording import Recording
 from overlapper.viewer.stage import Stage, matrix
 
 import meshcat  # isort: skip  # after the stage, which says what to install
+from overlapper.viewer.server import Window, must_be_here, serve  # isort: skip
 
 __all__ = ["Recording", "Viewer"]
 
@@ -31,17 +33,27 @@ class Viewer:
 
     A visualizer that is passed in keeps its own camera, lights and background. Without one a meshcat server is started,
     whose address is `url`, the bodies of the first `show` are framed, and `close`, or the end of a `with` block, stops
-    the server.
+    the server. It is seen on this machine only, unless `host` is another of its addresses, or "0.0.0.0" for all.
     """
 
-    def __init__(self, visualizer: Any = None, bodies: Look = BODIES, overlaps: Look = OVERLAPS) -> None:
-        self._owned = visualizer is None
-        self.visualizer = meshcat.Visualizer() if visualizer is None else visualizer
+    def __init__(
+        self, visualizer: Any = None, bodies: Look = BODIES, overlaps: Look = OVERLAPS, *, host: str = "127.0.0.1"
+    ) -> None:
+        self._server: Worker | None = None
+        self.visualizer = visualizer
+        if visualizer is None:
+            self._serve(host)
         self._looks = bodies, overlaps
         self._stage: Stage | None = None
         self._shapes: dict[str, bytes] = {}
         self._poses: dict[str, Array] = {}
         self._pairs: set[tuple[str, str]] = set()
+
+    def _serve(self, host: str) -> None:
+        must_be_here(host)
+        self._server = Worker(serve)
+        self._server.send(host)
+        self.visualizer = meshcat.Visualizer(window=Window(*self._server.receive(START_LIMIT)))
 
     @property
     def url(self) -> str:
@@ -52,7 +64,7 @@ class Viewer:
         """Draw the bodies where they are now and the overlapping pairs among `contacts`, in place of what was there."""
         if self._stage is None:
             self._stage = Stage(bodies.placed, *self._looks)
-            if self._owned:
+            if self._server:
                 self._stage.set(self.visualizer, boxes(bodies.placed))
         self._show_bodies(self._stage, bodies)
         self._show_overlaps(self._stage, pairs(bodies, contacts))
@@ -81,10 +93,9 @@ class Viewer:
 
     def close(self) -> None:
         """Stop the server, if this view started it."""
-        if self._owned and not self.visualizer.window.zmq_socket.closed:
+        if self._server and not self.visualizer.window.zmq_socket.closed:
             self.visualizer.window.zmq_socket.close()
-            self.visualizer.window.server_proc.kill()
-            self.visualizer.window.server_proc.communicate()
+            self._server.close()
 
     def __enter__(self) -> Viewer:
         return self
