@@ -7,6 +7,7 @@ as the corners determine them.
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import groupby, islice
@@ -18,11 +19,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from overlapper._core import Hull, Overlap
+from overlapper.install import hint
 
 try:
     import sqlalchemy as sql
 except ImportError as error:
-    raise ImportError("overlapper.polytopes.database needs sqlalchemy: pip install 'overlapper[sql]'") from error
+    raise ImportError(f"overlapper.polytopes.database needs {hint('sqlalchemy')}") from error
 
 __all__ = ["read_polytopes", "write_polytopes"]
 
@@ -40,6 +42,12 @@ ALL = """
     SELECT polytopes.id, x, y, z FROM polytopes LEFT JOIN vertices ON polytope_id = polytopes.id
     ORDER BY polytopes.id, corner
 """
+# What SQLite may do for a query. VACUUM INTO, ATTACH and most pragmas write, too.
+READING = {sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ, sqlite3.SQLITE_FUNCTION, sqlite3.SQLITE_RECURSIVE}
+# What a session is told so that no transaction of it writes, by the package of the driver.
+POSTGRESQL = "SET SESSION CHARACTERISTICS AS TRANSACTION READ ONLY"
+READ_ONLY = dict.fromkeys(("psycopg", "psycopg2", "pg8000"), POSTGRESQL)
+READ_ONLY |= dict.fromkeys(("MySQLdb", "pymysql", "mariadb", "mysql"), "SET SESSION TRANSACTION READ ONLY")
 ROWS = 10_000  # fetched at a time: some megabytes
 BATCH = 1_000  # polytopes sent at a time
 
@@ -51,7 +59,8 @@ def read_polytopes(
 
     `url` is SQLAlchemy's, such as "sqlite:///parts.db" or "postgresql+psycopg://user@host/parts". `query` returns four
     columns, the id (of any type) and x, y, z of a point in m, with the points of a polytope one after the other, as by
-    ORDER BY id; without it, the tables that `write_polytopes` makes are read. Inner points are welcome.
+    ORDER BY id; without it, the tables that `write_polytopes` makes are read. Inner points are welcome. A query that
+    writes is refused: by SQLite, PostgreSQL, MySQL and MariaDB; any other database takes back what it wrote.
 
     A polytope that is none (a coordinate missing, fewer than four points, all in one plane) raises ValueError with its
     id; or `on_bad(id, reason)` is called, if given, and reading goes on. Raises FileNotFoundError if there is no such
@@ -60,7 +69,9 @@ def read_polytopes(
     """
     _must_exist(sql.make_url(url))
     with ExitStack() as stack:
-        connection = stack.enter_context(stack.enter_context(_engine(url)).connect())
+        engine = stack.enter_context(_engine(url))
+        sql.event.listen(engine, "connect", _read_only)
+        connection = stack.enter_context(engine.connect())
         # Closed first, as a server keeps a cursor for it.
         rows = stack.enter_context(connection.execution_options(yield_per=ROWS).execute(sql.text(query or ALL)))
         if len(rows.keys()) != 4:
@@ -106,6 +117,19 @@ def _engine(url: str) -> Iterator[sql.Engine]:
         yield engine
     finally:
         engine.dispose()
+
+
+def _read_only(connection: Any, record: Any) -> None:
+    """By the connection's own means; SQLAlchemy ends what remains by taking back all that was not committed."""
+    if isinstance(connection, sqlite3.Connection):
+        connection.set_authorizer(lambda action, *_: sqlite3.SQLITE_OK if action in READING else sqlite3.SQLITE_DENY)
+        return
+    words = READ_ONLY.get(type(connection).__module__.partition(".")[0])
+    if words:
+        cursor = connection.cursor()
+        cursor.execute(words)
+        cursor.close()
+        connection.commit()  # or it would be for this transaction alone
 
 
 def _must_exist(url: sql.URL) -> None:
