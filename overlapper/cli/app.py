@@ -11,7 +11,7 @@ from overlapper import __version__
 from overlapper.cli.bench import chart, stability
 from overlapper.cli.check import check, diff
 from overlapper.cli.intersect import intersect
-from overlapper.cli.refusals import Refused, give_up
+from overlapper.cli.refusals import Refused, give_up, say
 from overlapper.cli.run import run
 from overlapper.cli.shapes import shapes
 from overlapper.cli.view import view
@@ -26,6 +26,9 @@ def main() -> NoReturn:
     usage_error: Any = typer.BadParameter.__bases__[0]
     try:
         sys.exit(app(sys.argv[1:] or ["--help"], prog_name="overlapper", standalone_mode=False))
+    except (typer.Abort, KeyboardInterrupt):
+        say("overlapper: interrupted; nothing was written", sys.stderr)
+        sys.exit(130)
     except Refused as error:
         give_up(str(error))
     except usage_error as error:
@@ -55,7 +58,7 @@ def overlapper(
 def scenes() -> None:
     """List the scenes that can be run by name: those of the checkout, and of the folder `scenes` here."""
     for name, path in scene_paths().items():
-        print(f"{name:22}{headline(path)}")
+        say(f"{name:22}{headline(path)}")
 
 
 for command in (scenes, run, view, check, diff, intersect, shapes, stability, chart):

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from overlapper.cli.refusals import Refused, quiet, scene_refusals, without_banner
+from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
 from overlapper.scenes.scene import SceneError, scenes_in
 
 
@@ -50,10 +50,11 @@ def _checked(scene: Path, out: Path, record: bool) -> int:
                 from overlapper.scenes.check import hold
             outcome = hold(scene, out, record)
     except Refused as error:
-        print(f"overlapper: {error}", file=sys.stderr)
+        say(f"overlapper: {error}", sys.stderr)
         return 2
     shown = outcome.lines if outcome.word != "as recorded" else [f"note: {note}" for note in outcome.notes]
-    print("\n".join([f"{scene}: {outcome.word}", *(f"    {line}" for line in shown)]), flush=True)
+    for line in [f"{scene}: {outcome.word}", *(f"    {line}" for line in shown)]:
+        say(line)
     return 0 if outcome.passed else 1
 
 
@@ -73,11 +74,9 @@ def diff(
     from overlapper.scenes.expected import DRIFT, ROUNDING, read_budgets
     from overlapper.scenes.table_file import read_table
 
-    try:
+    with input_refusals():
         recorded, found = read_table(before), read_table(after)
         budgets = ROUNDING | DRIFT | read_budgets(before)
-    except (OSError, ValueError, ImportError) as error:
-        raise Refused(str(error)) from error
     moved = False
     for cause, differences in (
         ("poses", compare_poses(recorded, found, budgets)),
@@ -86,7 +85,7 @@ def diff(
         moves = sorted(differences.moves, key=lambda move: -move.part)
         print(f"{cause:9} {f'{len(moves):,} moved' if moves else 'the same'}")
         for move in moves[:20]:
-            print(f"    {move}")
+            say(f"    {move}")
         if len(moves) > 20:
             print(f"    and {len(moves) - 20:,} more")
         moved = moved or bool(moves)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from overlapper.cli.options import MethodOption
-from overlapper.cli.refusals import Refused, input_refusals
+from overlapper.cli.refusals import Refused, input_refusals, say
 
 if TYPE_CHECKING:
     from overlapper import Hull, Overlap
@@ -69,7 +69,7 @@ def intersect(
             error = f" ± {common.volume_error:.1g}" if name == "volume" else ""
             print(f"{name:10}{_digits(fact)}{error}{UNITS.get(name, '')}")
     if out:
-        print(f"Written: {out}" if written else f"Not written, as nothing is in common: {out}")
+        say(f"Written: {out}" if written else f"Not written, as nothing is in common: {out}")
 
 
 def _hulls(source: str, query: str | None) -> Iterator[Hull]:
@@ -86,7 +86,7 @@ def _hulls(source: str, query: str | None) -> Iterator[Hull]:
         hull = read_hull(source)
     for warning in caught:
         if issubclass(warning.category, NotConvexWarning):
-            print(f"overlapper: {warning.message}", file=sys.stderr)
+            say(f"overlapper: {warning.message}", sys.stderr)
     yield hull
 
 

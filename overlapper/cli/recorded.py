@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from rich.console import Console
 from rich.progress import Progress
+
+from overlapper.whole_file import must_be_writable, unfinished
 
 if TYPE_CHECKING:
     from overlapper.scenes.playback import View
@@ -28,12 +30,16 @@ def with_progress(frames: Iterable[Item], name: str, steps: int) -> Iterator[Ite
 
 @contextmanager
 def recorder(
-    path: Path, looks: Sequence[Look] = (), rate: float = PICTURES_PER_SECOND
+    path: Path, written: list[Path], looks: Sequence[Look] = (), rate: float = PICTURES_PER_SECOND
 ) -> Iterator[Callable[[View], None]]:
-    """Records some of the frames it is called with, and writes the page in the end, however that comes."""
+    """Records some of the frames it is called with, and writes the page in the end.
+
+    After an error, what was recorded until then is beside the page, and named in `written`, as the page is else.
+    Nothing is written of no frame.
+    """
     from overlapper.viewer import Recording
 
-    path.touch()  # better refused now than after the run
+    must_be_writable(path)
     recording = Recording(*looks)
     shown = 0
 
@@ -45,6 +51,10 @@ def recorder(
 
     try:
         yield record
-    finally:
+    except Exception:
         if shown:
-            recording.save(path)
+            with suppress(OSError):  # the error says enough
+                written.append(recording.save(unfinished(path)))
+        raise
+    if shown:
+        written.append(recording.save(path))

@@ -9,8 +9,9 @@ import tempfile
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
-from typing import BinaryIO, NoReturn
+from typing import BinaryIO, NoReturn, TextIO
 
+from overlapper.printable import first_line, printable
 from overlapper.scenes.scene import SceneError
 
 LIBC = ctypes.CDLL(None)
@@ -20,8 +21,13 @@ class Refused(Exception):
     """What was asked for cannot be done; the message is one sentence for the person who asked."""
 
 
+def say(line: str, file: TextIO | None = None) -> None:
+    """Print a line, on stdout if not on `file`; what in it would command a terminal is spelled out."""
+    print(printable(line), file=file or sys.stdout, flush=True)
+
+
 def give_up(sentence: str) -> NoReturn:
-    print(f"overlapper: {sentence}", file=sys.stderr)
+    say(f"overlapper: {sentence}", sys.stderr)
     sys.exit(2)
 
 
@@ -31,14 +37,14 @@ def input_refusals() -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise Refused(f"{error.filename}: {error.strerror}" if error.filename else str(error)) from error
+        raise Refused(f"{error.filename}: {error.strerror}" if error.filename else first_line(error)) from error
     except (ImportError, ValueError) as error:
         raise Refused(str(error)) from error
     except Exception as error:
         # SQLAlchemy may not be there to name the class; its message goes on for lines about itself.
         if not type(error).__module__.startswith("sqlalchemy."):
             raise
-        raise Refused(f"the database says: {str(getattr(error, 'orig', None) or error).splitlines()[0]}") from error
+        raise Refused(f"the database says: {first_line(getattr(error, 'orig', None) or error)}") from error
 
 
 @contextmanager
@@ -49,7 +55,7 @@ def scene_refusals(noise: BinaryIO) -> Iterator[None]:
     except ImportError as error:
         raise Refused(str(error)) from error
     except OSError as error:
-        raise Refused(f"cannot write {error.filename or 'the results'}: {error.strerror}") from error
+        raise Refused(f"cannot write {error.filename or 'the results'}: {error.strerror or error}") from error
     except SceneError as error:
         LIBC.fflush(None)
         noise.seek(0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
-from contextlib import ExitStack, closing
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -14,11 +14,12 @@ from rich.console import Console
 
 from overlapper.cli.options import ConcaveOption, MethodOption, SurfaceOption, ThresholdOption
 from overlapper.cli.recorded import recorder, with_progress
-from overlapper.cli.refusals import Refused, quiet, scene_refusals, without_banner
+from overlapper.cli.refusals import Refused, quiet, say, scene_refusals, without_banner
 from overlapper.scenes.scene import load_scene
 
 if TYPE_CHECKING:
     from overlapper.cli.summary import Summary
+    from overlapper.scenes.table_file import Table
 
 
 def run(
@@ -77,12 +78,18 @@ def run(
         "surface": surface,
         "pairs": pairs,
     }
-    summary, finished = _measure(scene, steps, out, html, check is not None, per, geometry)
-    files = {name: str(path) for name, path in (("out", out), ("html", html)) if path}
+    written: list[Path] = []
+    try:
+        summary, finished = _measure(scene, steps, out, html, check is not None, per, geometry, written)
+    except Refused as refused:
+        kept = f"; what came before is in {' and '.join(map(str, written))}" if written else ""
+        raise Refused(f"{refused}{kept}") from refused
     if as_json:
-        print(json.dumps(geometry | summary.as_dict() | {"finished": finished} | files))
+        files = {name: str(path) for name, path in (("out", out), ("html", html)) if path in written}
+        settings = {"settings": {**geometry, "per": per, "check": check}}
+        print(json.dumps(settings | summary.as_dict() | {"finished": finished} | files))
     else:
-        _show(summary, finished, files)
+        _show(summary, finished, written)
     if not finished:
         raise typer.Exit(130)
 
@@ -95,8 +102,12 @@ def _measure(
     check: bool,
     per: Literal["shape", "link"],
     geometry: Mapping[str, Any],
+    written: list[Path],
 ) -> tuple[Summary, bool]:
-    """The run, with its files; False if it was interrupted, and then both have what was done until then."""
+    """The run, with its files; False if it was interrupted, and then both have what was done until then.
+
+    `written` gets the files that there are in the end: in their place, or, if the run fails, beside it.
+    """
     with quiet() as noise, scene_refusals(noise), ExitStack() as stack:
         with without_banner():
             from overlapper.scenes.run import run as frames_of
@@ -104,7 +115,7 @@ def _measure(
         from overlapper.cli.summary import Summary
         from overlapper.reference import Fcl
         from overlapper.scenes.table import link_rows, rows
-        from overlapper.scenes.table_file import TABLES, origin
+        from overlapper.scenes.table_file import origin
 
         scene = load_scene(name)
         fcl = stack.enter_context(Fcl()) if check else None
@@ -116,8 +127,9 @@ def _measure(
             "per": per,
             **{setting: str(value) for setting, value in geometry.items()},
         }
-        table = stack.enter_context(closing(TABLES[out.suffix](out, origin() | settings))) if out else None
-        record = stack.enter_context(recorder(html)) if html else None
+        # The page is written last, and checked first.
+        record = stack.enter_context(recorder(html, written)) if html else None
+        table = stack.enter_context(_table(out, origin() | settings, written)) if out else None
         frames = stack.enter_context(closing(frames_of(scene, steps, **geometry)))
         summary = Summary(scene.name)
         try:
@@ -133,18 +145,37 @@ def _measure(
                 if record:
                     record(frame)
         except KeyboardInterrupt:
+            if not summary.steps:
+                raise
             return summary, False
     return summary, True
 
 
-def _show(summary: Summary, finished: bool, files: dict[str, str]) -> None:
+@contextmanager
+def _table(path: Path, metadata: Mapping[str, str], written: list[Path]) -> Iterator[Table]:
+    """A table to be written; named in `written` if it has rows, or the run came to its end."""
+    from overlapper.scenes.table_file import TABLES
+
+    table = TABLES[path.suffix](path, metadata)
+    try:
+        yield table
+    except BaseException as error:
+        left = table.leave()
+        if isinstance(error, Exception) and left:
+            written.append(left)
+        raise
+    table.close()
+    written.append(path)
+
+
+def _show(summary: Summary, finished: bool, written: Sequence[Path]) -> None:
     from overlapper.cli.summary import overlaps_table, remarks
 
     console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
     console.print(overlaps_table(summary) if summary.pairs else f"Nothing overlaps in {summary.steps} steps.")
     for line in remarks(summary):
-        console.print(line, markup=False, soft_wrap=True)
+        say(line)
     if not finished:
-        console.print(f"Interrupted after step {summary.steps}; what came before is kept.")
-    for path in files.values():
-        console.print(f"Written: {path}", markup=False, soft_wrap=True)
+        say(f"Interrupted after step {summary.steps}; what came before is kept.")
+    for path in written:
+        say(f"Written: {path}")

@@ -15,7 +15,8 @@ from rich.table import Table
 from rich.text import Text
 
 from overlapper.cli.options import ConcaveOption, SurfaceOption, ThresholdOption
-from overlapper.cli.refusals import Refused
+from overlapper.cli.refusals import Refused, say
+from overlapper.printable import printable
 
 if TYPE_CHECKING:
     from overlapper.simulation.inventory import Inventory, ListedShape
@@ -56,7 +57,7 @@ def shapes(
         if found.links:
             console.print(_table(found))
         for line in _remarks(found):
-            console.print(line, markup=False, soft_wrap=True)
+            say(line)
     raise typer.Exit(1 if found.skipped else 0)
 
 
@@ -80,7 +81,7 @@ def _table(found: Inventory) -> Table:
         for row, kind in enumerate(dict.fromkeys(shape.kind for shape in link.shapes)):
             shapes = [shape for shape in link.shapes if shape.kind == kind]
             table.add_row(
-                Text("" if row else link.name),
+                Text("" if row else printable(link.name)),
                 f"{len(shapes)} {_plural(kind)}" if len(shapes) > 1 else kind,
                 _sizes(shapes),
                 _rounded(1e6 * sum(shape.volume for shape in shapes)),

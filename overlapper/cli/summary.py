@@ -12,6 +12,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from overlapper.printable import printable
 from overlapper.reference import Comparison
 from overlapper.scenes.run import Frame
 from overlapper.simulation import Bodies, Decomposed, Report, Skipped
@@ -160,7 +161,7 @@ def overlaps_table(summary: Summary, limit: int = 20) -> Table:
         table.add_column(header, justify="right", no_wrap=True)
     for pair in pairs[:limit]:
         table.add_row(
-            Text("\n ".join(pair.names)),
+            Text("\n ".join(map(printable, pair.names))),
             str(pair.steps),
             f"{pair.volume / VOLUME_UNITS[unit]:.4g}",
             f"{ROUNDED_UP.create_decimal(pair.volume_error / VOLUME_UNITS[unit]):e}",

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import math
 import os
 import sys
 import time
 from collections.abc import Sequence
-from contextlib import closing, redirect_stdout, suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from overlapper.cli.recorded import PICTURES_PER_SECOND, recorder, with_progress
-from overlapper.cli.refusals import Refused, input_refusals, quiet, scene_refusals, without_banner
+from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
 
 if TYPE_CHECKING:
     from overlapper.scenes.playback import Playback
@@ -29,6 +28,12 @@ def view(
     html: Annotated[Path | None, typer.Option(help="Write a page for any browser; out/<name>.html by default.")] = None,
     png: Annotated[Path | None, typer.Option(help="Draw a picture instead, without a browser.")] = None,
     live: Annotated[bool, typer.Option("--live", help="Watch it in meshcat while it is simulated instead.")] = False,
+    host: Annotated[
+        str, typer.Option(help="Address of this machine at which --live is seen; 0.0.0.0 shows it to the network.")
+    ] = "127.0.0.1",
+    scene: Annotated[
+        str | None, typer.Option(help="The scene of a table that has no shapes, by name or path: it is run again.")
+    ] = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Steps of a scene; by default as many as it says.")] = None,
     step: Annotated[
         int | None, typer.Option(min=1, help="Of the picture; by default the one in which most is shared.")
@@ -47,14 +52,16 @@ def view(
 ) -> None:
     """See a scene, or a table of one: as a page with a time slider, as a picture, or live.
 
-    An expected file has all that is needed. Of any other table the scene is run again, as the table says it was, and
-    what is not as in the table is told.
+    An expected file has all that is needed. Of any other table give the --scene, which is run again with the table's
+    settings, and what is not as in the table is told. No file is run because a table names it.
 
     Examples:
 
     [bold]overlapper view franka_grasp[/bold]  a page to play, click and measure in: out/franka_grasp.html
 
     [bold]overlapper view scenes/expected/box_pile.csv --png pile.png --close[/bold]  a picture for a report
+
+    [bold]overlapper view run.csv --scene my_scene.py[/bold]
 
     [bold]overlapper view my_scene.py --live --bodies edges --overlaps-opacity 0.6[/bold]
     """
@@ -64,32 +71,48 @@ def view(
         _look("bodies", bodies, bodies_opacity, bodies_front, bodies_back),
         _look("overlaps", overlaps, overlaps_opacity, overlaps_front, overlaps_back),
     )
+    written: list[Path] = []
+    finished = True
     page = html or Path("out") / f"{Path(source).stem}.html"
     with quiet() as noise, scene_refusals(noise), input_refusals():
         with without_banner():
             from overlapper.scenes.playback import play
-        playback = play(source, steps)
+        playback = play(source, steps, scene)
         with closing(playback.views):
             if live:
-                _live(playback, looks)
+                _live(playback, looks, host)
             elif png:
                 _picture(playback, png, step, close, looks)
+                written.append(png)
             else:
-                _film(playback, page, looks)
+                finished = _film(playback, page, looks, written)
     for remark in playback.remarks:
-        print(f"overlapper: {remark}", file=sys.stderr)
-    if not live:
-        print(f"Written: {png or page}")
-    if not live and not png:
+        say(f"overlapper: {remark}", sys.stderr)
+    for path in written:
+        say(f"Written: {path}")
+    if not finished:
+        raise typer.Exit(130)
+    if page in written:
         _open(page.resolve().as_uri())
 
 
-def _film(playback: Playback, html: Path, looks: Sequence[Look]) -> None:
+def _film(playback: Playback, html: Path, looks: Sequence[Look], written: list[Path]) -> bool:
+    """False if it was interrupted; then the page has what came before. KeyboardInterrupt if that is nothing."""
     html.parent.mkdir(parents=True, exist_ok=True)
     rate = math.inf if playback.sparse else PICTURES_PER_SECOND
-    with recorder(html, looks, rate) as record, suppress(KeyboardInterrupt):
-        for view in with_progress(playback.views, playback.name, playback.total):
-            record(view)
+    seen = 0
+    with recorder(html, written, looks, rate) as record:
+        try:
+            for view in with_progress(playback.views, playback.name, playback.total):
+                record(view)
+                seen += 1
+        except KeyboardInterrupt:
+            if not seen:
+                raise
+            return False
+    if not seen:
+        raise ValueError("there is nothing to see: no step was simulated or recorded")
+    return True
 
 
 def _picture(playback: Playback, png: Path, step: int | None, close: bool, looks: tuple[Look, Look]) -> None:
@@ -103,13 +126,11 @@ def _picture(playback: Playback, png: Path, step: int | None, close: bool, looks
     picture.save(png, view.bodies, view.contacts, title, close, looks)
 
 
-def _live(playback: Playback, looks: Sequence[Look]) -> None:
+def _live(playback: Playback, looks: Sequence[Look], host: str) -> None:
     """As fast as the simulation is in the world, or as it can be; stays until it is interrupted, on a terminal."""
     from overlapper.viewer import Viewer
 
-    with redirect_stdout(io.StringIO()):  # meshcat says where it is, too
-        viewer = Viewer(None, *looks)
-    with viewer, suppress(KeyboardInterrupt):
+    with Viewer(None, *looks, host=host) as viewer, suppress(KeyboardInterrupt):
         print(f"overlapper: {viewer.url} (Ctrl-C ends it)", file=sys.stderr, flush=True)
         _open(viewer.url)
         start, shown = time.monotonic(), 0

@@ -10,11 +10,14 @@ from typing import Any
 import numpy as np
 
 from overlapper._core import Hull, Overlap
+from overlapper.install import hint
+from overlapper.printable import first_line
+from overlapper.whole_file import beside
 
 try:
     import trimesh
 except ImportError as error:
-    raise ImportError("overlapper.polytopes.mesh_file needs trimesh: pip install 'overlapper[mesh]'") from error
+    raise ImportError(f"overlapper.polytopes.mesh_file needs {hint('trimesh')}") from error
 
 __all__ = ["NotConvexWarning", "check_ending", "read_hull", "write_mesh"]
 
@@ -39,7 +42,7 @@ def read_hull(path: str | Path) -> Hull:
         mesh: Any = trimesh.load_mesh(str(path))
         hull = Hull(mesh.vertices[np.unique(mesh.faces)])
     except Exception as error:  # of many kinds, as every format has a parser of its own
-        raise ValueError(f"{path} is not a mesh with a hull: {error}") from error
+        raise ValueError(f"{path} is not a mesh with a hull: {first_line(error)}") from error
     mesh.merge_vertices(merge_tex=True, merge_norm=True)  # a seam of colours is no hole
     if not mesh.is_volume:
         warnings.warn(f"{path} is not closed: its convex hull stands for it", NotConvexWarning, stacklevel=2)
@@ -69,4 +72,5 @@ def write_mesh(path: str | Path, polytope: Hull | Overlap) -> None:
     ending = Path(path).suffix
     mesh: Any = trimesh.Trimesh(polytope.vertices, triangles, process=False)
     text = mesh.export(file_type=ending[1:], **MESHES[ending])
-    Path(path).write_bytes(text.encode() if isinstance(text, str) else text)
+    with beside(path) as file:
+        file.write_bytes(text.encode() if isinstance(text, str) else text)

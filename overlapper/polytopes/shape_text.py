@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper._core import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Sphere
+from overlapper.printable import first_line
 from overlapper.shape import Shape
 
 PARAMETERS: dict[type, tuple[str, ...]] = {
@@ -20,6 +21,7 @@ PARAMETERS: dict[type, tuple[str, ...]] = {
     Cylinder: ("radius", "length"),
     HalfSpace: ("normal", "offset"),
 }
+LARGEST = 24 * 1_000_000  # bytes of the vertices of a hull: a million, of which Hull itself needs seconds
 KINDS = {kind.__name__: kind for kind in (*PARAMETERS, Hull, RoundedHull)}
 
 
@@ -43,11 +45,20 @@ def shape_of(text: str) -> Shape:
         kind, *parameters = json.loads(text)
         if kind in ("Hull", "RoundedHull"):
             packed, *radius = parameters
-            parameters = [np.frombuffer(zlib.decompress(base64.b64decode(packed)), "<f8").reshape(-1, 3), *radius]
+            parameters = [np.frombuffer(_inflated(base64.b64decode(packed)), "<f8").reshape(-1, 3), *radius]
         shape: Shape = KINDS[kind](*parameters)
-    except (ValueError, TypeError, KeyError, zlib.error, binascii.Error) as error:
-        raise ValueError(f"{text[:60]!r} is no shape: {error}") from error
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError, zlib.error, binascii.Error) as error:
+        raise ValueError(f"{text[:60]!r} is no shape: {first_line(error)}") from error
     return shape
+
+
+def _inflated(data: bytes) -> bytes:
+    """A little that is deflated may be very much."""
+    unpacker = zlib.decompressobj()
+    inflated = unpacker.decompress(data, LARGEST)
+    if not unpacker.eof:
+        raise ValueError(f"its vertices are cut, or more than {LARGEST // 24:,}")
+    return inflated
 
 
 def alike(a: Shape, b: Shape) -> bool:

@@ -40,11 +40,11 @@ def hold(path: Path, pages: Path, anew: bool = False) -> Outcome:
     """
     scene = load_scene(path)
     page = pages / f"{scene.name}.moved.html"
-    page.unlink(missing_ok=True)  # of an earlier run
     try:
         if anew or not scene.expected.is_file():
             record(scene)
             written = f"written: {scene.expected}"
+            page.unlink(missing_ok=True)  # of an earlier run
             if anew:
                 return Outcome(scene.name, "recorded", [written])
             return Outcome(scene.name, "new", [written, "look at it, commit it, and the scene is guarded from now on"])
@@ -53,6 +53,7 @@ def hold(path: Path, pages: Path, anew: bool = False) -> Outcome:
         raise SceneError(str(error)) from error
     causes = {cause: "moved" if moves else "as recorded" for cause, moves in verdict.causes.items()}
     if not verdict.moves:
+        page.unlink(missing_ok=True)  # of an earlier run
         return Outcome(scene.name, "as recorded", verdict.lines(), causes, verdict.notes)
     shown, remark = _page(verdict, scene.name, page)
     return Outcome(scene.name, "moved", [*verdict.lines(), remark], causes, verdict.notes, shown)

@@ -76,7 +76,7 @@ def compare_measures(
     )
     moves: list[Move] = []
     spent = {name: 0.0 for name in MEASURES if name in budgets}
-    for k in sorted(old.keys() | new.keys()):
+    for k in sorted(old.keys() | new.keys(), key=lambda k: [-math.inf if part is None else part for part in k]):
         who = label(old.get(k) or new[k], names)
         was, now = (str(rows[k]["status"]) if k in rows else "not there" for rows in (old, new))
         if was != now:
@@ -93,11 +93,11 @@ def _measure_moves(
     for name in spent:
         for column in MEASURES[name]:
             was, now = _number(old, column), _number(new, column)
-            part = budgets[name].spent(abs(now - was), was)
+            part = budgets[name].spent(_difference(was, now), was)
             spent[name] = max(spent[name], part)
             if not part <= 1:  # as it is for a value that is not a number
                 allowed = budgets[name].allowed(was)
-                yield Move(_step(old), who, column, _text(was), _text(now), abs(now - was), allowed, part)
+                yield Move(_step(old), who, column, _text(was), _text(now), _difference(was, now), allowed, part)
     # A bound is free to be within the budget of what it bounds. Beyond that ten times are allowed, for the bound of one
     # pair depends on the order of operations: moving a scene multiplied one by 4.7, another way of cutting one by 14.
     was, now = (_number(row, "volume_error_m3") for row in (old, new))
@@ -121,10 +121,11 @@ def compare_poses(
     for k in sorted(old.keys() & new.keys()):
         step, shape = k
         who = shape_label(shape, names)
-        differences = {
-            "position": float(np.linalg.norm(new[k][:3] - old[k][:3])),
-            "orientation": _angle(old[k][3:], new[k][3:]),
-        }
+        differences = {"position": 0.0, "orientation": 0.0}
+        # What has no pose, as a link of many shapes, or one that is not a number, has none on both sides.
+        if not np.array_equal(old[k], new[k], equal_nan=True):
+            differences["position"] = float(np.linalg.norm(new[k][:3] - old[k][:3]))
+            differences["orientation"] = _angle(old[k][3:], new[k][3:])
         for (name, difference), unit, part_of in zip(differences.items(), ("m", "rad"), (slice(3), slice(3, 7))):
             budget = budgets.get(name, Budget(0.0, math.inf))
             part = budget.spent(difference, 0.0)
@@ -183,6 +184,11 @@ def _number(row: Row, column: str) -> float:
     """A measure as a number; 0.0 where it has none, which is the same on both sides if the status is."""
     value = row.get(column)
     return float(value) if value is not None else 0.0
+
+
+def _difference(was: float, now: float) -> float:
+    """Of a measure; what is not a number differs from every number, and not from itself."""
+    return 0.0 if was == now or (math.isnan(was) and math.isnan(now)) else abs(now - was)
 
 
 def _text(value: float) -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 from overlapper import Shape
 from overlapper.polytopes.shape_text import shape_of, text_of
 from overlapper.scenes.table import COLUMNS, Row, key
-from overlapper.scenes.table_file import CsvTable, read_csv
+from overlapper.scenes.table_file import CsvTable, csv_text, read_csv
 
 Key = tuple[int, int, int]  # (body, link, shape)
 
@@ -47,10 +47,12 @@ class Budget:
 
     def spent(self, difference: float, recorded: float) -> float:
         """The part of the budget that a difference uses up; above 1 is too far."""
+        if difference == 0:
+            return 0.0
         allowed = self.allowed(recorded)
         if math.isinf(allowed):
             return 0.0 if math.isfinite(difference) else math.inf
-        return difference / allowed if allowed else 0.0 if difference == 0 else math.inf
+        return difference / allowed if allowed else math.inf
 
 
 # The budgets of a scene of polyhedra: five times what rounding did to the scenes when all their poses were moved by
@@ -98,6 +100,16 @@ class Expected:
         }
         path.parent.mkdir(parents=True, exist_ok=True)
         table = CsvTable(path, heading | origin, EXPECTED_COLUMNS)
+        try:
+            self._write_steps(table)
+            table.close()
+        except BaseException:
+            # A part of what is expected is of no use.
+            if left := table.leave():
+                left.unlink()
+            raise
+
+    def _write_steps(self, table: CsvTable) -> None:
         known: dict[Key, str] = {}
         for step, rows in self.rows_by_step():
             texts = {shape_key: text_of(shape) for shape_key, shape in self.shapes[step].items()}
@@ -107,28 +119,24 @@ class Expected:
                 table.comment(f"shapes {users}: {text}")
             known |= new
             table.write(rows)
-        table.close()
 
 
 def read_expected(path: Path) -> Expected:
-    """An expected file. FileNotFoundError if there is none, ValueError if it is not one."""
-    text = path.read_text(encoding="utf-8")
-    steps = re.search(r"^# steps: ([\d ]+)$", text, re.MULTILINE)
-    tolerance = re.search(r"^# tolerance: ([-+.e\d]+)$", text, re.MULTILINE)
+    """An expected file. FileNotFoundError if there is none, ValueError if it is not one, or not all of it is there."""
+    text = csv_text(path)
+    steps = re.search(r"^# steps: ([\d ]*\d)$", text, re.MULTILINE | re.ASCII)
+    tolerance = re.search(r"^# tolerance: ([-+.e\d]+)$", text, re.MULTILINE | re.ASCII)
     if steps is None or tolerance is None:
         raise ValueError(f"{path} must say `# steps: <numbers>` and `# tolerance: <number>` in its first lines")
     rows = read_csv(path)
     try:
-        shapes = _shapes(text, rows)
+        expected = Expected([int(step) for step in steps[1].split()], float(tolerance[1]), read_budgets(path), rows)
+        if not 0 < expected.tolerance < 1:
+            raise ValueError(f"its tolerance must lie between 0 and 1, not {expected.tolerance}")
+        expected.shapes.update(_shapes(text, rows))
     except ValueError as error:
-        raise ValueError(f"{path}: {error}") from error
-    return Expected(
-        [int(step) for step in steps[1].split()],
-        float(tolerance[1]),
-        read_budgets(path),
-        rows,
-        shapes,
-    )
+        raise ValueError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from error
+    return expected
 
 
 def read_budgets(path: Path) -> dict[str, Budget]:
@@ -136,21 +144,28 @@ def read_budgets(path: Path) -> dict[str, Budget]:
     if path.suffix != ".csv":
         return {}
     pattern = r"^# budget (\w+): relative (\S+) absolute (\S+)$"
-    budgets = {
-        name: Budget(float(relative), float(absolute))
-        for name, relative, absolute in re.findall(pattern, path.read_text(encoding="utf-8"), re.MULTILINE)
-    }
-    unknown = budgets.keys() - ROUNDING.keys() - DRIFT.keys()
-    if unknown:
-        raise ValueError(f"{path} has a budget of {min(unknown)!r}, which is none of {', '.join(ROUNDING | DRIFT)}")
+    budgets: dict[str, Budget] = {}
+    for name, *parts in re.findall(pattern, csv_text(path), re.MULTILINE):
+        if name not in ROUNDING | DRIFT:
+            raise ValueError(f"{path} has a budget of {name!r}, which is none of {', '.join(ROUNDING | DRIFT)}")
+        try:
+            relative, absolute = map(float, parts)
+        except ValueError:
+            relative = math.nan
+        if not (relative >= 0 and absolute >= 0):
+            raise ValueError(f"{path} has a budget of {name} that is not two numbers from 0: {' and '.join(parts)}")
+        budgets[name] = Budget(relative, absolute)
     return budgets
 
 
 def _shapes(text: str, rows: list[Row]) -> dict[int, dict[Key, Shape]]:
     """The shapes of every step: a line `# shapes` holds for the rows that follow, until another says otherwise."""
-    present: dict[int, set[object]] = {}
+    present: dict[int, set[Key]] = {}
     for row in rows:
-        present.setdefault(int(row["step"] or 0), set()).update((key(row)[:3], key(row)[3:]))
+        keys = (key(row)[:3], key(row)[3:])
+        # A row of a shape alone has no B.
+        numbers = [tuple(int(part or 0) for part in each) for each in keys if each != (None, None, None)]
+        present.setdefault(int(row["step"] or 0), set()).update((a, b, c) for a, b, c in numbers)
     known: dict[Key, Shape] = {}
     shapes: dict[int, dict[Key, Shape]] = {}
     for line in text.splitlines():
@@ -158,17 +173,20 @@ def _shapes(text: str, rows: list[Row]) -> dict[int, dict[Key, Shape]]:
             users, _, words = line.removeprefix("# shapes ").partition(": ")
             shape = shape_of(words)
             known |= {_key(user): shape for user in users.split()}
-        elif line[:1].isdigit():
+        elif re.match(r"\d+,", line, re.ASCII):
             step = int(line.partition(",")[0])
             if step not in shapes:
-                shapes[step] = {each: shape for each, shape in known.items() if each in present[step]}
-    for step, keys in present.items():
-        missing = keys - shapes[step].keys() - {(None, None, None)}
+                shapes[step] = {each: known[each] for each in present.get(step, ()) if each in known}
+    for step, needed in present.items():
+        missing = needed - shapes.get(step, {}).keys()
         if missing:
-            raise ValueError(f"the shape {min(map(str, missing))} of step {step} is in no line `# shapes`")
+            raise ValueError(f"the shape {'/'.join(map(str, min(missing)))} of step {step} is in no line `# shapes`")
     return shapes
 
 
 def _key(text: str) -> Key:
-    body, link, shape = map(int, text.split("/"))
+    try:
+        body, link, shape = map(int, text.split("/"))
+    except ValueError:
+        raise ValueError(f"{text[:60]!r} is no shape of a link of a body, as 0/-1/0 is one") from None
     return body, link, shape

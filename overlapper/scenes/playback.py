@@ -12,13 +12,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from overlapper.printable import printable
 from overlapper.scenes.comparison import compare_measures
 from overlapper.scenes.expected import HUNDREDTHS, read_expected
 from overlapper.scenes.run import Frame, run
-from overlapper.scenes.scene import Scene, SceneError, load_scene
+from overlapper.scenes.scene import Scene, load_scene
 from overlapper.scenes.still import Still
 from overlapper.scenes.table import Row, link_rows, rows
-from overlapper.scenes.table_file import TABLES, read_metadata, read_table
+from overlapper.scenes.table_file import TABLES, csv_text, read_metadata, read_table
 from overlapper.simulation import Bodies
 from overlapper.simulation.links import link_contacts
 
@@ -41,43 +42,37 @@ class Playback:
     remarks: list[str] = field(default_factory=list)
 
 
-def play(source: str, steps: int | None = None) -> Playback:
+def play(source: str, steps: int | None = None, scene: str | None = None) -> Playback:
     """The playback of a scene, by name or path, or of a table; of a scene, `steps` of it.
+
+    A table without shapes is of the `scene` given: what a table names is not run, as tables come from anywhere.
 
     SceneError if a scene cannot be found or run, ValueError or OSError if a table cannot be read.
     """
     path = Path(source)
     if path.suffix not in TABLES:
-        scene = load_scene(source)
-        return Playback(scene.name, steps or scene.steps, _run(scene, steps or scene.steps, {}))
-    settings = read_metadata(path)
-    if path.suffix == ".csv" and re.search(r"^# shapes ", path.read_text(encoding="utf-8"), re.MULTILINE):
+        if scene is not None:
+            raise ValueError(f"--scene is for tables, and {source} is none")
+        chosen = load_scene(source)
+        return Playback(chosen.name, steps or chosen.steps, _run(chosen, steps or chosen.steps, {}))
+    metadata = read_metadata(path)
+    if path.suffix == ".csv" and re.search(r"^# shapes ", csv_text(path), re.MULTILINE):
         expected = read_expected(path)
         stills = {step: Still.recorded(recorded, expected.shapes[step]) for step, recorded in expected.rows_by_step()}
         return Playback(path.stem, len(stills), _stills(stills, expected.tolerance), sparse=True)
-    playback = Playback(path.stem, int(settings.get("steps", 0)), _nothing())
-    playback.views = _held_against(path, _scene_of(path, settings), settings, playback)
+    if scene is None:
+        said = metadata.get("scene")
+        named = f" (it says {printable(said)!r})" if said else ""
+        raise ValueError(f"{path} has no shapes to show: give the scene that it is of with --scene{named}")
+    recorded = read_table(path)
+    total = max((int(row["step"] or 0) for row in recorded), default=1)
+    playback = Playback(path.stem, total, _nothing())
+    playback.views = _held_against(path, load_scene(scene), metadata, recorded, playback)
     return playback
 
 
 def _nothing() -> Generator[View, None, None]:
     yield from ()
-
-
-def _scene_of(path: Path, settings: dict[str, str]) -> Scene:
-    """The scene that a table is of: one known by name, or one whose file is here or beside the table."""
-    name = settings.get("scene")
-    if name is None or not settings.get("steps", "").isdigit():
-        raise ValueError(f"{path} does not say which scene it is of, nor has it shapes to show")
-    for folder in (Path(), path.parent):
-        if (folder / f"{name}.py").is_file():
-            return load_scene(folder / f"{name}.py")
-    try:
-        return load_scene(name)
-    except SceneError as error:
-        raise ValueError(
-            f"{path} has no shapes to show, and its scene {name}.py, to be run again, is neither here nor beside it"
-        ) from error
 
 
 def _run(scene: Scene, steps: int, settings: dict[str, Any]) -> Generator[View, None, None]:
@@ -89,12 +84,8 @@ def _stills(stills: dict[int, Still], tolerance: float) -> Generator[View, None,
         yield Frame(step, step * STEP, still, still.contacts(tolerance))
 
 
-def _held_against(
-    path: Path, scene: Scene, settings: dict[str, str], playback: Playback
-) -> Generator[View, None, None]:
-    recorded = read_table(path)
-    steps = max((int(row["step"] or 0) for row in recorded), default=playback.total)
-    playback.total = steps
+def _settings(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
+    """The settings in a table's heading that `run` takes, which knows what each may be."""
     kinds = {
         "tolerance": float,
         "method": str,
@@ -103,11 +94,19 @@ def _held_against(
         "concave_threshold": float,
         "pairs": str,
     }
-    known = {name: kind(settings[name]) for name, kind in kinds.items() if settings.get(name, "None") != "None"}
+    try:
+        return {name: kind(metadata[name]) for name, kind in kinds.items() if metadata.get(name, "None") != "None"}
+    except ValueError as error:
+        raise ValueError(f"{path} has a setting that is none: {error}") from error
+
+
+def _held_against(
+    path: Path, scene: Scene, metadata: dict[str, str], recorded: list[Row], playback: Playback
+) -> Generator[View, None, None]:
     found: list[Row] = []
-    for frame in run(scene, steps, **known):
+    for frame in run(scene, playback.total, **_settings(path, metadata)):
         where = frame.step, frame.time, frame.bodies
-        if settings.get("per") == "link":
+        if metadata.get("per") == "link":
             found += link_rows(*where, link_contacts(frame.contacts))
         else:
             found += rows(*where, frame.contacts)

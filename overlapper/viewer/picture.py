@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from overlapper import HalfSpace, Overlap, Placed
+from overlapper.install import hint
 from overlapper.quaternion import rotated
 from overlapper.viewer.labels import Bodies, Contact, pairs
 from overlapper.viewer.look import (
@@ -37,6 +38,7 @@ from overlapper.viewer.look import (
     volume_text,
 )
 from overlapper.viewer.outline import Outline, outline, plate, polytope_edges
+from overlapper.whole_file import beside
 
 try:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -45,7 +47,7 @@ try:
     from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea, VPacker
     from PIL import Image, ImageDraw
 except ImportError as missing:
-    raise ImportError("overlapper.viewer.picture needs matplotlib: pip install 'overlapper[view]'") from missing
+    raise ImportError(f"overlapper.viewer.picture needs {hint('matplotlib')}") from missing
 
 WIDTH, HEIGHT = 1200, 900  # pixels
 FINER = 2  # times: so much larger are faces painted, to be smooth when made smaller
@@ -222,7 +224,8 @@ class _Picture:
         for points, color, size in self.dots:
             axes.plot(*points.T, ".", color=tuple(color), markersize=size, zorder=BEFORE + 1)
         axes.add_artist(_table(title, overlaps))
-        FigureCanvasAgg(figure).print_png(str(path))  # type: ignore[no-untyped-call]
+        with beside(path) as file:
+            FigureCanvasAgg(figure).print_png(str(file))  # type: ignore[no-untyped-call]
 
 
 def _in_world(placed: Placed, points: Array) -> Array:
@@ -241,7 +244,7 @@ def _table(title: str, overlaps: Sequence[tuple[tuple[str, str], Overlap]]) -> A
     """The title, and the pairs with volume and depth, the largest first."""
 
     def text(words: str, color: Any = LINE) -> TextArea:
-        return TextArea(words, textprops={"color": color, "fontsize": 11, "family": "DejaVu Sans"})
+        return TextArea(words, textprops={"color": color, "fontsize": 11, "family": "DejaVu Sans", "parse_math": False})
 
     names: list[Any] = []
     volumes: list[Any] = []

@@ -35,6 +35,7 @@ from overlapper.viewer.look import (
     to_draw,
 )
 from overlapper.viewer.stage import Stage, rgb
+from overlapper.whole_file import beside
 
 from meshcat import Visualizer  # isort: skip  # after the stage, which says what to install
 from meshcat.servers.zmqserver import VIEWER_ROOT  # isort: skip
@@ -130,7 +131,8 @@ class Recording:
         page = (folder / "recording.html").read_text(encoding="utf-8")
         for mark, text in texts.items():
             page = page.replace(f"{{{{{mark}}}}}", text)
-        Path(path).write_text(page, encoding="utf-8")
+        with beside(path) as file:
+            file.write_text(page, encoding="utf-8")
         return Path(path)
 
     def _heading(self, stage: Stage) -> dict[str, Any]:

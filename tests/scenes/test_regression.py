@@ -1,6 +1,7 @@
 """Scenes are found and run, and an expected file notices what has changed since it was written."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -8,11 +9,11 @@ import pytest
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Sphere
 from overlapper.polytopes.shape_text import alike, shape_of, text_of
 from overlapper.scenes.comparison import compare_measures, compare_poses, loose_budgets
-from overlapper.scenes.expected import Budget, read_expected
+from overlapper.scenes.expected import DRIFT, Budget, read_expected
 from overlapper.scenes.record import record, replay
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import SceneError, load_scene
-from overlapper.scenes.table import COLUMNS
+from overlapper.scenes.table import COLUMNS, POSE
 from overlapper.scenes.verdict import examine
 
 TWO_CUBES = '''
@@ -179,6 +180,42 @@ def test_a_failing_recording_leaves_what_was_expected(recorded, scene_file):
     assert recorded.expected.read_text() == before
 
 
+def without_rows(text, kept):
+    """An expected file of which only the first rows are left."""
+    lines = text.splitlines(keepends=True)
+    rows = [line for line in lines if line[0].isdigit()]
+    return "".join(line for line in lines if line not in rows[kept:])
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda text: without_rows(text, 5), r"5 of its 8 rows are there"),
+        (lambda text: text[:-40], r"a line of it is another"),
+        (lambda text: text.replace(",overlapping,0", ",overlapping,9"), r"a line of it is another"),
+        (lambda text: text.replace('["Box", [0.5', '["Box", [0.6'), r"a line of it is another"),
+        (lambda text: without_rows(text, 0).partition("step,")[0], r"0 of its 8 rows are there"),
+    ],
+)
+def test_an_expected_file_that_was_cut_or_changed_is_refused(recorded, change, sentence):
+    text = recorded.expected.read_text()
+    assert change(text) != text
+    recorded.expected.write_text(change(text))
+    with pytest.raises(ValueError, match=rf"two_cubes\.csv is not as it was written: {sentence} \(if that is as it"):
+        read_expected(recorded.expected)
+
+
+def test_an_expected_file_without_a_count_is_read_and_one_with_other_line_ends_is_the_same(recorded):
+    before = read_expected(recorded.expected)
+    text = recorded.expected.read_text()
+    recorded.expected.write_bytes(text.replace("\n", "\r\n").encode())
+    assert read_expected(recorded.expected).rows == before.rows
+    uncounted = re.sub(r"^# rows: .*\n", "", text, flags=re.MULTILINE)
+    assert uncounted != text
+    recorded.expected.write_text(without_rows(uncounted, 5))
+    assert read_expected(recorded.expected).rows == before.rows[:5]
+
+
 def test_other_dynamics_are_told_from_geometry_and_shapes(recorded, scene_file):
     verdict = edited(scene_file, "0.9 + 0.01 * i", "0.9 + 0.02 * i")
     assert [bool(moves) for moves in verdict.causes.values()] == [False, False, True]
@@ -223,7 +260,13 @@ def test_a_scene_shorter_than_its_recording_is_told(recorded, scene_file):
     ("old", "new", "sentence"),
     [
         ("# steps", "# stages", "must say `# steps: <numbers>`"),
+        ("# steps: 1 3", "# steps: a b", "must say `# steps: <numbers>`"),
+        ("# tolerance: 0.001", "# tolerance: 1e", "could not convert"),
+        ("# tolerance: 0.001", "# tolerance: 1e9", "its tolerance must lie between 0 and 1, not 1000000000.0"),
         ("# budget volume", "# budget weight", "has a budget of 'weight'"),
+        ("absolute 0.0001\n", "absolute -1\n", "has a budget of position that is not two numbers from 0: 0.0 and -1"),
+        ("absolute 0.0001\n", "absolute wide\n", "budget of position that is not two numbers from 0: 0.0 and wide"),
+        ("# shapes 0/-1/0", "# shapes 0/-1/one", "'0/-1/one' is no shape of a link of a body, as 0/-1/0 is one"),
         ("# shapes", "# forms", "is in no line `# shapes`"),
         ('["Box"', '["Bax"', "is no shape"),
         (",overlapping,", ",overlapping,many", "cannot be read"),
@@ -232,6 +275,8 @@ def test_a_scene_shorter_than_its_recording_is_told(recorded, scene_file):
 def test_an_expected_file_that_cannot_be_read_is_named(recorded, old, new, sentence):
     text = recorded.expected.read_text()
     assert old in text
+    # Or the line says that another is not as it was written.
+    text = re.sub(r"^# rows: .*\n", "", text, flags=re.MULTILINE)
     recorded.expected.write_text(text.replace(old, new))
     with pytest.raises(ValueError, match=sentence) as refusal:
         read_expected(recorded.expected)
@@ -309,6 +354,23 @@ def test_measures_may_differ_by_their_budget_and_no_more():
 
 def test_a_measure_that_is_not_a_number_is_a_failure():
     assert failures([pair()], [pair(volume_m3=math.nan)]) != []
+
+
+def test_what_is_not_a_number_differs_from_numbers_and_not_from_itself():
+    nowhere = pair(volume_m3=math.nan, positionA_x_m=math.nan, orientationB_w=math.nan, depth_m=math.inf)
+    assert failures([nowhere], [nowhere]) == []
+    assert compare_poses([nowhere], [dict(nowhere)], BUDGETS | DRIFT).moves == []
+    (move,) = compare_poses([nowhere], [nowhere | {"positionA_x_m": 0.0}], BUDGETS).moves
+    assert move.quantity == "position_m"
+    placeless = pair(**dict.fromkeys([part.format(side) for side in "AB" for part in POSE]))
+    assert compare_poses([placeless], [dict(placeless)], BUDGETS | DRIFT).moves == []
+
+
+def test_pairs_of_links_and_pairs_of_shapes_are_told_apart():
+    assert failures([pair(shapeA=None, shapeB=None)], [pair()]) == [
+        "step 1, 0/-1/None and 1/-1/None: status is not there, recorded as overlapping",
+        "step 1, 0/-1/0 and 1/-1/0: status is overlapping, recorded as not there",
+    ]
 
 
 def test_a_certified_error_ten_times_larger_and_beyond_the_budget_of_the_volume_is_a_failure():

@@ -1,9 +1,10 @@
 """Tables come back as they were written, also in pandas and polars, and a killed run leaves what it had finished."""
 
-import shutil
+import re
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,12 @@ import pytest
 
 from overlapper import Box, Placed, overlap
 from overlapper.scenes.table import COLUMNS, rows
-from overlapper.scenes.table_file import TABLES, CsvTable, ParquetTable, read_csv, read_table
+from overlapper.scenes.table_file import NEEDED, TABLES, CsvTable, ParquetTable, read_csv, read_metadata, read_table
 from overlapper.simulation.contacts import Contact
+from overlapper.whole_file import must_be_writable
 
 ENDINGS = sorted(TABLES)
+BLANK = "," * (len(NEEDED) - 1)
 METADATA = {"overlapper": "1.2.3", "tolerance": "0.001"}
 
 # What the README says, a line each.
@@ -77,17 +80,21 @@ def test_one_line_reads_a_table_into_pandas_and_polars(tmp_path, ending):
 def test_metadata_travels_with_every_kind_of_table(tmp_path):
     for ending in ENDINGS:
         TABLES[ending](tmp_path / f"run{ending}", METADATA).close()
-    assert (tmp_path / "run.csv").read_text().startswith("# overlapper: 1.2.3\n# tolerance: 0.001\nstep,")
+    text = (tmp_path / "run.csv").read_text()
+    assert re.match(r"# overlapper: 1\.2\.3\n# tolerance: 0\.001\n# rows: +0, sha256 [0-9a-f]{64}\nstep,", text)
     assert pyarrow.parquet.read_schema(tmp_path / "run.parquet").metadata == {
         name.encode(): value.encode() for name, value in METADATA.items()
     }
     with sqlite3.connect(tmp_path / "run.sqlite") as connection:
-        assert dict(connection.execute("SELECT * FROM metadata")) == METADATA
+        assert dict(connection.execute("SELECT * FROM metadata")) == METADATA | {"rows": "0"}
+    for ending in ENDINGS:
+        assert METADATA.items() <= read_metadata(tmp_path / f"run{ending}").items()
 
 
 ENDLESS = """
 import sys
 from itertools import count
+from contextlib import closing
 from pathlib import Path
 from overlapper.scenes.table_file import TABLES
 
@@ -108,7 +115,8 @@ def test_a_killed_run_leaves_every_step_it_had_finished(tmp_path, ending):
             process.stdout.readline()
         process.kill()
         finished = 30 + len(process.stdout.read().split())
-    left = path.with_name("run.parquet.parts") if ending == ".parquet" else path
+    left = path.with_name(f"run.unfinished{ending}")
+    assert not path.exists()
     for read in [read_table, *READERS[ending]]:
         table = read(left)
         steps = [row["step"] for row in table] if read is read_table else list(table["step"])
@@ -120,32 +128,105 @@ def test_a_killed_run_leaves_every_step_it_had_finished(tmp_path, ending):
 def test_a_line_that_a_kill_has_cut_is_not_read(tmp_path):
     table = CsvTable(tmp_path / "run.csv")
     table.write(Cubes().rows(1))
+    left = table.leave()
+    left.write_text(left.read_text()[:-7])
+    assert read_csv(left) == Cubes().rows(1)[:2]
+
+
+def test_a_line_that_a_signal_has_cut_is_not_in_the_table(tmp_path):
+    table = CsvTable(tmp_path / "run.csv")
+    table.write(Cubes().rows(1))
+    table._file.write(b"2,0.00833")
     table.close()
-    text = (tmp_path / "run.csv").read_text()
-    (tmp_path / "run.csv").write_text(text[:-7])
-    assert read_csv(tmp_path / "run.csv") == Cubes().rows(1)[:2]
+    assert read_csv(tmp_path / "run.csv") == Cubes().rows(1)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_nothing_of_an_earlier_run_is_left(tmp_path, ending):
-    (tmp_path / "running").mkdir()
-    running = TABLES[ending](tmp_path / "running" / f"run{ending}", METADATA)
-    running.write(Cubes().rows(1))
-    shutil.copytree(tmp_path / "running", tmp_path / "killed")
-    running.close()
-    path = tmp_path / "killed" / f"run{ending}"
-    table = TABLES[ending](path, METADATA)
-    table.write(Cubes().rows(2))
-    table.close()
+def test_two_runs_at_once_and_one_that_was_killed_disturb_nothing(tmp_path, ending):
+    path = tmp_path / f"run{ending}"
+    path.write_text("what was there before")
+    killed, first, second = (TABLES[ending](path, METADATA) for _ in range(3))
+    for step, table in enumerate((killed, first, second)):
+        table.write(Cubes().rows(step))
+    assert path.read_text() == "what was there before"
+    second.close()
     assert {row["step"] for row in read_table(path)} == {2}
-    assert list(path.parent.iterdir()) == [path]
+    first.close()
+    assert {row["step"] for row in read_table(path)} == {1}
+    left = killed.leave()
+    assert left == tmp_path / f"run.unfinished{ending}"
+    assert {row["step"] for row in read_table(left)} == {0}
+    assert {path.name for path in tmp_path.iterdir()} == {path.name, left.name}
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_of_a_table_without_rows_nothing_is_left(tmp_path, ending):
+    assert TABLES[ending](tmp_path / f"run{ending}", METADATA).leave() is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_log_of_an_earlier_database_is_not_taken_for_one_of_the_new(tmp_path):
+    path = tmp_path / "run.sqlite"
+    with sqlite3.connect(path) as earlier:
+        earlier.execute("PRAGMA journal_mode = WAL")
+        earlier.execute("CREATE TABLE overlaps (step)")
+    assert (tmp_path / "run.sqlite-wal").exists()
+    table = TABLES[".sqlite"](path, METADATA)
+    table.write(Cubes().rows(1))
+    table.close()
+    assert read_table(path) == Cubes().rows(1)
+    earlier.close()
+
+
+def test_a_link_to_a_table_stays_one(tmp_path):
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept" / "run.csv").write_text("earlier")
+    (tmp_path / "kept" / "run.csv").chmod(0o640)
+    (tmp_path / "run.csv").symlink_to(tmp_path / "kept" / "run.csv")
+    CsvTable(tmp_path / "run.csv").close()
+    assert (tmp_path / "run.csv").is_symlink()
+    assert read_csv(tmp_path / "kept" / "run.csv") == []
+    assert (tmp_path / "kept" / "run.csv").stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.parametrize(("place", "reason"), [("/dev/null", "Invalid argument"), (".", "Is a directory")])
+def test_what_no_file_should_replace_is_not_replaced(place, reason):
+    with pytest.raises(OSError, match=reason):
+        must_be_writable(Path(place))
+    with pytest.raises(FileNotFoundError):
+        must_be_writable(Path("no/folder/run.csv"))
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_table_that_was_cut_is_noticed(tmp_path, ending):
+    path = tmp_path / f"run{ending}"
+    table = TABLES[ending](path, METADATA)
+    for step in range(40):
+        table.write(Cubes().rows(step))
+    table.close()
+    whole = path.read_bytes()
+    for part in (0.3, 0.6, 0.9, 0.999):
+        path.write_bytes(whole[: int(part * len(whole))])
+        with pytest.raises(ValueError, match=re.escape(str(path))):
+            read_table(path)
+
+
+def test_rows_that_are_gone_from_a_database_are_noticed(tmp_path):
+    path = tmp_path / "run.sqlite"
+    table = TABLES[".sqlite"](path, METADATA)
+    table.write(Cubes().rows(1))
+    table.close()
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("DELETE FROM overlaps WHERE bodyB = 2")
+    with pytest.raises(ValueError, match=r"is not as it was written: 2 of its 3 rows are there$"):
+        read_table(path)
 
 
 def test_a_long_parquet_table_has_few_and_large_row_groups(tmp_path):
     table = ParquetTable(tmp_path / "run.parquet")
     for step in range(1, 12):
         table.write([{"step": step}] * 2_500)
-    parts = sorted((tmp_path / "run.parquet.parts").iterdir())
+    parts = sorted((tmp_path / "run.unfinished.parquet").iterdir())
     assert [len(read_table(part.parent)) for part in parts[:1]] == [27_500]
     assert len(parts) == 6
     table.close()
@@ -166,8 +247,16 @@ def test_what_is_no_table_is_refused_by_name(tmp_path, text):
     [
         ("a,step\n1,2\n", r"is not a table of overlaps: it has a column 'a'$"),
         ("# only a heading\n", r"is not a table of overlaps: it has no columns$"),
-        ("step,volume_m3\n1,0.5\ntwo,0.5\n", r"cannot be read at line 3 below its heading: invalid literal"),
-        ("step,volume_m3\n1,0.5,7\n", r"cannot be read at line 2 below its heading"),
+        (f"{','.join(NEEDED)}\n1{BLANK}\ntwo{BLANK}\n", r"cannot be read at line 3 below its heading: invalid literal"),
+        (
+            f"{','.join(NEEDED)}\n1{BLANK},7\n",
+            r"cannot be read at line 2 below its heading: it has 23 cells and not 22",
+        ),
+        (f"{','.join(NEEDED)}\n{BLANK}\n", r"line 2 below its heading: a row is of no step"),
+        (f"{','.join(NEEDED)}\n{'9' * 30}{BLANK}\n", r"line 2 below its heading: step is beyond 64 bits"),
+        (f"{','.join(NEEDED)}\n{'9' * 200_000}{BLANK}\n", r"line 2 below its heading: field larger than field limit"),
+        (f"{','.join(NEEDED)},step\n", r"is not a table of overlaps: it has one twice"),
+        ("step,volume_m3\n1,0.5\n", r"is not a table of overlaps: it has no column 'status'"),
     ],
 )
 def test_a_file_that_is_no_table_is_refused_in_a_sentence(tmp_path, text, sentence):
@@ -175,3 +264,64 @@ def test_a_file_that_is_no_table_is_refused_in_a_sentence(tmp_path, text, senten
     path.write_text(text)
     with pytest.raises(ValueError, match=sentence):
         read_csv(path)
+
+
+def database(path, *statements):
+    with closing(sqlite3.connect(path)) as connection, connection:
+        for statement in statements:
+            connection.execute(statement)
+
+
+COLUMN_LIST = ", ".join(NEEDED)
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda path: path.write_bytes(b"\xff" * 40), r"it is no text \("),
+        (lambda path: path.with_suffix(".sqlite").write_bytes(b"\xff" * 4000), r"file is not a database$"),
+        (lambda path: database(path.with_suffix(".sqlite"), "CREATE TABLE a (b)"), r"it has no table 'overlaps'$"),
+        (
+            # Rows without end, made by whoever asks for them.
+            lambda path: database(
+                path.with_suffix(".sqlite"),
+                "CREATE TABLE metadata (name, value)",
+                "CREATE VIEW overlaps AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i FROM n) SELECT i FROM n",
+            ),
+            r"it has no table 'overlaps'$",
+        ),
+        (
+            lambda path: database(
+                path.with_suffix(".sqlite"),
+                f"CREATE TABLE overlaps ({COLUMN_LIST})",
+                "CREATE TABLE metadata (name, value)",
+                f"INSERT INTO overlaps VALUES ('one'{', NULL' * (len(NEEDED) - 1)})",
+            ),
+            r"step is 'one', which is no int$",
+        ),
+        (
+            lambda path: path.with_suffix(".parquet").write_bytes(b"PAR1" * 10),
+            r"t\.parquet is not a table of overlaps: ",
+        ),
+        (
+            lambda path: pyarrow.parquet.write_table(
+                pyarrow.table({"step": pyarrow.nulls(10_000_000, pyarrow.int32())}), path.with_suffix(".parquet")
+            ),
+            r"it claims 10,000,000 rows in [\d,]+ bytes$",
+        ),
+    ],
+)
+def test_bytes_that_are_no_table_are_refused_in_a_sentence(tmp_path, make, sentence):
+    make(tmp_path / "t.csv")
+    (path,) = tmp_path.iterdir()
+    with pytest.raises(ValueError, match=sentence) as refusal:
+        read_table(path)
+    assert str(refusal.value).startswith(f"{path} is not a table of overlaps: ")
+    assert str(refusal.value).count("\n") == 0
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_table_that_is_not_there_is_no_file(tmp_path, ending):
+    for read in (read_table, read_metadata):
+        with pytest.raises(FileNotFoundError):
+            read(tmp_path / f"none{ending}")

@@ -15,6 +15,7 @@ from overlapper.cli import view as cli
 from overlapper.scenes.playback import largest, play
 from overlapper.scenes.record import record
 from overlapper.scenes.scene import load_scene
+from overlapper.scenes.table_file import NEEDED
 from overlapper.viewer import picture
 from overlapper.viewer.look import Look
 
@@ -68,7 +69,9 @@ def test_a_scene_becomes_a_page_and_its_table_a_picture_of_the_step_in_which_mos
     assert overlapper("view", "press.py").stdout == "Written: out/press.html\n"
     assert (tmp_path / "out" / "press.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     overlapper("run", "press.py", "--out", "table.sqlite")
-    done = overlapper("view", "table.sqlite", "--png", "made/press.png", "--overlaps-front", "#ff0000")
+    done = overlapper(
+        "view", "table.sqlite", "--scene", "press.py", "--png", "made/press.png", "--overlaps-front", "#ff0000"
+    )
     assert (done.stdout, done.stderr, done.returncode) == ("Written: made/press.png\n", "", 0)
     seen = colours("made/press.png")
     assert seen["orange"] == seen["sky blue"] == 0
@@ -84,11 +87,11 @@ def test_most_is_shared_when_the_cube_is_deepest():
 
 def test_what_a_table_has_is_told_from_what_its_scene_has_become(scene_file):
     overlapper("run", "press.py", "--out", "press.csv")
-    playback = play("press.csv")
+    playback = play("press.csv", scene="press.py")
     assert len(list(playback.views)) == playback.total == 9  # the cubes are apart from then on
     assert playback.remarks == []
     scene_file.write_text(PRESS.replace("0.08 +", "0.07 +"))
-    list((playback := play("press.csv")).views)
+    list((playback := play("press.csv", scene="press.py")).views)
     (remark,) = playback.remarks
     assert re.match(r"what is seen is not what press\.csv has, as the simulation has changed: step \d, ", remark)
 
@@ -97,7 +100,7 @@ def test_a_table_of_bodies_with_margins_is_played_with_margins(scene_file):
     points = "vertices=[[x, y, z] for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (-0.05, 0.05)]"
     scene_file.write_text(PRESS.replace("GEOM_BOX, halfExtents=[0.05] * 3", f"GEOM_MESH, {points}"))
     overlapper("run", "press.py", "--surface", "margin", "--out", "press.csv")
-    playback = play("press.csv")
+    playback = play("press.csv", scene="press.py")
     assert {type(body.shape) for view in playback.views for body in view.bodies.placed} == {RoundedHull}
     assert playback.remarks == []
 
@@ -115,8 +118,20 @@ def test_an_expected_file_is_seen_without_its_scene(scene_file):
 @pytest.mark.parametrize(
     ("source", "options", "sentence"),
     [
-        ("lost.csv", {}, "lost.csv has no shapes to show, and its scene lost.py, to be run again, is neither here nor"),
-        ("mute.csv", {}, "mute.csv does not say which scene it is of, nor has it shapes to show"),
+        (
+            "lost.csv",
+            {},
+            "lost.csv has no shapes to show: give the scene that it is of with --scene (it says '../lost')",
+        ),
+        ("mute.csv", {}, "mute.csv has no shapes to show: give the scene that it is of with --scene"),
+        (
+            "odd.csv",
+            {"scene": "press.py"},
+            "odd.csv has a setting that is none: could not convert string to float: 'x'",
+        ),
+        ("press.py", {"scene": "press.py"}, "--scene is for tables, and press.py is none"),
+        ("press.py", {"live": True, "host": "192.0.2.1"}, "host must be an address of this machine, not '192.0.2.1': "),
+        ("press.py", {"live": True, "host": "no host"}, "host must be an address of this machine, not 'no host': "),
         ("gone.csv", {}, "gone.csv: No such file"),
         ("press.py", {"png": Path("a.png"), "step": 13}, "there is no step 13 to see"),
         ("press.py", {"overlaps": "faces,corners"}, "--overlaps must name some of faces,edges,vertices,marks, not 'c"),
@@ -125,8 +140,9 @@ def test_an_expected_file_is_seen_without_its_scene(scene_file):
     ],
 )
 def test_what_cannot_be_seen_is_refused_in_one_sentence(source, options, sentence, tmp_path):
-    (tmp_path / "lost.csv").write_text("# scene: lost\n# steps: 3\nstep\n")
-    (tmp_path / "mute.csv").write_text("step\n")
+    (tmp_path / "lost.csv").write_text(f"# scene: ../lost\n# steps: 3\n{','.join(NEEDED)}\n")
+    (tmp_path / "mute.csv").write_text(f"{','.join(NEEDED)}\n")
+    (tmp_path / "odd.csv").write_text(f"# tolerance: x\n{','.join(NEEDED)}\n")
     with pytest.raises(cli.Refused, match=re.escape(sentence)):
         cli.view(source, **options)
 

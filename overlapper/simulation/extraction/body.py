@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 
+from overlapper.printable import printable
 from overlapper.simulation.extraction.bullet_file import BulletFile, Leaf, SavedBody
 from overlapper.simulation.extraction.height_field import HeightField
 from overlapper.simulation.extraction.model import BASE, Body, Color, Decomposed, Ground, Part, Settings, Skipped
@@ -38,10 +39,10 @@ def read_body(
     field: HeightField | None = None,
 ) -> Body:
     """A body as it is in a .bullet file, and in pybullet; `field` is the height field that it is known to be."""
-    base, name = (text.decode(errors="replace") for text in pybullet.getBodyInfo(id, client))
+    base, name = (printable(text.decode(errors="replace")) for text in pybullet.getBodyInfo(id, client))
     name = name or f"body {id}"
     joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
-    link_names = {BASE: base or "base"} | {joint[0]: joint[12].decode(errors="replace") for joint in joints}
+    link_names = {BASE: base or "base"} | {joint[0]: printable(joint[12].decode(errors="replace")) for joint in joints}
     parents = {joint[0]: joint[16] for joint in joints}
     leaves = _leaves(client, id, file, saved) if saved else {}
     parts: list[Part] = []
