@@ -11,7 +11,7 @@ LEAST_OF_PYTHON := 90
 LEAST_OF_CORE := 91
 # The core as it is counted, and tests that hold a build with counters for one that leaks or is the released one.
 COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
-UNCOUNTED := test_hardening test_out_of_memory test_stub
+UNCOUNTED := overlap/test_hardening python/test_out_of_memory python/test_stub
 
 .PHONY: help run test record coverage coverage-python coverage-core mutants fuzz lint format hooks ci clean
 

@@ -9,7 +9,7 @@ from ways import AROUND, CUBE, FLOOR, TURN, TYPICAL
 
 from overlapper import Box, Hull, Overlaps, Placed, overlap, overlaps, random_polytope
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "how.md").read_text(encoding="utf-8")
 NATIVE = ROOT / "overlapper" / "native"
 CHOOSE = (NATIVE / "methods" / "choose.h").read_text(encoding="utf-8")
