@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import repeat
 
+import numpy as np
 import pybullet
 
-from overlapper.simulation.extraction.bullet_file import SavedBody
+from overlapper.simulation.extraction.bullet_file import orientations
 from overlapper.simulation.extraction.model import BASE
 from overlapper.simulation.extraction.saved_scene import save
 
@@ -35,13 +36,13 @@ class ColliderPoses:
     def read(self) -> None:
         """Read the frames anew, and which bases are static."""
         client, before = self._client, self.frames or [()] * len(self.bodies)
-        saved = save(client).bodies if self._hidden else []
+        saved = self._saved_frames() if self._hidden else {}
         frames: list[ReportedPose] = list(map(pybullet.getBasePositionAndOrientation, self._seen, repeat(client)))
-        frames += [_frame(saved[row], BASE) for row, _ in self._hidden]
+        frames += [saved[row, BASE] for row, _ in self._hidden]
         for id, links in self._jointed:
             # Without forward kinematics the poses of links lag one step behind.
             frames += pybullet.getLinkStates(id, links, computeForwardKinematics=1, physicsClientId=client)
-        frames += [_frame(saved[row], link) for row, links in self._hidden for link in links]
+        frames += [saved[row, link] for row, links in self._hidden for link in links]
         self.frames = frames
         # changeDynamics may turn a static body into a moving one, and back. A body that has moved of itself is not
         # static; one that is moved by hand is asked once it rests.
@@ -49,7 +50,10 @@ class ColliderPoses:
             if self.static[k] or frames[k] == before[k]:
                 self.static[k] = pybullet.getDynamicsInfo(id, BASE, client)[0] == 0
 
-
-def _frame(body: SavedBody, link: int) -> ReportedPose:
-    collider = body.colliders[link]
-    return collider.position.tolist(), collider.orientation.tolist()
+    def _saved_frames(self) -> dict[tuple[int, int], ReportedPose]:
+        """Of the hidden bodies, by place in a .bullet file and link."""
+        bodies = save(self._client).bodies
+        keys = [(row, link) for row, links in self._hidden for link in (BASE, *links)]
+        colliders = [bodies[row].colliders[link] for row, link in keys]
+        positions = np.array([collider.position for collider in colliders]).tolist()
+        return dict(zip(keys, zip(positions, orientations(colliders).tolist())))

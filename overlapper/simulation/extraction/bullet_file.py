@@ -8,7 +8,7 @@ between blocks are those old addresses.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -93,6 +93,11 @@ class Collider:
     def orientation(self) -> NDArray[np.float64]:
         """(4,) unit quaternion xyzw of `rotation`."""
         return _quaternion(self.rotation)
+
+
+def orientations(colliders: Sequence[Collider]) -> NDArray[np.float64]:
+    """(n, 4) unit quaternions xyzw, as `Collider.orientation` has them, in one go."""
+    return _quaternion(np.array([collider.rotation for collider in colliders]).reshape(-1, 3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -355,14 +360,19 @@ def _aligned(offset: int) -> int:
     return (offset + 3) // 4 * 4
 
 
-def _quaternion(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Nearest xyzw quaternion of a rotation matrix that is orthogonal to single precision only (Bar-Itzhack 2000)."""
-    (a, b, c), (d, e, f), (g, h, i) = rotation
-    form = [
-        [a - e - i, b + d, c + g, h - f],
-        [b + d, e - a - i, f + h, c - g],
-        [c + g, f + h, i - a - e, d - b],
-        [h - f, c - g, d - b, a + e + i],
-    ]
-    nearest: NDArray[np.float64] = np.linalg.eigh(form)[1][:, -1]
+def _quaternion(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Nearest xyzw quaternions (..., 4) of rotation matrices (..., 3, 3) that are orthogonal to single precision only.
+
+    (Bar-Itzhack 2000)
+    """
+    a, b, c, d, e, f, g, h, i = np.moveaxis(rotations.reshape(*rotations.shape[:-2], 9), -1, 0)
+    form = np.array(
+        [
+            [a - e - i, b + d, c + g, h - f],
+            [b + d, e - a - i, f + h, c - g],
+            [c + g, f + h, i - a - e, d - b],
+            [h - f, c - g, d - b, a + e + i],
+        ]
+    )
+    nearest: NDArray[np.float64] = np.linalg.eigh(np.moveaxis(form, (0, 1), (-2, -1)))[1][..., -1]
     return nearest

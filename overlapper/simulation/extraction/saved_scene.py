@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import count
-from pathlib import Path
 
 import pybullet
 
@@ -55,16 +55,22 @@ def _base_position(client: int, id: int) -> tuple[float, ...]:
 
 
 def save(client: int) -> BulletFile:
-    with tempfile.TemporaryDirectory(prefix="overlapper-") as folder:
-        path = Path(folder) / "scene.bullet"
-        try:
-            pybullet.saveBullet(str(path), physicsClientId=client)
-            return BulletFile(path)
-        except (pybullet.error, OSError) as error:
-            raise RuntimeError(
-                f"the physics server of physicsClientId {client} could not hand over its shapes in {path}: "
-                "it must run on this machine and be allowed to write there"
-            ) from error
+    # A file and no folder, whose removal takes as long as all the rest.
+    descriptor, name = tempfile.mkstemp(prefix="overlapper-", suffix=".bullet")
+    os.close(descriptor)
+    try:
+        pybullet.saveBullet(name, physicsClientId=client)
+        if os.path.getsize(name):
+            return BulletFile(name)
+        reason: Exception | None = None
+    except (pybullet.error, OSError) as error:
+        reason = error
+    finally:
+        os.unlink(name)
+    raise RuntimeError(
+        f"the physics server of physicsClientId {client} could not hand over its shapes in {name}: "
+        "it must run on this machine and be allowed to write there"
+    ) from reason
 
 
 @contextmanager
