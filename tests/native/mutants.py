@@ -47,8 +47,8 @@ TOKEN = re.compile(
 )
 NOT_RUN = re.compile(r"^\s*(#|assert\(|static_assert|throw |using |template|///|\*|case )")
 
-# Of the tests of the core, those about what no such fault changes: the stub, databases, memory and signals.
-LEFT_OUT = ("test_stub.py", "test_postgresql.py", "test_out_of_memory.py", "test_mutants.py")
+# Of the tests of the core, those about what no such fault changes: the stub, memory and signals.
+LEFT_OUT = ("test_stub.py", "test_out_of_memory.py", "test_mutants.py")
 NOT_ASKED = "not memory and not ctrl_c and not spawn and not process"
 QUICK = "tests/native/test_recorded_answers.py"
 
@@ -253,7 +253,7 @@ class Bench:
     def tests(self, number: int, quick: bool, seconds: float) -> str:
         """Nothing if all pass, or what noticed."""
         which = [QUICK] if quick else ["tests/native", f"--ignore={QUICK}", "-k", NOT_ASKED]
-        left_out = [f"--ignore=tests/native/{name}" for name in LEFT_OUT]
+        left_out = [f"--ignore-glob=*/{name}" for name in LEFT_OUT]
         command = [str(self.python), "-m", "pytest", "-q", "-x", "--tb=no", "-p", "no:cacheprovider", *which, *left_out]
         try:
             done = run(command, self.tree, seconds, check=False, mutant=number)

@@ -9,23 +9,41 @@ writes what is found, for a change that is meant.
 from __future__ import annotations
 
 import csv
+import pickle
 from pathlib import Path
 from random import Random
 
 import numpy as np
 import pytest
-from plain_cases import GROUPS, SHAPES, PlainCase, ball_of_points, cloud, plain_cases, quaternion, vector
+from plain_cases import GROUPS, SHAPES, PlainCase, ball_of_points, cloud, plain_cases, plain_crowds, quaternion, vector
 
 from overlapper import Batch, Box, Hull, Overlap, overlap, overlaps
 
 RECORDED = Path(__file__).with_name("recorded")
 # How far a measure may be off, relative to itself or in SI units, whichever is more; all else is exact.
-SIZES = dict.fromkeys(("volume", "area", "reach"), (1e-11, 1e-17))
+SIZES = dict.fromkeys(("volume", "area", "reach", "rim"), (1e-11, 1e-17))
 LENGTHS = dict.fromkeys(("depth", "distance"), (1e-10, 1e-15))
 SUMS = dict.fromkeys(
-    ("inertia", "gradient", "normal", "centroid", "witnesses", "plane", "bounds", "walls", "normals"), (1e-10, 1e-13)
+    (
+        "inertia",
+        "gradient",
+        "normal",
+        "centroid",
+        "witnesses",
+        "plane",
+        "bounds",
+        "walls",
+        "normals",
+        "skew",
+        "leaning",
+    ),
+    (1e-10, 1e-13),
 )
-MEASURES = SIZES | LENGTHS | SUMS | {"error": (1e-6, 0.0)}
+# Sums of logarithms, in which a sliver weighs as much as a large body.
+LOGARITHMS = {"log error": (1e-6, 1e-5)} | dict.fromkeys(
+    ("log volume", "log area", "log depth", "log distance", "log reach", "log rim"), (1e-9, 1e-7)
+)
+MEASURES = SIZES | LENGTHS | SUMS | LOGARITHMS | {"error": (1e-6, 0.0)}
 WEIGHTS = np.array([0.59, 0.83, -0.71, 0.37, 0.97, -0.43, 0.61, -0.89, 0.53])
 
 
@@ -54,11 +72,14 @@ def answer_of(case: PlainCase) -> dict[str, object]:
 
 
 def surface_of(found: Overlap) -> dict[str, object]:
-    arms = found.vertices - found.centroid
+    arms, walls = found.vertices - found.centroid, found.halfspaces
     return {
-        "corners": len(found.vertices), "facets": len(found.facets), "owned": int((found.owner == 0).sum()),
-        "patches": len(found.patch), "patch": sum(len(ring) for ring in found.patch),
-        "reach": float((arms * arms).sum()), "walls": float(found.halfspaces[:, 3].sum()),
+        "corners": len(found.vertices), "facets": len(walls), "around": sum(map(len, found.facets)),
+        "owned": int((found.owner == 0).sum()), "patches": len(found.patch),
+        "patch": sum(map(len, found.patch)), "reach": float((arms * arms).sum()),
+        "skew": float(((arms @ WEIGHTS[:3]) ** 3).sum()),
+        "walls": float(walls[:, 3].sum()), "leaning": float(walls[:, :3] @ WEIGHTS[3:6] @ (found.owner + 1)),
+        "rim": sum(float(np.sqrt(((np.roll(ring, -1, axis=0) - ring) ** 2).sum(axis=1)).sum()) for ring in found.patch),
     }  # fmt: skip
 
 
@@ -88,7 +109,7 @@ def hulls() -> dict[str, dict[str, object]]:
     clouds |= {f"a flake {thin} thick": cloud(rng, 20) * (1, 1, thin) for thin in (1e-6, 1e-10, 1e-13)}
     rows = {}
     for name, points in clouds.items():
-        hull = Hull(points)
+        hull = pickle.loads(pickle.dumps(Hull(points)))
         rows[name] = {
             "corners": len(hull.vertices), "exact corners": len(hull.corners), "facets": len(hull.facets),
             "triangles": len(hull.triangles), "around": sum(len(ring) for ring in hull.facets),
@@ -107,7 +128,7 @@ def moving() -> dict[str, dict[str, object]]:
     turns = np.array([quaternion(rng) for _ in shapes], float)
     batch, rows = Batch(shapes), {}
     for step in range(12):
-        found = batch.overlaps(where, turns)
+        found = batch.overlaps(where, turns, threads=1 + step % 3)
         rows[f"step {step}"] = {
             "pairs": len(found), "examined": found.examined, "planes": found.planes_asked,
             "candidates": len(batch.candidate_pairs(where, turns)), "widened": int(found.widened.sum()),
@@ -121,6 +142,28 @@ def moving() -> dict[str, dict[str, object]]:
                 if rng.random() < 0.5:
                     turns[i] += [rng.uniform(-0.1, 0.1) for _ in range(4)]
     return rows
+
+
+def crowds() -> dict[str, dict[str, object]]:
+    """What is found of many cases of a sort, all together."""
+    sorts: dict[str, list[dict[str, object]]] = {}
+    for case in plain_crowds():
+        sorts.setdefault(case.name, []).append(answer_of(case))
+    return {name: together(answers) for name, answers in sorts.items()}
+
+
+def together(answers: list[dict[str, object]]) -> dict[str, object]:
+    row: dict[str, object] = {}
+    for column in ("status", "way"):
+        words = [str(answer[column]) for answer in answers]
+        row[column] = ", ".join(f"{words.count(word)} {word}" for word in sorted(set(words)))
+    for column in dict.fromkeys(column for answer in answers for column in answer):
+        values = [answer[column] for answer in answers if isinstance(answer.get(column), (int, float))]
+        if f"log {column}" in LOGARITHMS:
+            row[f"log {column}"] = float(sum(np.log2(value) for value in values if value > 0))
+        elif values:
+            row[column] = sum(values)
+    return row
 
 
 def of_group(group: str) -> dict[str, dict[str, object]]:
@@ -140,9 +183,9 @@ def is_as_recorded(column: str, found: str, recorded: str) -> bool:
     return abs(float(found) - float(recorded)) <= max(relative * abs(float(recorded)), absolute)
 
 
-@pytest.mark.parametrize("group", [*GROUPS, "hulls", "moving"])
+@pytest.mark.parametrize("group", [*GROUPS, "hulls", "moving", "crowds"])
 def test_answers_are_as_they_were_recorded(group, request):
-    rows = {"hulls": hulls, "moving": moving}.get(group, lambda: of_group(group))()
+    rows = {"hulls": hulls, "moving": moving, "crowds": crowds}.get(group, lambda: of_group(group))()
     columns = list(dict.fromkeys(["case", *(column for row in rows.values() for column in row)]))
     file = RECORDED / f"{group}.csv"
     if request.config.getoption("overlapper_record"):

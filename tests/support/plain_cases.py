@@ -10,11 +10,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere, overlap
 
 CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
 WAYS = [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) != (0, 0, 0)]
 SQUARE = [(x, y) for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
+
+
+# Two needles, and by how much the second is moved: their ends are in one plane, and their other corners off it by a
+# thousandth of their length.
+NEEDLES = {
+    "with three corners between": tuple(
+        np.array(numbers) / 1024
+        for numbers in (
+            [(-2048, 8192, 8192), (-2, -4, -1), (3072, -9216, -8192), (-507, 2048, 2046), (-520, 2055, 2041)],
+            [(1024, 8192, -3072), (-760, -6151, 2310), (-1024, -8192, 3072), (249, 2055, -771), (-254, -2045, 770)],
+            (-2, 1, -4),
+        )
+    ),
+    "with two corners between": tuple(
+        np.array(numbers) / 1024
+        for numbers in (
+            [(8192, -7168, 6144), (-8192, 7168, -6144), (-4089, 3590, -3076), (-2044, 1789, -1529)],
+            [(7168, 8192, 5120), (-8192, -7168, -7168), (-3583, -4091, -2566), (5371, 6141, 3834)],
+            (3, 1, 4),
+        )
+    ),
+}
 
 
 class PlainCase(NamedTuple):
@@ -55,6 +77,14 @@ def ball_of_points(rng: Random, count: int) -> np.ndarray:
         if 0.01 < square < 1:
             points.append(np.array([x, y, z]) / np.sqrt(square))
     return np.array(points)
+
+
+def prism(sides: int) -> np.ndarray:
+    """Two whole circles of points, whose coordinates are fractions, at the heights -1 and 1."""
+    steps = [(2 * k + 1 - sides // 4) / (sides // 4) for k in range(sides // 4)]
+    arc = [((1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)) for t in steps]
+    rim = [(x, y) for a, b in arc for x, y in ((a, b), (-b, a), (-a, -b), (b, -a))]
+    return np.array([(x, y, z) for x, y in rim for z in (-1.0, 1.0)])
 
 
 def wedge(rng: Random, feature: str, sign: int) -> np.ndarray:
@@ -196,6 +226,23 @@ def fine(rng: Random) -> Iterator[PlainCase]:
             f"{count} corners in a box", [Placed(a), Placed(Box((0.6, 0.7, 0.8)), (0.3, 0, 0), (1, 2, 3, 4))]
         )
         yield PlainCase(f"{count} corners on a plate", [Placed(a), Placed(HalfSpace((1, 2, 3), rng.uniform(-2, 2)))])
+    for sides, others in ((40, 64), (64, 64)):
+        for shift in ((0, 0, 0), (0, 0, 0.5), (0.25, 0, 0), (0.5, 0.5, 1), (1, 0, 1), (2, 0, 0), (0, 0, 2)):
+            for slip in (0.0, 1e-15, -1e-12, -1e-6):
+                second = Placed(Hull(prism(others)), np.array(shift) * (1 + slip), (0, 0, slip, 1))
+                yield PlainCase(
+                    f"prisms of {sides} and {others} sides by {shift}, {slip:.0e} off",
+                    [Placed(Hull(prism(sides))), second],
+                )
+    for count in (60, 200):
+        globe = ball_of_points(rng, count)
+        for exponent in (0, 2, 4, 6, 8, 10, 12, 13, 14, 15, 16):
+            step = vector(rng, 10.0**-exponent)
+            turn = (*vector(rng, 10.0**-exponent), 1)
+            yield PlainCase(f"{count} corners moved by 1e-{exponent}", [Placed(Hull(globe)), Placed(Hull(globe), step)])
+            yield PlainCase(
+                f"{count} corners turned by 1e-{exponent}", [Placed(Hull(globe)), Placed(Hull(globe), step * 0, turn)]
+            )
     for gap in (1e-3, 1e-6, 1e-9, 1e-12):
         globe = ball_of_points(rng, 200)
         low, high = globe[:, 2].min(), globe[:, 2].max()
@@ -206,7 +253,7 @@ def fine(rng: Random) -> Iterator[PlainCase]:
 def round_bodies(rng: Random) -> Iterator[PlainCase]:
     """Round bodies by tangent planes at other tolerances, and those that a formula measures."""
     names = ["ball", "capsule", "cylinder", "rounded hull"]
-    for tolerance in (0.3, 1e-2, 1e-4):
+    for tolerance in (0.3, 1e-2, 1e-3):
         for name in names:
             bodies = [posed(rng, SHAPES[name](rng), 0.2), posed(rng, SHAPES[rng.choice(["box", "hull"])](rng), 0.2)]
             yield PlainCase(f"{name} at {tolerance}", bodies, tolerance)
@@ -250,11 +297,113 @@ def by_the_article(rng: Random) -> Iterator[PlainCase]:
         yield PlainCase(f"article, {count} bodies", several, method="paper")
 
 
+def far_off(rng: Random) -> Iterator[PlainCase]:
+    """Hulls far from their own origin, turned in place or moved back, and needles whose difference looks flat."""
+    for far in (8.0, 1e3, 1e6):
+        for name in ("turned", "moved", "both", "neither"):
+            for depth in (0.3, 1e-6, 1e-12):
+                away = sixteenths(rng, -16, 16) * far
+                points = [cloud(rng, 12) + away, cloud(rng, 12) + away]
+                turn = (*(rng.randint(-9, 9) for _ in range(3)), 9) if name in ("turned", "both") else (0, 0, 0, 1)
+                back = -away if name in ("moved", "both") else np.zeros(3)
+                bodies = [Placed(Hull(cloud), back, turn) for cloud in points]
+                yield PlainCase(f"{name}, {far:.0e} away, by {depth:.0e}", sunk(bodies, depth))
+    for name, (a, b, moved_by) in NEEDLES.items():
+        for radius in (2.0**-10, 2.0**-4):
+            needles = [Placed(RoundedHull(a, radius)), Placed(RoundedHull(b, radius), moved_by)]
+            yield PlainCase(f"needles {name}, rounded by {radius}", needles, 0.3)
+
+
+def half_spaces(rng: Random) -> Iterator[PlainCase]:
+    """Half-spaces alone, which close up, or not at all but for a box; some of them twice, some opposite."""
+    for count in (4, 5, 6, 8, 12):
+        for offset in (1.0, 1e-3, 0.0, -0.1):
+            normals = [np.array(way, float) for way in rng.sample(WAYS, count)]
+            walls = [Placed(HalfSpace(normal, offset)) for normal in normals]
+            yield PlainCase(f"{count} half-spaces at {offset} and a box", [*walls, posed(rng, SHAPES["box"](rng), 0.2)])
+            normals[:4] = [
+                np.array(way) + vector(rng, 0.2) for way in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
+            ]
+            walls = [Placed(HalfSpace(normal, offset), vector(rng, 0.01)) for normal in normals]
+            yield PlainCase(f"{count} half-spaces at {offset}", walls)
+
+
 GROUPS = {
     group.__name__: group
-    for group in (kinds, slivers, boxes, slender, many, copies, rough, fine, round_bodies, by_the_article)
+    for group in (
+        kinds,
+        slivers,
+        boxes,
+        slender,
+        many,
+        copies,
+        rough,
+        fine,
+        round_bodies,
+        by_the_article,
+        far_off,
+        half_spaces,
+    )
 }
 
 
 def plain_cases(group: str) -> list[PlainCase]:
     return list(GROUPS[group](Random(group)))
+
+
+def lattice_points(rng: Random) -> np.ndarray:
+    """Few points of few places, so that facets, edges and corners of two such hulls coincide."""
+    corners = [CUBE[i] for i in (0, 1, 2, 4)]
+    return np.array(corners + [[rng.randint(-2, 2) / 2 for _ in range(3)] for _ in range(rng.randint(0, 10))])
+
+
+# Sunk into each other by so much, or that far apart.
+SUNK = (0.1, 1e-3, 1e-5, 1e-8, 1e-11, 1e-13, 1e-14, 1e-15, 0.0, -1e-13, -1e-9, -1e-3)
+
+
+COARSE = 0.03  # so that round bodies take no longer than others
+
+
+def plain_crowds(count: int = 12) -> Iterator[PlainCase]:
+    """Several cases of each name: pairs of every two kinds, by chance and in contact, and three and more bodies."""
+    rng = Random("crowds")
+    names = list(SHAPES)
+    for i, a in enumerate(names):
+        for b in names[i:]:
+            if a == b == "half-space":
+                continue
+            for _ in range(count):
+                yield PlainCase(f"{a} and {b}", [posed(rng, SHAPES[name](rng), 0.8) for name in (a, b)], COARSE)
+            for depth in SUNK:
+                bodies = [posed(rng, SHAPES[name](rng), 0.8) for name in (a, b)]
+                yield PlainCase(f"{a} and {b} in contact", sunk(bodies, depth, rng.choice([0, 0, 1e3])), COARSE)
+    for turned in (False, True):
+        for step in (0.0, 0.5, 1.0, 2.0, 3.0):
+            for bodies in (2, 2, 3):
+                name = f"{bodies} lattice hulls{', turned' if turned else ''}, {step} apart"
+                turn = quaternion(rng) if turned else (0, 0, 0, 1)
+                for _ in range(3 * count):
+                    places = [np.array([rng.randint(-1, 1) for _ in range(3)]) * step / 2 for _ in range(bodies)]
+                    yield PlainCase(
+                        name, [Placed(Hull(lattice_points(rng) + place), (0, 0, 0), turn) for place in places]
+                    )
+    for count_of_bodies in (3, 4, 6):
+        for _ in range(3 * count):
+            several = [posed(rng, SHAPES[rng.choice(names[1:])](rng), 0.5) for _ in range(count_of_bodies)]
+            yield PlainCase(f"{count_of_bodies} bodies", [posed(rng, SHAPES["box"](rng), 0.3), *several[1:]], COARSE)
+        for depth in SUNK:
+            several = sunk(
+                [posed(rng, SHAPES[rng.choice(["box", "hull", "fine hull"])](rng), 0.8) for _ in "ab"], depth
+            )
+            several += [posed(rng, SHAPES[rng.choice(names)](rng), 0.3) for _ in range(count_of_bodies - 2)]
+            yield PlainCase(f"{count_of_bodies} bodies, two in contact", several, COARSE)
+
+
+def sunk(bodies: list[Placed], depth: float, far: float = 0.0) -> list[Placed]:
+    """A pair, the second moved so that the two are by `depth` in each other, and both far away."""
+    found = overlap(*bodies)
+    a, b = bodies
+    moved = b.position + (found.distance - found.depth + depth) * np.asarray(found.normal)
+    return [
+        Placed(body.shape, position + far, body.given_orientation) for body, position in ((a, a.position), (b, moved))
+    ]

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from plain_cases import NEEDLES
 from strategies import (
     capsules,
     directions,
@@ -247,6 +248,15 @@ def test_depth_of_hulls_far_from_their_own_origin_is_right_to_the_rounding_of_th
         assert penetration_depth(Placed(Hull(far), position, orientation), q) == pytest.approx(
             truth, abs=16 * EPS * 2.0**power
         )
+
+
+@pytest.mark.parametrize(("a", "b", "moved_by"), NEEDLES.values(), ids=NEEDLES)
+def test_depth_of_needles_is_the_exact_one_where_their_difference_looks_flat_at_first(a, b, moved_by):
+    """Whichever way EPA looks first, it sees their ends alone, which are in one plane, and no other corner."""
+    radius = 2.0**-10
+    truth = float(exact.depth_squared(exact.hull(a), exact.hull(b + moved_by))) ** 0.5 + 2 * radius
+    needles = Placed(RoundedHull(a, radius)), Placed(RoundedHull(b, radius), moved_by)
+    assert penetration_depth(*needles) == pytest.approx(truth, rel=1e-12)
 
 
 def points_of_small_polytopes(rng):
