@@ -235,9 +235,10 @@ def fine(rng: Random) -> Iterator[PlainCase]:
                     [Placed(Hull(prism(sides))), second],
                 )
     for count in (60, 200):
-        globe = ball_of_points(rng, count)
         for exponent in (0, 2, 4, 6, 8, 10, 12, 13, 14, 15, 16):
-            step = vector(rng, 10.0**-exponent)
+            size = 2.0 ** rng.choice([-8, 0, 8])
+            globe = ball_of_points(rng, count) * size
+            step = vector(rng, size * 10.0**-exponent)
             turn = (*vector(rng, 10.0**-exponent), 1)
             yield PlainCase(f"{count} corners moved by 1e-{exponent}", [Placed(Hull(globe)), Placed(Hull(globe), step)])
             yield PlainCase(
@@ -326,6 +327,9 @@ def half_spaces(rng: Random) -> Iterator[PlainCase]:
             ]
             walls = [Placed(HalfSpace(normal, offset), vector(rng, 0.01)) for normal in normals]
             yield PlainCase(f"{count} half-spaces at {offset}", walls)
+    for left_open in (WAYS[-1], (1, 0, 0), (1, 1, 0), (0, 0, 1)):
+        normals = [np.array(way) for way in WAYS if np.dot(way, left_open) <= 0]
+        yield PlainCase(f"half-spaces open towards {left_open}", [Placed(HalfSpace(normal, 1)) for normal in normals])
 
 
 GROUPS = {
@@ -383,9 +387,10 @@ def plain_crowds(count: int = 12) -> Iterator[PlainCase]:
                 name = f"{bodies} lattice hulls{', turned' if turned else ''}, {step} apart"
                 turn = quaternion(rng) if turned else (0, 0, 0, 1)
                 for _ in range(3 * count):
+                    size = 2.0 ** rng.choice([-10, 0, 0, 10])
                     places = [np.array([rng.randint(-1, 1) for _ in range(3)]) * step / 2 for _ in range(bodies)]
                     yield PlainCase(
-                        name, [Placed(Hull(lattice_points(rng) + place), (0, 0, 0), turn) for place in places]
+                        name, [Placed(Hull((lattice_points(rng) + place) * size), (0, 0, 0), turn) for place in places]
                     )
     for count_of_bodies in (3, 4, 6):
         for _ in range(3 * count):
