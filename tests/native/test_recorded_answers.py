@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from plain_cases import GROUPS, SHAPES, PlainCase, ball_of_points, cloud, plain_cases, plain_crowds, quaternion, vector
 
-from overlapper import Batch, Box, Hull, Overlap, overlap, overlaps
+from overlapper import Batch, Box, Hull, Overlap, RoundedHull, overlap, overlaps
 
 RECORDED = Path(__file__).with_name("recorded")
 # How far a measure may be off, relative to itself or in SI units, whichever is more; all else is exact.
@@ -120,6 +120,11 @@ def hulls() -> dict[str, dict[str, object]]:
             "volume": hull.volume, "centroid": as_one(hull.centroid), "bounds": as_one(hull.bounds),
             "walls": float(hull.halfspaces[:, 3].sum()), "normals": float(abs(hull.halfspaces[:, :3]).sum()),
         }  # fmt: skip
+        if len(points) < 100:
+            grown = RoundedHull(points, 0.125)
+            rows[f"{name}, rounded"] = {
+                "volume": grown.volume, "centroid": as_one(grown.centroid), "bounds": as_one(grown.bounds),
+            }  # fmt: skip
     return rows
 
 

@@ -39,6 +39,9 @@ NEEDLES = {
 }
 
 
+COARSE = 0.03  # so that round bodies take no longer than others
+
+
 class PlainCase(NamedTuple):
     name: str
     bodies: list[Placed]
@@ -286,7 +289,11 @@ def by_the_article(rng: Random) -> Iterator[PlainCase]:
     for i in range(16):
         bodies = [posed(rng, SHAPES[rng.choice(["box", "hull", "ball", "half-space"])](rng)) for _ in range(2)]
         bodies[0] = posed(rng, SHAPES["hull"](rng))
-        yield PlainCase(f"article {i}", bodies, method="paper")
+        yield PlainCase(f"article {i}", bodies, COARSE, method="paper")
+    for name in ("ball", "capsule", "cylinder", "half-space", "box"):
+        for tolerance in (0.3, 0.1, 0.05):
+            bodies = [posed(rng, SHAPES[name](rng), 0.2), posed(rng, SHAPES["hull"](rng), 0.2)]
+            yield PlainCase(f"article, {name} at {tolerance}", bodies, tolerance, "paper")
     for x, y, z in WAYS:
         bodies = [Placed(Hull(CUBE)), Placed(Hull(CUBE), np.array([x, y, z]) * 1.5)]
         yield PlainCase(f"article, cubes along {x} {y} {z}", bodies, method="paper")
@@ -309,6 +316,7 @@ def far_off(rng: Random) -> Iterator[PlainCase]:
                 back = -away if name in ("moved", "both") else np.zeros(3)
                 bodies = [Placed(Hull(cloud), back, turn) for cloud in points]
                 yield PlainCase(f"{name}, {far:.0e} away, by {depth:.0e}", sunk(bodies, depth))
+            yield PlainCase(f"{name}, {far:.0e} away, as they are", bodies)
     for name, (a, b, moved_by) in NEEDLES.items():
         for radius in (2.0**-10, 2.0**-4):
             needles = [Placed(RoundedHull(a, radius)), Placed(RoundedHull(b, radius), moved_by)]
@@ -363,9 +371,6 @@ def lattice_points(rng: Random) -> np.ndarray:
 
 # Sunk into each other by so much, or that far apart.
 SUNK = (0.1, 1e-3, 1e-5, 1e-8, 1e-11, 1e-13, 1e-14, 1e-15, 0.0, -1e-13, -1e-9, -1e-3)
-
-
-COARSE = 0.03  # so that round bodies take no longer than others
 
 
 def plain_crowds(count: int = 12) -> Iterator[PlainCase]:
