@@ -249,7 +249,7 @@ class Bodies:
         skipped = self._known.refresh(self._layout.poses.bodies)
         if arranged := skipped is not None:
             self._arrange()
-        before, self._nowhere = self._nowhere, self._layout.pose() | self._left_out.pose()
+        before, self._nowhere = self._nowhere, self._pose()
         if self._nowhere != before:
             arranged = True
             self._arrange()
@@ -280,9 +280,10 @@ class Bodies:
         self._pairs = AskedPairs(self._layout, known.links)
         self._grounds.follow(self._layout, placed)
 
-    def _pose(self) -> None:
-        self._layout.pose()
-        self._left_out.pose()
+    def _pose(self) -> set[int]:
+        """Place all bodies; those that have no finite pose."""
+        nowhere = self._layout.pose()
+        return nowhere | self._left_out.pose() if self._nowhere else nowhere
 
     def _tell_of_self_collision(self) -> None:
         """Warn, once for each, of bodies whose links pybullet keeps apart, and no recorder knows of it."""

@@ -1,5 +1,6 @@
 """The pairs that are looked at are those that pybullet makes contacts of, or those of the user's list."""
 
+import sys
 import warnings
 from types import SimpleNamespace
 
@@ -348,6 +349,31 @@ def test_only_pairs_whose_boxes_meet_are_candidates(client):
     box(client), box(client, 1, [0.5, 0, 0]), box(client, 1, [9, 0, 0])
     pairs = Bodies(client).pairs()
     assert pairs.tolist() == [[0, 1]] and pairs.dtype == np.int32
+
+
+def test_many_pair_filters_are_looked_at_in_one_go(client, recorder):
+    cubes = [box(client, position=[0.9 * x, 0, 0]) for x in range(40)]
+    bodies = Bodies(client, recorder=recorder)
+
+    def work():
+        """How many functions are called to choose pairs."""
+        calls = []
+        bodies.update()
+        sys.setprofile(lambda frame, event, argument: calls.append(event))
+        try:
+            found = bodies.pairs()
+        finally:
+            sys.setprofile(None)
+        return len(found), len(calls)
+
+    def forbid(pairs):
+        for i, j in pairs:
+            p.setCollisionFilterPair(cubes[i], cubes[j], -1, -1, 0, physicsClientId=client)
+        return work()
+
+    assert work()[0] == 39
+    (few, some), (none, many) = forbid([(0, 1)]), forbid([(i, j) for j in range(40) for i in range(j)])
+    assert (few, none) == (38, 0) and many == some
 
 
 # --- what no recorder has heard of

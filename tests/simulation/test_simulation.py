@@ -865,6 +865,19 @@ def test_bodies_whose_poses_pybullet_does_not_tell_are_placed_all_the_same(clien
     assert_modelled_as_collided(client, bodies, chains[1], 129, np.random.default_rng(1), points=2)
 
 
+@pytest.mark.parametrize("links", [130, 200])
+def test_a_body_of_many_links_costs_one_file_and_one_pass_over_its_frames(client, tmp_path, monkeypatch, links):
+    long_chain(client, tmp_path, [0, 0, 0], links)
+    bodies, calls = Bodies(client), []
+    for module, name in ((p, "saveBullet"), (np.linalg, "eigh"), (p, "getDynamicsInfo")):
+        original = getattr(module, name)
+        monkeypatch.setattr(
+            module, name, lambda *args, call=original, of=name, **named: (calls.append(of), call(*args, **named))[1]
+        )
+    bodies.update()
+    assert sorted(calls) == ["eigh", "getDynamicsInfo", "saveBullet"]
+
+
 # --- clients
 
 
