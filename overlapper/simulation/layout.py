@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Batch, _core
+from overlapper import Batch, Shape, Sphere, _core
 from overlapper.simulation.collider_poses import ColliderPoses
 from overlapper.simulation.extraction.model import BASE, Array, Body
 
@@ -44,8 +44,7 @@ class Layout:
 
     def reach(self, rows: NDArray[np.intp]) -> Array:
         """(n,) m: how far the shapes in these rows reach from their own origins; planes reach everywhere."""
-        reach = [np.abs(self.shapes[row].bounds).max(axis=0) for row in rows]
-        return np.asarray(np.linalg.norm(np.array(reach).reshape(-1, 3), axis=1))
+        return np.array([_reach(self.shapes[row]) for row in rows])
 
     def pose(self) -> set[int]:
         """Place the shapes where their colliders are now; the bodies of which one is nowhere."""
@@ -57,3 +56,9 @@ class Layout:
             return set()
         finite = np.isfinite(self.positions).all(axis=1) & np.isfinite(self.orientations).all(axis=1)
         return {*self.owners[~finite].tolist()}
+
+
+def _reach(shape: Shape) -> float:
+    if isinstance(shape, Sphere):
+        return shape.radius
+    return float(np.linalg.norm(np.abs(shape.bounds).max(axis=0)))

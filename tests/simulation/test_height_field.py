@@ -136,6 +136,20 @@ def test_ground_is_asked_for_and_arranged_only_once_a_body_has_come_some_way(cli
     assert 10 < len(asked) < 10 / 0.25 + 5
 
 
+def test_a_field_without_a_finite_pose_is_left_out_until_it_has_one(client, recorder):
+    ground = field(client, rough(41, 41), scale=[0.1, 0.1, 0.1])
+    ball(client, [0, 0, 0])
+    bodies = Bodies(client, recorder=recorder)
+    before = modelled(bodies, ground)
+    p.resetBasePositionAndOrientation(ground, [math.nan] * 3, [0, 0, 0, 1], physicsClientId=client)
+    with pytest.warns(SkippedShapeWarning, match=f"body {ground} .*no finite pose"):
+        bodies.update()
+    assert modelled(bodies, ground) == {} and bodies.overlaps() == []
+    p.resetBasePositionAndOrientation(ground, [0, 0, 0], [0, 0, 0, 1], physicsClientId=client)
+    bodies.update()
+    assert modelled(bodies, ground).keys() == before.keys() and len(link_contacts(bodies.overlaps())) == 1
+
+
 def test_another_body_on_the_ground_has_its_own_ground(client, recorder):
     ground = field(client, rough(41, 41), scale=[0.1, 0.1, 0.1])
     small = ball(client, [-1, -1, 0])

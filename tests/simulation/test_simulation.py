@@ -517,6 +517,18 @@ def test_marks_of_a_client_that_is_gone_do_no_harm(client):
     assert entries(client) == []
 
 
+def test_closing_outlives_the_server(client, monkeypatch):
+    box(client)
+    bodies = Bodies(client)
+
+    def gone(*args, **kwargs):
+        raise p.error("Not connected to physics server.")
+
+    monkeypatch.setattr(p, "removeUserData", gone)
+    bodies.close()
+    assert entries(client) == [1]
+
+
 def test_a_process_that_was_forked_off_leaves_the_marks_to_its_parent(client):
     box(client)
     bodies = Bodies(client)
@@ -950,6 +962,28 @@ def test_a_server_that_writes_elsewhere_is_an_error_of_one_sentence(client, monk
     monkeypatch.setattr(p, "saveBullet", lambda *args, **kwargs: None)
     with pytest.raises(RuntimeError, match=f"physicsClientId {client} could not hand over its shapes"):
         Bodies(client)
+
+
+def test_a_server_that_cannot_write_is_an_error_of_one_sentence(client, monkeypatch):
+    box(client)
+
+    def refuse(*args, **kwargs):
+        raise p.error("no")
+
+    monkeypatch.setattr(p, "saveBullet", refuse)
+    with pytest.raises(RuntimeError, match=f"physicsClientId {client} could not hand over its shapes") as caught:
+        Bodies(client)
+    assert isinstance(caught.value.__cause__, p.error)
+
+
+def test_no_file_is_left_behind(client, tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    box(client)
+    Bodies(client)
+    monkeypatch.setattr(p, "saveBullet", lambda *args, **kwargs: None)
+    with pytest.raises(RuntimeError, match="hand over"):
+        Bodies(client)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_missing_pybullet_is_one_clear_sentence():
