@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cfloat>
+#include <cstdint>
 #include <limits>
 #include <string>
+#include <unordered_map>
 
 #include "geometry/expanding_hull.h"
 #include "geometry/predicates.h"
@@ -259,6 +261,41 @@ std::array<int, 3> well_spread(std::span<const int> around, const std::vector<Pl
   return {around[0], second, most([&](int f) { return std::abs(dot(ab, planes[f].normal)); })};
 }
 
+/// How far corners of a facet rise above the plane of the one across its edge number `edge`, at most; 0 if none does.
+/// From either end of the edge, heights fall along the ring until they rise again towards the other end, as the ring is
+/// convex but for rounding: once they are below all that rounding may do, none beyond counts. So the ring of a large
+/// facet is not walked for each of the many around it.
+double rise_beside(const HullData& data, const Plane& across, std::span<const int> ring, size_t edge, double rounding) {
+  const size_t corners = ring.size();
+  double highest = 0;
+  const auto falls_away = [&](size_t place) {
+    const double height = signed_distance(across, data.vertices[ring[place % corners]]);
+    highest = std::max(highest, height);
+    return height < -rounding;
+  };
+  size_t walked = 0;
+  while (walked < corners && !falls_away(edge + 1 + walked)) ++walked;
+  for (size_t back = 0; back < corners && !falls_away(edge + corners - back); ++back) continue;
+  return highest;
+}
+
+/// The largest rise_beside() over all edges.
+double rise_over_edges(const HullData& data, double rounding) {
+  const auto side = [](int from, int to) { return static_cast<std::uint64_t>(from) << 32 | static_cast<unsigned>(to); };
+  std::unordered_map<std::uint64_t, int> across;
+  for (const Edge& e : data.edges) across[side(e.from, e.to)] = e.right, across[side(e.to, e.from)] = e.left;
+  double highest = 0;
+  for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
+    const auto ring = data.facet(f);
+    for (size_t i = 0; i < ring.size(); ++i) {
+      const auto found = across.find(side(ring[i], ring[(i + 1) % ring.size()]));
+      if (found != across.end())
+        highest = std::max(highest, rise_beside(data, data.planes[found->second], ring, i, rounding));
+    }
+  }
+  return highest;
+}
+
 }  // namespace
 
 void complete(HullData& data) {
@@ -270,12 +307,9 @@ void complete(HullData& data) {
       data.flatness = std::max(data.flatness, -signed_distance(data.planes[f], data.vertices[v]));
     }
   }
-  for (const Edge& e : data.edges)
-    for (const auto& [facet, beside] : {std::pair(e.left, e.right), std::pair(e.right, e.left)})
-      for (int v : data.facet(beside))
-        data.flatness = std::max(data.flatness, signed_distance(data.planes[facet], data.vertices[v]));
   for (const auto& facets : around) data.facets_meet.push_back(well_spread(facets, data.planes));
   for (Vec3 v : data.vertices) data.radius = std::max(data.radius, norm(v));
+  data.flatness = std::max(data.flatness, rise_over_edges(data, 256 * DBL_EPSILON * data.radius + 4 * data.flatness));
 }
 
 namespace {
