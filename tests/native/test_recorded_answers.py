@@ -21,7 +21,7 @@ from overlapper import Batch, Box, Hull, Overlap, RoundedHull, overlap, overlaps
 
 RECORDED = Path(__file__).with_name("recorded")
 # How far a measure may be off, relative to itself or in SI units, whichever is more; all else is exact.
-SIZES = dict.fromkeys(("volume", "area", "reach", "rim"), (1e-11, 1e-17))
+SIZES = dict.fromkeys(("volume", "area", "reach", "rim", "enclosed"), (1e-11, 1e-17))
 LENGTHS = dict.fromkeys(("depth", "distance"), (1e-10, 1e-15))
 SUMS = dict.fromkeys(
     (
@@ -80,7 +80,7 @@ def surface_of(found: Overlap) -> dict[str, object]:
         "corners": len(found.vertices), "facets": len(walls), "around": sum(map(len, found.facets)),
         "owned": int((found.owner == 0).sum()), "patches": len(found.patch),
         "patch": sum(map(len, found.patch)), "reach": float((arms * arms).sum()),
-        "skew": float(((arms @ WEIGHTS[:3]) ** 3).sum()),
+        "enclosed": float(np.linalg.det(arms[found.faces]).sum() / 6), "skew": float(((arms @ WEIGHTS[:3]) ** 3).sum()),
         "walls": float(walls[:, 3].sum()), "leaning": float(walls[:, :3] @ WEIGHTS[3:6] @ (found.owner + 1)),
         "rim": sum(float(np.sqrt(((np.roll(ring, -1, axis=0) - ring) ** 2).sum(axis=1)).sum()) for ring in found.patch),
     }  # fmt: skip
