@@ -173,6 +173,12 @@ def test_no_pairs_and_no_shapes_are_answers():
     assert len(overlaps([Sphere(1)], [[0, 0, 0]], [[0, 0, 0, 1]], [])) == 0
 
 
+@pytest.mark.parametrize("tolerance", [0, -1, 1, 2, float("nan")])
+def test_a_tolerance_is_refused_though_there_is_nothing_to_measure(tolerance):
+    with pytest.raises(ValueError, match="tolerance must be greater than 0 and less than 1"):
+        overlaps([], np.zeros((0, 3)), np.zeros((0, 4)), tolerance=tolerance)
+
+
 # The same bits
 
 
@@ -184,6 +190,23 @@ def test_the_number_of_threads_changes_no_bit(threads):
     batch = Batch(arguments[0])
     for _ in range(2):
         assert bits(batch.overlaps(*arguments[1:], tolerance=TOLERANCE, threads=threads)) == bits(alone)
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are listed on Linux only")
+@pytest.mark.parametrize("threads", [1, 3])
+def test_no_more_threads_work_than_are_asked_for(threads):
+    balls = [Sphere(1)] * 60
+    positions, pairs = np.linspace([0, 0, 0], [0.5, 0, 0], len(balls)), all_pairs(len(balls))
+    poses = positions, [[0, 0, 0, 1]] * len(balls), pairs
+    with ThreadPoolExecutor(1) as caller:
+        caller.submit(int).result()  # it has its thread
+        before = len(os.listdir("/proc/self/task"))
+        answer = caller.submit(overlaps, [*balls[1:], Cylinder(1, 1)], *poses, threads=threads)
+        most = 0
+        while not answer.done():
+            most = max(most, len(os.listdir("/proc/self/task")) - before)
+        assert len(answer.result()) == len(pairs)
+    assert most <= threads - 1
 
 
 @pytest.mark.parametrize("seed", range(3))

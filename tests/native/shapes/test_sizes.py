@@ -32,6 +32,8 @@ def test_sizes_beyond_the_limits_are_refused(name, size):
         MADE[name](size)
     with pytest.raises(ValueError, match=r"normal must be of a length between 1e-25 and 1e25"):
         HalfSpace((0, 0, size), 0.0)
+    with pytest.raises(ValueError, match="offset must be closer to the origin than 1e25 m"):
+        HalfSpace((0, 0, 1), 1e25)
     if size > 1:
         with pytest.raises(ValueError, match="position must be closer to the origin than 1e25 m"):
             Placed(Sphere(1), (0, size, 0))
