@@ -16,6 +16,8 @@ from overlapper.scenes.comparison import Move
 from overlapper.scenes.still import Still
 from overlapper.scenes.verdict import Verdict
 from overlapper.viewer import Recording
+from overlapper.viewer.page_text import filled
+from overlapper.whole_file import beside
 
 LIMIT = 3  # moves of a cause; what more there is, the terminal counts
 
@@ -26,18 +28,18 @@ def save(verdict: Verdict, name: str, path: Path) -> Path:
     before, after = (stills.get(step) for stills in (verdict.before, verdict.after))
     stills = [still for still in (_dressed(before, after), after) if still is not None and still.keys]
     sections = verdict.causes | ({"overlaps": verdict.overlaps} if verdict.overlaps else {})
+    recording = _recording(stills, verdict.expected.tolerance)
     texts = {
         "title": escape(f"{name} has moved"),
         "step": str(step),
         "verdicts": "\n".join(_section(*each) for each in sections.items()),
-        "recording": _recording(stills, verdict.expected.tolerance),
+        "recording": base64.b64encode(gzip.compress(recording, compresslevel=6, mtime=0)).decode(),
         "camera": _camera(stills),
     }
-    page = Path(__file__).with_suffix(".html").read_text(encoding="utf-8")
-    for mark, text in texts.items():
-        page = page.replace(f"{{{{{mark}}}}}", text)
+    page = filled(Path(__file__).with_suffix(".html"), texts, recording.decode())
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(page, encoding="utf-8")
+    with beside(path) as file:
+        file.write_text(page, encoding="utf-8")
     return path
 
 
@@ -48,14 +50,13 @@ def _dressed(before: Still | None, after: Still | None) -> Still | None:
     return replace(before, names=before.names | after.names, colors=before.colors | after.colors)
 
 
-def _recording(stills: Sequence[Still], tolerance: float) -> str:
-    """The frames as a page of `overlapper.viewer`, deflated and in base 64; the first at 0 s, the second at 1 s."""
+def _recording(stills: Sequence[Still], tolerance: float) -> bytes:
+    """The frames as a page of `overlapper.viewer`; the first at 0 s, the second at 1 s."""
     recording = Recording()
     for time, still in enumerate(stills):
         recording.add(still, still.contacts(tolerance), float(time))
     with tempfile.TemporaryDirectory() as folder:
-        page = recording.save(Path(folder) / "page.html").read_bytes()
-    return base64.b64encode(gzip.compress(page, compresslevel=6, mtime=0)).decode()
+        return recording.save(Path(folder) / "page.html").read_bytes()
 
 
 def _camera(stills: Sequence[Still]) -> str:

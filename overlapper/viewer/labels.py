@@ -10,6 +10,12 @@ from overlapper import Overlap, Placed
 
 ROOT = "/overlapper/bodies"
 
+# meshcat's tree and its panel look names up in objects, where these are found before any is put there; "<object>" is
+# what it calls the drawing at a node.
+INHERITED = {"__proto__", "constructor", "hasOwnProperty", "isPrototypeOf", "propertyIsEnumerable", "toLocaleString"}
+INHERITED |= {f"__{way}{kind}__" for way in ("define", "lookup") for kind in ("Getter", "Setter")}
+INHERITED |= {"toString", "valueOf", "<object>"}
+
 
 class Bodies(Protocol):
     """What is drawn: shapes in the world by (body, link, shape); the colours of the links and their distinct names."""
@@ -48,8 +54,13 @@ def link_names(bodies: Bodies) -> dict[tuple[int, int], tuple[str, str]]:
     names = {}
     for (body, link), name in bodies.names.items():
         first, _, rest = name.partition("/")
-        names[body, link] = first or str(body), rest.replace("/", ".") or str(link)
+        names[body, link] = _unlike(first or str(body)), _unlike(rest.replace("/", ".") or str(link))
     return names
+
+
+def _unlike(name: str) -> str:
+    """Quoted, where the name would be taken for something that every object of JavaScript has, or for a quoted one."""
+    return f"'{name}'" if name in INHERITED or name[:1] == name[-1:] == "'" else name
 
 
 def body_paths(bodies: Bodies) -> list[str]:

@@ -34,6 +34,7 @@ from overlapper.viewer.look import (
     boxes,
     to_draw,
 )
+from overlapper.viewer.page_text import filled, licences
 from overlapper.viewer.stage import Stage, rgb
 from overlapper.whole_file import beside
 
@@ -126,13 +127,11 @@ class Recording:
             "script": "\n".join((folder / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS),
             "meshcat": Path(VIEWER_ROOT, "main.min.js").read_text(encoding="utf-8"),
             "commands": _packed(f"[{','.join(tape.commands)}]".encode()),
+            "licences": licences(Path(VIEWER_ROOT).parent),
             "film": _packed(_film(self._heading(self._stage), self._arrays())),
         }
-        page = (folder / "recording.html").read_text(encoding="utf-8")
-        for mark, text in texts.items():
-            page = page.replace(f"{{{{{mark}}}}}", text)
         with beside(path) as file:
-            file.write_text(page, encoding="utf-8")
+            file.write_text(filled(folder / "recording.html", texts), encoding="utf-8")
         return Path(path)
 
     def _heading(self, stage: Stage) -> dict[str, Any]:

@@ -1,0 +1,49 @@
+"""The text of a page: a template that is filled, and a policy that lets it run its own scripts and load nothing."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+# Styles are set by scripts, dat.gui's among them, which a policy cannot tell from those of others.
+POLICY = (
+    "default-src 'none'; script-src {scripts}; style-src 'unsafe-inline'; img-src data: blob:; frame-src blob:; "
+    "base-uri 'none'; form-action 'none'"
+)
+
+
+def filled(template: Path, texts: Mapping[str, str], frames: str = "") -> str:
+    """The template with a text in the place of each {{mark}}, and the policy in that of {{policy}}.
+
+    What a text contains is not taken for a mark. `frames` is a page that this one opens in itself, and that is bound by
+    the policy of both.
+    """
+    page = re.sub(r"\{\{(\w+)\}\}", lambda mark: texts.get(mark[1], mark[0]), template.read_text(encoding="utf-8"))
+    hashes = dict.fromkeys(_hash(script) for text in (page, frames) for script in _scripts(text))
+    # The head is the page's own up to there.
+    return page.replace("{{policy}}", POLICY.format(scripts=" ".join(hashes) or "'none'"), 1)
+
+
+def _scripts(page: str) -> list[str]:
+    """The scripts that a browser runs; those of another type are data."""
+    return re.findall(r'<script(?: type="module")?>(.*?)</script>', page, re.DOTALL)
+
+
+def _hash(script: str) -> str:
+    # A browser has no other line ends.
+    text = script.replace("\r\n", "\n").replace("\r", "\n")
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def licences(viewer: Path) -> str:
+    """The licences of meshcat's viewer, which is in that folder, and of the libraries that are built into it."""
+    texts = [f"meshcat\n\n{(viewer / 'LICENSE').read_text(encoding='utf-8')}"]
+    for each in json.loads((viewer / "dist" / "main.min.js.THIRD_PARTY_LICENSES.json").read_text(encoding="utf-8")):
+        heading = f"{each['name']} {each['version']}, {each['license']}, {each.get('author') or each['repository']}"
+        texts.append(f"{heading}\n\n{each.get('licenseText') or ''}")
+    # A text that could end the element that holds it would do so.
+    return "\n\n".join(text.strip() for text in texts).replace("</", "< /")
