@@ -11,7 +11,7 @@ from overlapper import __version__
 from overlapper.cli.bench import chart, stability
 from overlapper.cli.check import check, diff
 from overlapper.cli.intersect import intersect
-from overlapper.cli.refusals import Refused, give_up, say
+from overlapper.cli.refusals import Interrupted, Refused, give_up, say
 from overlapper.cli.run import run
 from overlapper.cli.shapes import shapes
 from overlapper.cli.view import view
@@ -26,7 +26,7 @@ def main() -> NoReturn:
     usage_error: Any = typer.BadParameter.__bases__[0]
     try:
         sys.exit(app(sys.argv[1:] or ["--help"], prog_name="overlapper", standalone_mode=False))
-    except (typer.Abort, KeyboardInterrupt):
+    except Interrupted:
         say("overlapper: interrupted; nothing was written", sys.stderr)
         sys.exit(130)
     except Refused as error:

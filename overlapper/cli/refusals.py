@@ -21,6 +21,10 @@ class Refused(Exception):
     """What was asked for cannot be done; the message is one sentence for the person who asked."""
 
 
+class Interrupted(Exception):
+    """Ctrl-C came before there was anything to keep."""
+
+
 def say(line: str, file: TextIO | None = None) -> None:
     """Print a line, on stdout if not on `file`; what in it would command a terminal is spelled out."""
     print(printable(line), file=file or sys.stdout, flush=True)
@@ -52,6 +56,8 @@ def scene_refusals(noise: BinaryIO) -> Iterator[None]:
     """Turns what the user can mend into one sentence, to which the last line that C has printed may add the cause."""
     try:
         yield
+    except KeyboardInterrupt as error:
+        raise Interrupted from error
     except ImportError as error:
         raise Refused(str(error)) from error
     except OSError as error:

@@ -355,6 +355,94 @@ def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
     assert len(steps) - int(said[1]) in (0, 1)
 
 
+SLOW = TWO_CUBES.replace("def build(client):", "def build(client):\n    import time; time.sleep(30)")
+
+
+@pytest.mark.parametrize("command", ["run", "view"])
+def test_an_early_interruption_writes_nothing_and_says_so(tmp_path, command):
+    (tmp_path / "slow.py").write_text(SLOW.replace("import time", "print('here'); import time"))
+    (tmp_path / "old.html").write_text("of yesterday")
+    options = ["--out", "old.csv"] if command == "run" else []
+    command = [sys.executable, "-m", "overlapper", command, "slow.py", "--html", "old.html", *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "here\n"
+        process.send_signal(signal.SIGINT)
+        output, complaints = process.communicate(timeout=30)
+    assert (process.returncode, output) == (130, "")
+    assert complaints.strip() == "overlapper: interrupted; nothing was written"
+    assert (tmp_path / "old.html").read_text() == "of yesterday"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["old.html", "slow.py", "two_cubes.py"]
+
+
+def test_a_view_that_is_interrupted_writes_what_came_before(tmp_path):
+    (tmp_path / "long.py").write_text(TWO_CUBES.replace("STEPS = 8", "STEPS = 1_000_000"))
+    command = [sys.executable, "-m", "overlapper", "view", "long.py", "--html", "long.html"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "a scene may talk\n"
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=30)
+    assert (process.returncode, output) == (130, "Written: long.html\n")
+    assert (tmp_path / "long.html").stat().st_size > 100_000
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
+def test_a_scene_that_cannot_be_built_costs_no_earlier_table(tmp_path, ending):
+    (tmp_path / "bad.py").write_text("STEPS = 1\ndef build(client):\n    raise ValueError('typo')")
+    (tmp_path / f"old.{ending}").write_text("of yesterday")
+    assert refusal("run", "bad.py", "--out", f"old.{ending}").endswith("at line 3: ValueError: typo\n")
+    assert (tmp_path / f"old.{ending}").read_text() == "of yesterday"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.py", f"old.{ending}", "two_cubes.py"]
+
+
+# Beyond its limit, whatever the process writes is refused by the system, as by a disk that is full.
+FULL = TWO_CUBES.replace("STEPS = 8", "STEPS = 200").replace(
+    'assert i < STEPS, "no more"', "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, ROOM))"
+)
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite", "html"])
+@pytest.mark.parametrize("room", [0, 2500, 12_000])
+def test_a_disk_that_is_full_costs_no_earlier_file(tmp_path, ending, room):
+    (tmp_path / f"old.{ending}").write_text("of yesterday")
+    (tmp_path / "full.py").write_text(FULL.replace("ROOM", str(room)))
+    said = refusal("run", "full.py", "--html" if ending == "html" else "--out", f"old.{ending}")
+    assert said.startswith("overlapper: cannot write ") and said.count("\n") == 1
+    assert (tmp_path / f"old.{ending}").read_text() == "of yesterday"
+    kept = tmp_path / f"old.unfinished.{ending}"
+    assert ("; what came before is in" in said) == kept.exists()
+    if kept.exists():
+        steps = [row["step"] for row in read_table(kept)]
+        assert steps == list(range(1, len(steps) + 1))
+
+
+def test_names_reach_no_terminal_with_their_escapes(tmp_path):
+    link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    link += '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+    (tmp_path / "red.urdf").write_text(f'<robot name="r\x1b[31m"><link name="a\x1b[31mred">{link}</link></robot>')
+    (tmp_path / "red.py").write_text(
+        'PAIRS = "all"\nSTEPS = 1\nimport pybullet as p\n'
+        "def build(client):\n    for _ in range(2): p.loadURDF('red.urdf', physicsClientId=client)\n"
+    )
+    (tmp_path / "bad.py").write_text("STEPS = 1\ndef build(client):\n    raise ValueError('\x1b[31m')")
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "blue.py").write_text('"""In \x1b[34mblue."""')
+    for command in (
+        ["shapes", "red.urdf"],
+        ["run", "red.py", "--out", "red.csv"],
+        ["run", "bad.py"],
+        ["view", "\x1b[31m.csv"],
+        ["diff", "\x1b[31m.csv", "red.csv"],
+        ["scenes"],
+    ):
+        done = overlapper(*command)
+        assert "\x1b[3" not in done.stdout + done.stderr
+        assert "\\x1b[3" in done.stdout + done.stderr
+    assert "\x1b" not in (tmp_path / "red.csv").read_text()
+
+
 def checked(*arguments):
     """Exit code, stdout and stderr of `overlapper check`."""
     done = overlapper("check", *arguments)

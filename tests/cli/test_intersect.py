@@ -1,6 +1,7 @@
 """Mesh files, and the command for people who have polytopes and no simulator."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -122,6 +123,27 @@ def test_a_mesh_that_is_not_convex_is_named_beside_the_answer():
     done = intersect("one.stl", "bent.obj", "--json")
     assert json.loads(done.stdout)["volume"] == pytest.approx(1.0)
     assert "bent.obj is not convex: it fills 85.7% of its convex hull" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "DROP TABLE vertices",
+        "DELETE FROM vertices RETURNING polytope_id, x, y, z",
+        "VACUUM INTO 'stolen.db'",
+        "ATTACH DATABASE 'made.db' AS made",
+        "PRAGMA user_version = 7",
+        "CREATE TABLE made AS SELECT * FROM vertices",
+    ],
+)
+def test_a_query_only_reads(tmp_path, query):
+    write_polytopes("sqlite:///parts.db", [(1, CUBE), (2, CUBE)])
+    before, names = (tmp_path / "parts.db").read_bytes(), {*tmp_path.iterdir()}
+    done = intersect("sqlite:///parts.db", "--query", query)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.fullmatch(r"overlapper: the database says: .*(not authorized|authorization denied).*\n", done.stderr)
+    assert (tmp_path / "parts.db").read_bytes() == before
+    assert {*tmp_path.iterdir()} == names
 
 
 @pytest.mark.parametrize(

@@ -105,3 +105,14 @@ def test_polytopes_are_streamed(url):
 def test_what_the_database_refuses_is_an_error_of_sqlalchemy(url):
     with pytest.raises(sqlalchemy.exc.ProgrammingError, match='relation "polytopes" does not exist'):
         next(read_polytopes(url))
+
+
+@pytest.mark.parametrize(
+    "query",
+    ["DROP TABLE vertices", "SELECT 1, 0, 0, 0; DROP TABLE vertices", "SELECT 1, 0, 0, 0; COMMIT; DROP TABLE vertices"],
+)
+def test_a_query_only_reads(url, query):
+    write_polytopes(url, [(1, TETRAHEDRON)])
+    with pytest.raises(sqlalchemy.exc.SQLAlchemyError):
+        list(read_polytopes(url, query))
+    assert [id for id, _ in read_polytopes(url)] == [1]

@@ -1,11 +1,17 @@
 """What the reader finds in .bullet files is what pybullet was given."""
 
+import re
+import struct
+
 import numpy as np
 import pybullet as p
 import pybullet_data
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from overlapper.simulation.extraction import bullet_file
 from overlapper.simulation.extraction.bullet_file import BulletFile
 
 CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -189,3 +195,127 @@ def test_a_file_cut_short_is_refused(client, saved, tmp_path):
     (tmp_path / "cut.bullet").write_bytes(whole[:1000])
     with pytest.raises(ValueError, match="cut short"):
         BulletFile(tmp_path / "cut.bullet")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The bytes of a file with all kinds of shapes."""
+    client = p.connect(p.DIRECT)
+    try:
+        for shape, figures in (
+            (p.GEOM_BOX, {"halfExtents": [0.1, 0.2, 0.3]}),
+            (p.GEOM_CAPSULE, {"radius": 0.25, "height": 0.7}),
+            (p.GEOM_PLANE, {"planeNormal": [0, 3, 4]}),
+            (p.GEOM_MESH, {"vertices": CUBE.tolist()}),
+            (p.GEOM_MESH, {"vertices": CUBE.tolist(), "indices": [0, 1, 2, 1, 2, 3]}),
+        ):
+            body(client, shape, **figures)
+        compound = p.createCollisionShapeArray(
+            [p.GEOM_BOX, p.GEOM_SPHERE], halfExtents=[[1, 2, 3]] * 2, radii=[1, 1], physicsClientId=client
+        )
+        p.createMultiBody(1, compound, physicsClientId=client)
+        body(client, p.GEOM_SPHERE, radius=1, maximal=True)
+        path = tmp_path_factory.mktemp("whole") / "scene.bullet"
+        p.saveBullet(str(path), physicsClientId=client)
+    finally:
+        p.disconnect(client)
+    return path.read_bytes()
+
+
+def read_all(path):
+    """What all that is in a file is made of."""
+    file = BulletFile(path)
+    return [file.leaves(each.shape) for saved in file.bodies for each in saved.colliders.values()]
+
+
+def blocks_of(data):
+    """Where the blocks of a file begin."""
+    start = 12
+    while data[start : start + 4] != b"DNA1":
+        yield start
+        start += 24 + struct.unpack_from("<i", data, start + 4)[0]
+    yield start
+
+
+@given(st.data())
+@settings(max_examples=300)
+def test_a_mutated_file_is_read_or_refused_in_one_sentence(whole, tmp_path_factory, data):
+    changed = bytearray(whole)
+    starts = list(blocks_of(whole))
+    for _ in range(data.draw(st.integers(1, 4))):
+        # Most bytes are numbers of no importance: headings and what describes the structs are worth more.
+        at = data.draw(
+            st.one_of(
+                st.integers(0, len(whole) - 9),
+                st.builds(lambda start, off: start + off, st.sampled_from(starts), st.integers(0, 40)),
+                st.integers(starts[-1], len(whole) - 9),
+            )
+        )
+        new = data.draw(
+            st.one_of(
+                st.binary(min_size=1, max_size=8),
+                st.sampled_from([struct.pack("<i", number) for number in (-1, 0, -24, 2**31 - 1, -(2**31))]),
+                st.builds(lambda k: whole[starts[k] + 8 : starts[k] + 16], st.integers(0, len(starts) - 1)),
+            )
+        )
+        changed[at : at + len(new)] = new
+    changed = changed[: data.draw(st.one_of(st.just(len(changed)), st.integers(0, len(changed))))]
+    path = tmp_path_factory.getbasetemp() / "mutated.bullet"
+    path.write_bytes(changed)
+    words = "path is as it should be"
+    try:
+        read_all(path)
+    except ValueError as error:
+        words = str(error)
+    assert re.fullmatch(r"path [^\n]*", words)
+
+
+def test_a_block_of_negative_size_is_refused(whole, tmp_path):
+    for offset in (4, 16, 20):
+        data = bytearray(whole)
+        struct.pack_into("<i", data, 12 + offset, -24)
+        (tmp_path / "x.bullet").write_bytes(data)
+        with pytest.raises(ValueError, match=r"^path is a damaged \.bullet file: a block of it has a negative size$"):
+            read_all(tmp_path / "x.bullet")
+
+
+def test_a_block_smaller_than_its_struct_is_refused(whole, tmp_path):
+    at = next(start for start in blocks_of(whole) if whole[start : start + 4] == b"MBDY")
+    size = struct.unpack_from("<i", whole, at + 4)[0]
+    data = bytearray(whole[: at + 24] + whole[at + 24 + size - 8 :])
+    struct.pack_into("<i", data, at + 4, 8)
+    (tmp_path / "x.bullet").write_bytes(data)
+    with pytest.raises(ValueError, match=r"^path is a damaged .*: a block MBDY is smaller than its struct$"):
+        read_all(tmp_path / "x.bullet")
+
+
+def test_a_compound_that_contains_itself_is_refused(whole, tmp_path):
+    file = tmp_path / "x.bullet"
+    file.write_bytes(whole)
+    read = BulletFile(file)
+    (address,) = {
+        each.shape for saved in read.bodies for each in saved.colliders.values() if len(read.leaves(each.shape)) == 2
+    }
+    child = read._records(read._by_address[int(read._at(address)[0]["m_childShapePtr"])])[0]["m_childShape"]
+    old = struct.pack("<Q", int(child))
+    at = whole.index(old, whole.index(b"ARAY"))
+    for start in range(len(whole) - 8):  # the child's own block keeps its address
+        if whole[start : start + 8] == old and start not in [block + 8 for block in blocks_of(whole)]:
+            at = start
+    file.write_bytes(whole[:at] + struct.pack("<Q", address) + whole[at + 8 :])
+    with pytest.raises(ValueError, match=r"^path is a damaged \.bullet file"):
+        read_all(file)
+
+
+def test_shapes_made_of_each_other_without_end_are_refused(whole, tmp_path, monkeypatch):
+    monkeypatch.setattr(bullet_file, "MOST_READ", 0)
+    (tmp_path / "x.bullet").write_bytes(whole)
+    with pytest.raises(ValueError, match=r"^path is a damaged .*: its shapes are made of each other without end$"):
+        read_all(tmp_path / "x.bullet")
+
+
+def test_a_struct_with_holes_is_refused(whole, tmp_path):
+    at = whole.index(b"m_floats[4]", list(blocks_of(whole))[-1])
+    (tmp_path / "x.bullet").write_bytes(whole[:at] + b"m_floats[3]" + whole[at + 11 :])
+    with pytest.raises(ValueError, match=r"^path is a damaged \.bullet file: \w+ has holes$"):
+        read_all(tmp_path / "x.bullet")

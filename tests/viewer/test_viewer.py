@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import errno
 import gzip
 import json
+import os
 import re
 import subprocess
 import sys
@@ -529,6 +531,81 @@ def test_a_recording_without_frames_is_not_saved(tmp_path):
     with pytest.raises(ValueError, match="add at least one frame"):
         Recording().save(tmp_path / "empty.html")
     assert list(tmp_path.iterdir()) == []
+
+
+@looks
+@pytest.mark.parametrize("name", ["constructor", "__proto__", "'constructor'", "{{film}}", "<object>"])
+def test_a_name_that_means_something_to_the_page_is_a_name(browser, tmp_path, name):
+    frames = [hand_at(0.3), hand_at(0.12)]
+    for bodies in frames:
+        bodies.names |= {(1, -1): f"{name}/{name}", (2, 3): f"arm/{name}"}
+    page = opened(browser, recorded(frames, tmp_path / "page.html"))
+    assert coloured(scene(page), "orange") > 500
+    label = name if name == "{{film}}" else f"'{name}'"
+    assert f"{label} – arm.{label}" in page.ask("document.querySelector('#overlaps').innerText")
+    page.ask("document.querySelector('#tree').onclick()")
+
+
+@looks
+def test_a_page_runs_its_own_scripts_alone(browser, reach, tmp_path):
+    page = tmp_path / "page.html"
+    strange = "<script>document.title = 'strange'</script>"
+    page.write_text(reach.read_text(encoding="utf-8").replace("</body>", f"{strange}</body>"), encoding="utf-8")
+    assert opened(browser, page).ask("document.title") == "overlapper"
+    refused = "fetch('https://example.org').then(() => 'loaded', () => 'refused')"
+    assert browser.ask(refused) == "refused"
+
+
+@looks
+def test_a_page_that_was_cut_says_so(browser, reach, tmp_path):
+    text = reach.read_text(encoding="utf-8")
+    shown = "document.querySelector('#unread')?.innerText ?? ''"
+    assert opened(browser, reach).ask(shown) == ""
+    film = text.index('id="film">') + 400
+    changed = text[:film] + ("B" if text[film] == "A" else "A") + text[film + 1 :]
+    for number, broken in enumerate((text[:-100], text[: len(text) // 2], changed)):
+        page = tmp_path / f"{number}.html"
+        page.write_text(broken, encoding="utf-8")
+        browser.open(page.as_uri(), until="document.readyState === 'complete'")
+        browser.ask("new Promise(done => setTimeout(done, 300))")
+        assert "it is not whole: it was cut or changed" in browser.ask(shown)
+
+
+def test_a_page_carries_the_licences_of_what_it_contains(reach):
+    text = reach.read_text(encoding="utf-8").partition('id="licences">')[2].partition("</script>")[0]
+    for name in ("meshcat", "three 0.", "dat.gui", "msgpack-lite"):
+        assert f"\n{name}" in text
+    assert text.count("Permission is hereby granted") >= 5 and "Apache License" in text
+
+
+def test_an_earlier_page_is_whole_when_a_new_one_cannot_be_written(reach, tmp_path, monkeypatch):
+    page = tmp_path / "page.html"
+    page.write_text("earlier")
+
+    def full(self, *arguments, **options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(OSError, match="No space left"):
+        recorded([hand_at(0.12)], page)
+    assert page.read_text() == "earlier" and list(tmp_path.iterdir()) == [page]
+
+
+def test_a_live_view_is_seen_where_it_is_asked_to_be():
+    def listening(port):
+        """The addresses at which this machine answers on a port, as the kernel lists them."""
+        lines = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
+        return {at.partition(":")[0] for _, at, _, state, *_ in lines if state == "0A" and at.endswith(f":{port:04X}")}
+
+    for host, address in (("127.0.0.1", "0100007F"), ("0.0.0.0", "00000000")):
+        with Viewer(host=host) as viewer:
+            assert re.fullmatch(r"http://127\.0\.0\.1:\d+/static/", viewer.url)
+            assert listening(int(viewer.url.split(":")[2].split("/")[0])) == {address}
+            assert listening(int(viewer.visualizer.window.zmq_url.split(":")[2])) == {"0100007F"}
+    with pytest.raises(
+        ValueError, match=r"^host must be an address of this machine, not '192\.0\.2\.1': Cannot assign"
+    ):
+        Viewer(host="192.0.2.1")
 
 
 def live_paths(viewer: Viewer, command: str = "set_object") -> set[str]:

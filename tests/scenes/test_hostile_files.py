@@ -1,0 +1,160 @@
+"""Tables, expected files and shapes of which bytes are changed are read, or refused in one sentence."""
+
+import base64
+import json
+import sqlite3
+import zlib
+from contextlib import closing
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Sphere
+from overlapper.polytopes import shape_text
+from overlapper.polytopes.shape_text import shape_of, text_of
+from overlapper.scenes.comparison import compare_measures, compare_poses
+from overlapper.scenes.expected import DRIFT, ROUNDING, Expected, read_expected
+from overlapper.scenes.still import Still
+from overlapper.scenes.table import COLUMNS, POSE
+from overlapper.scenes.table_file import TABLES, read_metadata, read_table
+
+CORNERS = np.random.default_rng(0).normal(size=(12, 3))
+SHAPES = [Box([1, 2, 3]), Sphere(1), Capsule(1, 2), Cylinder(1, 2), HalfSpace([0, 0, 1], 0), Hull(CORNERS)]
+SHAPES.append(RoundedHull(CORNERS, 0.1))
+
+
+def rows():
+    """Two steps of two pairs and a shape alone."""
+    table = []
+    for step in (1, 2):
+        for other in (1, 2):
+            row = dict.fromkeys(COLUMNS) | {"step": step, "time_s": step / 240, "status": "overlapping"}
+            row |= {"bodyA": 0, "linkA": -1, "shapeA": 0, "bodyB": other, "linkB": -1, "shapeB": 0}
+            row |= dict.fromkeys([part.format(side) for side in "AB" for part in POSE], 0.5)
+            table.append(row | {"volume_m3": 0.5, "volume_error_m3": 1e-12, "nameA": 'a "b", c', "nameB": "#"})
+    return table
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The bytes of a table of each kind, and of an expected file."""
+    folder = tmp_path_factory.mktemp("written")
+    for ending, kind in TABLES.items():
+        table = kind(folder / f"t{ending}", {"tolerance": "0.001"})
+        table.write(rows())
+        table.close()
+    shapes = dict(zip([(body, -1, 0) for body in range(3)], [SHAPES[0], SHAPES[1], SHAPES[5]]))
+    expected = Expected([1, 2], 1e-3, ROUNDING | DRIFT, rows(), {1: shapes, 2: shapes})
+    expected.write(folder / "expected.csv", {})
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def mutated(data, whole):
+    """Some bytes changed, put in or taken out; maybe without the line that would tell."""
+    changed = bytearray(whole)
+    if data.draw(st.booleans()) and b"# rows" in changed:
+        start = changed.index(b"# rows")
+        del changed[start : changed.index(b"\n", start) + 1]
+    pieces = st.one_of(
+        st.binary(max_size=8),
+        st.sampled_from([b"\n", b",", b'"', b"#", b"9" * 30, b"nan", b"-1", b"1e999", b"\0", b"\xff", b"# shapes "]),
+    )
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(changed)))
+        changed[at : at + data.draw(st.integers(0, 8))] = data.draw(pieces)
+    return bytes(changed[: data.draw(st.one_of(st.just(len(changed)), st.integers(0, len(changed))))])
+
+
+def said_by(read):
+    """The one sentence of a refusal; any other error is one of the test."""
+    try:
+        read()
+    except ValueError as error:
+        return str(error) or "nothing"
+    return ""
+
+
+@pytest.mark.parametrize("ending", sorted(TABLES))
+@given(data=st.data())
+@settings(max_examples=200)
+def test_a_mutated_table_is_read_or_refused_in_one_sentence(written, tmp_path_factory, ending, data):
+    path = tmp_path_factory.getbasetemp() / f"mutated{ending}"
+    path.write_bytes(mutated(data, written[f"t{ending}"]))
+
+    def read():
+        read_metadata(path)
+        table = read_table(path)
+        compare_measures(table, rows(), ROUNDING)
+        compare_poses(rows(), table, DRIFT)
+
+    said = said_by(read)
+    assert said == "" or (said.startswith(str(path)) and "\n" not in said)
+
+
+@given(data=st.data())
+@settings(max_examples=300)
+def test_a_mutated_expected_file_is_read_or_refused_in_one_sentence(written, tmp_path_factory, data):
+    path = tmp_path_factory.getbasetemp() / "mutated_expected.csv"
+    path.write_bytes(mutated(data, written["expected.csv"]))
+
+    def read():
+        expected = read_expected(path)
+        for step, recorded in expected.rows_by_step():
+            Still.recorded(recorded, expected.shapes[step])
+
+    said = said_by(read)
+    assert said == "" or (said.startswith(str(path)) and "\n" not in said)
+
+
+@given(data=st.data())
+@settings(max_examples=300)
+def test_a_mutated_shape_is_read_or_refused_in_one_sentence(data):
+    text = mutated(data, text_of(data.draw(st.sampled_from(SHAPES))).encode()).decode(errors="replace")
+    said = said_by(lambda: shape_of(text))
+    assert said == "" or (" is no shape: " in said and "\n" not in said)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("[" * 100_000, "maximum recursion depth exceeded"),
+        (
+            json.dumps(["Hull", base64.b64encode(zlib.compress(bytes(60_000_000))).decode()]),
+            "its vertices are cut, or more",
+        ),
+        (
+            json.dumps(["Hull", base64.b64encode(zlib.compress(CORNERS.tobytes())[:-9]).decode()]),
+            "its vertices are cut",
+        ),
+        ('["Sphere", 1, 2, 3]', "__init__"),
+        ('[["Sphere"], 1]', "unhashable"),
+        ("[]", "not enough values"),
+        ('["Sphere", 1e999]', "radius"),
+    ],
+)
+def test_what_is_no_shape_is_told_in_a_sentence(text, reason):
+    with pytest.raises(ValueError, match=reason) as refusal:
+        shape_of(text)
+    assert "\n" not in str(refusal.value) and len(str(refusal.value)) < 300
+    assert shape_text.LARGEST < 60_000_000
+
+
+def test_pages_of_a_database_that_meet_again_are_refused(written, tmp_path):
+    path = tmp_path / "t.sqlite"
+    path.write_bytes(written["t.sqlite"])
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.executemany(
+            f"INSERT INTO overlaps VALUES ({', '.join('?' * len(COLUMNS))})",
+            [list(row.values()) for row in rows()] * 60,
+        )
+        (page,) = connection.execute("PRAGMA page_size").fetchone()
+        (root,) = connection.execute("SELECT rootpage FROM sqlite_master WHERE name = 'overlaps'").fetchone()
+    data = bytearray(path.read_bytes())
+    start = page * (root - 1)
+    assert data[start] == 5  # an inner page, of which the last child becomes the page itself
+    data[start + 8 : start + 12] = root.to_bytes(4, "big")
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match=r"t\.sqlite is not a table of overlaps: .*"):
+        read_table(path)
