@@ -267,7 +267,7 @@ class ParquetTable:
             self._begun.unlink(missing_ok=True)
             self.leave()
             raise
-        shutil.rmtree(self._folder)
+        shutil.rmtree(self._folder, ignore_errors=True)  # all of it is in the table
 
     def leave(self) -> Path | None:
         if self._empty:
