@@ -247,7 +247,7 @@ Measures by_formula() {
   return m;
 }
 
-/// Where a pull acts in the world, and the positions about which those of the bodies are counted.
+/// Of a pull and of its opposite, both of which act at `where`, each about the position of its body.
 std::array<Pull, 2> opposite_pulls(Vec3 force_on_first, Vec3 where, const std::array<Vec3, 2>& positions) {
   return {about({force_on_first, {}}, where, positions[0]), about({-force_on_first, {}}, where, positions[1])};
 }
@@ -264,15 +264,15 @@ std::optional<Measures> cut_by_plane(const Revolved& body, const Plane& plane, i
   const Vec3 sideways = cosine > 0 ? across / cosine : any_orthogonal(axis);
   const Part part = below(body, sine, cosine, -signed_distance(plane, body.centre));
   if (!(part.volume > 0)) return std::nullopt;
-  const auto to_world = [&](Vec3 p) { return reference + (body.centre + (p.x * axis + p.y * sideways)); };
+  const auto placed = [&](Vec3 p) { return body.centre + (p.x * axis + p.y * sideways); };
   Measures q = by_formula();
   q.facets_touched = part.flat_area > 0 ? 1 : 0;
   q.volume = part.volume;
   q.area = part.flat_area + part.curved_area;
-  q.centroid = to_world(part.moment / part.volume);
+  q.centroid = reference + placed(part.moment / part.volume);
   q.volume_error = rounding * q.area + kSummation * part.scale + kSummation * part.volume;
   if (part.flat_area > 0) {
-    const Vec3 where = to_world(part.flat_moment / part.flat_area);
+    const Vec3 where = placed(part.flat_moment / part.flat_area);
     // The area vectors of a closed surface sum to zero, and so do their moments.
     const Vec3 on_other = part.flat_area * plane.normal;
     q.pulls = opposite_pulls(self == 0 ? -on_other : on_other, where, positions);
@@ -370,7 +370,7 @@ std::optional<Measures> lens(Vec3 a, double ra, Vec3 b, double rb, double roundi
   q.centroid = reference + (circle + moment / q.volume);
   q.volume_error = rounding * q.area + kSummation * q.volume;
   const double disc = std::max(cap_a.flat_area, cap_b.flat_area);
-  if (disc > 0) q.pulls = opposite_pulls(disc * towards, reference + circle, positions);
+  if (disc > 0) q.pulls = opposite_pulls(disc * towards, circle, positions);
   return q;
 }
 
@@ -397,7 +397,7 @@ std::optional<Measures> lens_of_ends(const Revolved& a, const Revolved& b, doubl
 
 std::optional<Measures> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference) {
   const std::optional<Revolved> smooth_a = revolved(a), smooth_b = revolved(b);
-  const std::array<Vec3, 2> positions{a.position, b.position};
+  const std::array<Vec3, 2> positions{a.position - reference, b.position - reference};
   if (smooth_a && smooth_b) {
     if (!smooth_a->round || !smooth_b->round) return std::nullopt;
     return lens_of_ends(*smooth_a, *smooth_b, rounding, reference, positions);

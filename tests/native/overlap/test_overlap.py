@@ -761,3 +761,34 @@ def test_corners_of_facets_at_small_angles_lie_in_their_planes():
     found = overlap(Box([1, 1, 1]), np.array([*points, [-11, 17, 41]]) / 64)
     for facet, (*normal, offset) in zip(found.facets, found.halfspaces):
         assert_allclose(found.vertices[facet] @ normal, -offset, atol=1e-14)
+
+
+@pytest.mark.parametrize("far", [2.0**20, 2.0**30])
+@pytest.mark.parametrize(
+    ("shapes", "way"),
+    [
+        ([Box([1, 1, 1]), Box([1, 0.5, 1])], "clipping"),
+        ([Box([1, 1, 1]), Box([1, 0.5, 1]), Box([0.5, 1, 1])], "clipping"),
+        ([Box([1, 1, 1]), Sphere(0.4)], "closed form"),
+        ([Box([1, 1, 1]), Cylinder(0.75, 1)], "dual hull"),
+    ],
+)
+def test_gradients_are_as_good_far_from_the_origin_as_near(shapes, way, far):
+    scale, turn = 2.0**-10, (0.1, 0.2, 0.3, 0.9)
+    small = [
+        Box(scale * each.half_extents)
+        if isinstance(each, Box)
+        else Sphere(scale * each.radius)
+        if isinstance(each, Sphere)
+        else Cylinder(scale * each.radius, scale * each.length)
+        for each in shapes
+    ]
+    steps = scale * np.array([[0, 0, 0], [1.25, 0.25, 0.5], [0.5, 0.25, -0.25]])
+
+    def found(at):
+        return overlap(*(Placed(each, at + step, turn) for each, step in zip(small, steps)))
+
+    near = found(np.zeros(3))
+    assert near.way == way
+    off = np.abs(found(np.full(3, far)).gradient - near.gradient).max(axis=0) / np.abs(near.gradient).max(axis=0)
+    assert off.max() < 1e-11

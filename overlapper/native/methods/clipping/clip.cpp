@@ -347,9 +347,12 @@ std::optional<Measures> clip(std::span<const Placed> bodies) {
   if (!measure(w, sums, middle, rounded, least_slack, *common) || !common->measured) return std::nullopt;
   common->pulls_of_group.resize(bodies.size());
   add_pulls(w, first.pose, common->centroid - middle, common->pulls_of_group);
-  common->centroid = first.pose * common->centroid;
-  for (size_t i = 0; i < bodies.size(); ++i)
-    common->pulls_of_group[i] = about(common->pulls_of_group[i], common->centroid, bodies[i].position);
+  const Vec3 centroid = first.pose.rotation * common->centroid;
+  common->centroid = centroid + first.pose.translation;
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    const Vec3 lever = centroid + (first.pose.translation - bodies[i].position);
+    common->pulls_of_group[i] = about(common->pulls_of_group[i], lever, {});
+  }
   return common;
 }
 

@@ -228,10 +228,10 @@ MeasuresAndInertia measure(const Region& region, std::span<const Placed> bodies)
     const Region::Facet& facet = region.facets[f];
     const double area = 3 * scale * in_frame.cone_volume[f] / facet.slack;
     m.area += area;
-    const Vec3 force = area * facet.normal, at = region.to_world(in_frame.facet_centroid[f]);
+    const Vec3 force = area * facet.normal, at = region.frame.origin + axes * in_frame.facet_centroid[f];
     Pull& pull = bodies.size() > 2 ? m.pulls_of_group[facet.owner] : m.pulls[facet.owner];
     pull.force += force;
-    pull.moment += cross(at - bodies[facet.owner].position, force);
+    pull.moment += cross(at + (region.reference - bodies[facet.owner].position), force);
     moved += area * facet.rounding;
     farthest = std::max(farthest, facet.rounding);
     least_slack = std::min(least_slack, facet.slack);
