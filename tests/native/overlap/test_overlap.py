@@ -769,7 +769,7 @@ def test_corners_of_facets_at_small_angles_lie_in_their_planes():
     [
         ([Box([1, 1, 1]), Box([1, 0.5, 1])], "clipping"),
         ([Box([1, 1, 1]), Box([1, 0.5, 1]), Box([0.5, 1, 1])], "clipping"),
-        ([Box([1, 1, 1]), Sphere(0.4)], "closed form"),
+        ([Sphere(1), Sphere(0.75)], "closed form"),
         ([Box([1, 1, 1]), Cylinder(0.75, 1)], "dual hull"),
     ],
 )
