@@ -41,6 +41,14 @@ def test_sizes_beyond_the_limits_are_refused(name, size):
             Capsule(1, size)
 
 
+@pytest.mark.parametrize("way", np.vstack([np.eye(3), -np.eye(3)]))
+def test_a_hull_beyond_the_limits_on_one_side_and_one_just_as_small_as_them_are_refused(way):
+    with pytest.raises(ValueError, match="vertices must be closer to the origin than 1e25 m"):
+        Hull(CORNERS + 2e25 * way)
+    with pytest.raises(ValueError, match="vertices must span more than 1e-25 m"):
+        Hull(np.clip(CORNERS, 0, 1) * way.sum() * 1e-25)
+
+
 @pytest.mark.parametrize("size", ENDS)
 @pytest.mark.parametrize(("one", "other"), [*combinations_with_replacement(list(MADE)[:-1], 2)])
 def test_bodies_at_either_end_of_the_limits_have_a_finite_bound(one, other, size):
