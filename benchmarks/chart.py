@@ -5,8 +5,8 @@
     python benchmarks/chart.py --family "box deep"   one family alone
 
 Writes DIR/speed.csv (a line for each family, method and setting), DIR/claims.csv (what the article claims) and what
-benchmarks/speed_page.py makes of them. Every answer is compared with the exact truth: a peer that is wrong is shown as
-wrong; if this package is, the run ends there.
+benchmarks/speed/speed_page.py makes of them. Every answer is compared with the exact truth: a peer that is wrong is
+shown as wrong; if this package is, the run ends there.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-sys.path[:0] = [str(HERE), str(ROOT / "tests" / "support")]
+sys.path[:0] = [str(HERE), str(HERE / "speed"), str(HERE / "paper"), str(ROOT / "tests" / "support")]
 
 try:
     from interleaved import Row, Wrong, quiet, rows_of

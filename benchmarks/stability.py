@@ -21,7 +21,7 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-sys.path[:0] = [str(HERE), str(ROOT / "tests" / "support")]
+sys.path[:0] = [str(HERE), str(HERE / "paper"), str(ROOT / "tests" / "support")]
 
 try:
     import exact
