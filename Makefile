@@ -7,10 +7,11 @@ FUZZ := -max_total_time=60
 MUTANTS := --seed 0 --count 200
 NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
 # Shares in percent that tests are to reach: of the lines and branches of Python, and of the lines of the core.
-LEAST_OF_PYTHON := 90
-LEAST_OF_CORE := 91
-# The core as it is counted, and tests that hold a build with counters for one that leaks or is the released one.
+LEAST_OF_PYTHON := 92
+LEAST_OF_CORE := 90
+# The core as it is counted, by which tests, and those that hold a build with counters for one that leaks or is released.
 COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
+COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_out_of_memory python/test_stub
 
 .PHONY: help run test record coverage coverage-python coverage-core mutants fuzz lint format hooks ci clean
@@ -29,16 +30,16 @@ record: $(VENV)/dev ## write anew what is expected of the scenes and recorded of
 
 coverage: coverage-python coverage-core ## report what the tests reach of Python and of the core
 
+# Processes that tests start are not counted: one that is interrupted while it counts may wait for itself for ever.
 coverage-python: $(VENV)/dev ## pass all tests, report the branches of Python that they reach
-	@$(VENV)/bin/python -m coverage erase
-	@$(MAKE) --no-print-directory test PYTEST="$(VENV)/bin/python -m coverage run -m pytest"
-	@$(VENV)/bin/python -m coverage combine --quiet
-	@$(VENV)/bin/python -m coverage report --fail-under=$(LEAST_OF_PYTHON)
+	@$(MAKE) --no-print-directory test PYTEST="$(PYTEST) --cov --cov-report=term-missing:skip-covered \
+	  --cov-fail-under=$(LEAST_OF_PYTHON)"
 
 # Counts of the run before would be added to, and what a killed process leaves half written is not worth a failure.
 coverage-core: build/coverage/dev ## report the lines of the core that its own tests reach
 	@find build/coverage/native -name '*.gcda' -delete
-	@build/coverage/venv/bin/python -m pytest --numprocesses=auto --quiet $(UNCOUNTED:%=--ignore=tests/native/%.py) tests/native
+	@build/coverage/venv/bin/python -m pytest --numprocesses=auto --quiet $(UNCOUNTED:%=--ignore=tests/native/%.py) \
+	  $(COUNTING)
 	@$(VENV)/bin/python -m gcovr --root overlapper/native --exclude-throw-branches --gcov-ignore-parse-errors=all \
 	  --object-directory $(COUNTED) $(COUNTED) --fail-under-line=$(LEAST_OF_CORE)
 
