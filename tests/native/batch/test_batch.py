@@ -405,3 +405,9 @@ def test_half_spaces_that_overlap_without_bound_are_a_value_error():
     with pytest.raises(ValueError, match="shapes must have a bounded common set"):
         overlaps([ground, HalfSpace([1, 0, 0], 0)], *POSES, [[0, 1]])
     assert len(overlaps([ground, HalfSpace([1, 0, 0], 0)], *POSES)) == 0
+
+
+def test_boxes_that_touch_but_for_rounding_are_a_pair():
+    cube, beside = Box([1, 1, 1]), np.nextafter(2.0, 3.0)
+    assert overlap(cube, Placed(cube, (beside, 0, 0))).status == "touching"
+    assert len(overlaps([cube, cube], [[0, 0, 0], [beside, 0, 0]], [[0, 0, 0, 1]] * 2)) == 1

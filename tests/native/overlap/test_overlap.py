@@ -793,3 +793,10 @@ def test_gradients_are_as_good_far_from_the_origin_as_near(shapes, way, far):
     off = np.abs(found(np.full(3, far)).gradient - near.gradient).max(axis=0) / np.abs(near.gradient).max()
     assert off[:3].max() < 1e-11
     assert off[3:].max() < 1e-11 * scale
+
+
+def test_a_capsule_of_length_0_shares_what_a_ball_shares():
+    box, turn = Box([0.5, 0.5, 0.5]), (0.1, 0.2, 0.3, 0.9)
+    for position in [(0.7, 0.6, 0.8), (0.9, 0.2, 0.1)]:
+        capsule, ball = (overlap(box, Placed(each, position, turn)) for each in (Capsule(0.5, 0), Sphere(0.5)))
+        assert abs(capsule.volume - ball.volume) <= capsule.volume_error + ball.volume_error < 3e-3 * ball.volume
