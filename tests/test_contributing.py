@@ -2,7 +2,7 @@
 
 import re
 import subprocess
-import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -67,8 +67,5 @@ def test_hooks_have_the_formatters_of_the_environment():
 
 @pytest.mark.parametrize("tool", ["ruff", "clang-format"])
 def test_the_formatters_here_are_the_pinned_ones(tool):
-    said = subprocess.run(
-        [Path(sys.executable).with_name(tool), "--version"], capture_output=True, text=True, check=True
-    )
     version = re.search(rf'"{tool}==([\d.]+)"', (ROOT / "pyproject.toml").read_text())[1]
-    assert version in said.stdout
+    assert metadata.version(tool) == version
