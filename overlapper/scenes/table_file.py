@@ -34,7 +34,8 @@ NEEDED = ["step", "status"]
 NEEDED += [f"{word}{side}" for side in "AB" for word in ("body", "link", "shape")]
 NEEDED += [part.format(side) for side in "AB" for part in POSE]
 
-# Rows of a Parquet file for each of its bytes, beyond which it is no table: of what rests, 50,000 rows are 9 kB.
+# Rows of a Parquet file for each of its bytes, beyond which its count of rows is not believed: a small file must not
+# make a reader ask for the memory of millions of rows.
 DENSEST = 64
 
 
