@@ -165,6 +165,29 @@ def centroid_is_as_right_as_its_conditioning(case: Case, found: Overlap) -> str:
     return "" if beyond <= allowed else f"the centroid is off by {beyond:.2g} of the size, not {allowed:.2g}"
 
 
+def depth_and_distance_are_right_to_nine_digits(case: Case, found: Overlap) -> str:
+    if not has_exact_way_out(case):
+        return ""
+    if found and not nearly(found.depth, exact.depth_squared(*case.solids)):
+        return f"the depth is {found.depth}, exactly {float(exact.depth_squared(*case.solids)) ** 0.5}"
+    if found.status == "separated" and not nearly(found.distance, exact.distance_squared(*case.solids)):
+        return f"the distance is {found.distance}, exactly {float(exact.distance_squared(*case.solids)) ** 0.5}"
+    return ""
+
+
+def has_exact_way_out(case: Case) -> bool:
+    """Of two solids that are not too large for all facets of their difference."""
+    return (
+        not case.round
+        and len(case.solids) == len(case.bodies) == 2
+        and np.prod([len(solid.vertices) for solid in case.solids]) < 400
+    )
+
+
+def nearly(length: float, square: Fraction) -> bool:
+    return abs(Fraction(length) ** 2 - square) <= 2e-9 * square
+
+
 def measured(case: Case, found: Overlap) -> bool:
     return bool(found) and not case.round and case.truth.dimension == 3
 
@@ -276,6 +299,7 @@ UNPROVED: tuple[Rule, ...] = (
     volume_is_as_right_as_its_conditioning,
     volume_of_hulls_is_right_to_twelve_digits,
     centroid_is_as_right_as_its_conditioning,
+    depth_and_distance_are_right_to_nine_digits,
     the_order_of_bodies_keeps_the_status,
     the_order_of_bodies_keeps_every_bit,
     a_power_of_two_scales_every_bit,

@@ -237,6 +237,8 @@ void check_contact(const Overlap& overlap) {
   const Placed &a = overlap.bodies()[0], &b = overlap.bodies()[1];
   require(std::abs(norm(c.normal) - 1) < 1e-12, "the normal has length one");
   require(sound(c.depth) && sound(c.distance), "depth and distance are finite and not negative");
+  const ContactErrors& e = overlap.contact_errors();
+  require(sound(e.depth) && sound(e.distance) && sound(e.witnesses), "errors are finite and not negative");
   if (overlap.status() == Status::kOverlapping) return;
   require(finite(c.witness_a) && finite(c.witness_b), "the witness points are finite");
   require(finite(c.separating.normal) && std::isfinite(c.separating.offset), "the separating plane is finite");

@@ -7,7 +7,9 @@
 #include "distance/gjk.h"
 #include "distance/penetration.h"
 #include "distance/wide_gap.h"
+#include "distance/wide_parting.h"
 #include "geometry/rounding.h"
+#include "geometry/thresholds.h"
 #include "shapes/canonical_order.h"
 
 namespace overlapper {
@@ -25,6 +27,21 @@ Penetration parting(const Arrangement& at, std::vector<Vec3> normals, const Wide
     if (depth < least.depth) least = {depth, normal};
   }
   return least;
+}
+
+double up(double x) { return std::nextafter(x, std::numeric_limits<double>::infinity()); }
+
+bool rim(const Placed& body) { return std::holds_alternative<Cylinder>(body.shape); }
+
+/// True if doubles leave more of the depth in doubt than kClear.
+bool in_doubt(double depth, const Placed& a, const Placed& b) {
+  const double between = radius(a.shape) + radius(b.shape) + norm(a.pose.translation - b.pose.translation);
+  return rounding(reach(a, reach(b, between))) > kClear * depth;
+}
+
+Penetration parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint) {
+  const WideParting way = wide_parting(WideBody(a, wide(reference)), WideBody(b, wide(reference)), hint);
+  return {way.depth, way.normal};
 }
 
 Distance wide_distance(const Arrangement& at, double reach) {
@@ -51,6 +68,7 @@ Penetration penetration_in_order(const Placed& a, const Placed& b) {
   const Placed &first = swapped ? b : a, &second = swapped ? a : b;
   const Vec3 reference = first.pose.translation;
   Penetration p = penetration(first.seen_from(reference), second.seen_from(reference));
+  if (in_doubt(p.depth, first, second)) p = parting(first, second, reference, p.normal);
   if (swapped) p.normal = reversed(p.normal);
   return p;
 }
@@ -61,13 +79,17 @@ Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, const
   Contact contact;
   if (status == Status::kOverlapping) {
     Penetration p = penetration(a, b);
-    if (wide_ball || p.depth <= doubt(reach())) p = parting(at, {p.normal}, wide_ball);
+    if (rim(a) || rim(b)) {
+      if (wide_ball || p.depth <= doubt(reach())) p = parting(at, {p.normal}, wide_ball);
+    } else if (wide_ball || in_doubt(p.depth, a, b)) {
+      p = parting(a, b, at.reference, p.normal);
+    }
     contact.depth = p.depth;
     contact.normal = p.normal;
   } else {
     Distance d = distance(a, b);
     const double size = reach();
-    if (!(d.gap > doubt(size)) && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(at, size);
+    if (rounding(size) > kClear * d.gap && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(at, size);
     contact.normal = d.normal;
     // Where the bodies touch, which method "paper" may call apart, the line between the witness points may be all
     // rounding; the way out is not.
@@ -84,6 +106,37 @@ Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, const
     std::swap(contact.witness_a, contact.witness_b);
   }
   return contact;
+}
+
+namespace {
+
+/// Greatest of how far a number may be off that is known to lie between two others.
+double off(double stated, double lower, double upper) {
+  const double most = std::max(stated - lower, upper - stated);
+  return most > 0 ? up(most) : 0;
+}
+
+/// m: no farther a point is outside of a body.
+double outside(const Placed& body, Vec3 point) {
+  const WideBody wide_body(body, wide(point));
+  const WideBody at_point({Sphere{0}, point, {}, {{}, point}}, wide(point));
+  const double lost = 0x1p-94 * wide_body.reach();
+  return std::max(0.0, wide_gap(at_point, wide_body, lost).distance) + lost;
+}
+
+}  // namespace
+
+ContactErrors errors_of(const Contact& contact, const Placed& a, const Placed& b, Status status) {
+  const Vec3 reference = a.pose.translation;
+  const WideParting way = wide_parting(WideBody(a, wide(reference)), WideBody(b, wide(reference)), contact.normal);
+  ContactErrors errors;
+  errors.depth = off(contact.depth, std::max(0.0, way.lower), std::max(0.0, way.upper));
+  errors.distance = off(contact.distance, std::max(0.0, -way.upper), std::max(0.0, -way.lower));
+  if (status == Status::kOverlapping) return errors;
+  const double between = norm(rounded(wide_difference(contact.witness_a, contact.witness_b)));
+  errors.witnesses = up(std::max(outside(a, contact.witness_a), outside(b, contact.witness_b)) +
+                        std::max(0.0, between * (1 + 0x1p-50) - std::max(0.0, -way.upper)));
+  return errors;
 }
 
 }  // namespace overlapper

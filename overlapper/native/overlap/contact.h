@@ -22,4 +22,14 @@ Penetration penetration_in_order(const Placed& a, const Placed& b);
 /// The contact of a pair of which more is in doubt. Method "paper" may call apart what is not, and does not search.
 Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, const WideBall* wide_ball);
 
+/// How far the figures of a contact may be off, in m.
+struct ContactErrors {
+  double depth = 0, distance = 0;
+  /// Neither witness is farther outside of its body, nor are the two farther apart than the bodies: both together.
+  double witnesses = 0;
+};
+
+/// Bounds from double-doubles, whatever way the contact came; `a` and `b` are the bodies as given.
+ContactErrors errors_of(const Contact& contact, const Placed& a, const Placed& b, Status status);
+
 }  // namespace overlapper

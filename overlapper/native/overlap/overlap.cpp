@@ -167,4 +167,9 @@ const Contact& Overlap::contact() const {
   });
 }
 
+const ContactErrors& Overlap::contact_errors() const {
+  assert(pair());
+  return lazy().contact_errors.get([this] { return errors_of(contact(), two_[0], two_[1], status_); });
+}
+
 }  // namespace overlapper

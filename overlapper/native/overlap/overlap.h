@@ -63,6 +63,7 @@ class Overlap {
 
   /// The contact of a pair; not for more bodies.
   const Contact& contact() const;
+  const ContactErrors& contact_errors() const;
 
  private:
   bool traced() const { return at_once_ && at_once_->way == Way::kTracing; }
@@ -75,6 +76,7 @@ class Overlap {
     Once<MeasuresAndInertia> in_full;
     Once<Boundary> boundary;
     Once<Contact> contact;
+    Once<ContactErrors> contact_errors;
     Once<double> error_of_paper;
   };
 

@@ -104,6 +104,7 @@ WidePlane tightest(const Cylinder& c, const WideVector& p) {
 WideBody::WideBody(const Placed& body, const WideVector& about)
     : shape(body.shape), rotation_(wide_rotation(body.orientation)), translation_(wide(body.position) - about) {
   const HullData* hull = polytope_of(shape);
+  reach_ = norm(rounded(translation_)) + radius(shape) + (hull ? norm(hull->origin) : 0);
   if (!hull) return;
   translation_ = translation_ + rotation_ * wide(hull->origin);
   for (const auto& [i, j, k] : hull->triangles) {

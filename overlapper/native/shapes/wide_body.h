@@ -30,6 +30,13 @@ class WideBody {
   WideVector core_support(const WideVector& direction) const;
   WideVector position() const { return translation_; }
 
+  /// A point and a direction of the body's own coordinates, for hulls those about HullData::origin.
+  WideVector placed(const WideVector& point) const { return rotation_ * point + translation_; }
+  WideVector turned(const WideVector& direction) const { return rotation_ * direction; }
+
+  /// How large the numbers are that its points are computed from: what an operation loses is measured by that.
+  double reach() const { return reach_; }
+
   /// All planes of a polytope, of each triangle of its hull; for a smooth shape a few tangent planes that bound it.
   void append_planes(std::vector<WidePlane>& planes) const;
 
@@ -51,6 +58,7 @@ class WideBody {
 
   WideMatrix rotation_;
   WideVector translation_;
+  double reach_;
   std::vector<Glance> glances_;  ///< per triangle of a hull
 };
 

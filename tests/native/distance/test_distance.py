@@ -250,6 +250,24 @@ def test_depth_of_hulls_far_from_their_own_origin_is_right_to_the_rounding_of_th
         )
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_depth_of_a_tiny_body_in_a_huge_one_is_as_right_as_the_tiny_one(seed):
+    """At a corner, an edge or a face of a box up to 1e17 times as large, turned, so that its planes hold no doubles."""
+    rng = np.random.default_rng(seed)
+    half, orientation, tilt = 10 ** rng.uniform(2, 8) * rng.uniform(0.3, 1, 3), quaternion(rng), quaternion(rng)
+    side = rng.choice([-1.0, 1.0, rng.uniform(-1, 1)], 3)
+    side[int(rng.integers(3))] = rng.choice([-1.0, 1.0])
+    size = 10 ** rng.uniform(-8, -3)
+    points = hull_points(rng, 8, size)
+    at = np.array(exact.placed([side * half], (0, 0, 0), orientation)[0], float) + size * directions(rng, 1)[0] / 4
+    huge = exact.hull(exact.placed(CORNERS * 2 * half, (0, 0, 0), orientation))
+    tiny = exact.hull(exact.placed(points, at, tilt))
+    answer = overlap(Placed(Box(half), (0, 0, 0), orientation), Placed(Hull(points), at, tilt))
+    truth = float(exact.depth_squared(huge, tiny)) ** 0.5
+    assert answer.depth == pytest.approx(truth, rel=1e-11)
+    assert answer.distance == pytest.approx(float(exact.distance_squared(huge, tiny)) ** 0.5, rel=1e-11)
+
+
 @pytest.mark.parametrize(("a", "b", "moved_by"), NEEDLES.values(), ids=NEEDLES)
 def test_depth_of_needles_is_the_exact_one_where_their_difference_looks_flat_at_first(a, b, moved_by):
     """Whichever way EPA looks first, it sees their ends alone, which are in one plane, and no other corner."""

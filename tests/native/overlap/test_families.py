@@ -57,6 +57,8 @@ def test_an_answer_with_a_fault_breaks_the_rule_about_it():
         (deep, off, "volume_is_as_right_as_its_conditioning"),
         (deep, off, "volume_of_hulls_is_right_to_twelve_digits"),
         (deep, {"centroid": rules.answer(deep.placed).centroid + 1e-11}, "centroid_is_as_right_as_its_conditioning"),
+        (deep, {"depth": rules.answer(deep.placed).depth * (1 + 2e-9)}, "depth_and_distance_are_right_to_nine_digits"),
+        (apart, {"distance": 7.0}, "depth_and_distance_are_right_to_nine_digits"),
         (touching, {"status": "separated"}, "the_order_of_bodies_keeps_the_status"),
         (deep, {"area": np.nextafter(rules.answer(deep.placed).area, 9)}, "a_power_of_two_scales_every_bit"),
         (touching, {"status": "separated"}, "mirror_image_and_turns_of_the_axes_keep_the_status"),
