@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from fractions import Fraction
-from math import isqrt
 
 import exact
 import numpy as np
+from exact_distance import core, of_cores
 from scipy.spatial import ConvexHull
 
 # Facets of one body times facets of the other, up to which they are clipped as a whole.
@@ -79,52 +79,8 @@ def is_convex(triangles: dict[exact.Ring, exact.Plane], cloud: list[exact.Point]
 
 
 def depth(a: Iterable, b: Iterable) -> Fraction | None:
-    """The least translation that separates two hulls, to 40 digits, 0 if they are apart; None for too many edges.
-
-    It is the least extent of their difference along the normal of one of its facets, which is the normal of a facet of
-    either body or the cross product of an edge of each. Doubles find those that can be least; these are done exactly.
-    """
-    bodies = [polytope(points) for points in (a, b)]
-    solids = [[exact.coordinates(p) for p in body.vertices] for body in bodies]
-    edges = [edge_vectors(body) for body in bodies]
-    if len(edges[0]) * len(edges[1]) > MOST_EDGE_PAIRS:
+    """The least translation that separates two hulls, 0 if they are apart; None for too many edges."""
+    bodies = [core(polytope(points)) for points in (a, b)]
+    if len(bodies[0].edges) * len(bodies[1].edges) > MOST_EDGE_PAIRS:
         return None
-    clouds = [np.array(solid, float) for solid in solids]
-    rough = [np.array(of_body, float) for of_body in edges]
-    faces = [exact.vector(plane[:3]) for body in bodies for plane in body.planes]
-    # Planes are given by integers of any length.
-    first = np.array([[float(c / max(map(abs, n))) for c in n] for n in faces])
-    sides = [first] + [np.cross(edge, rough[1]) for edge in rough[0]]
-    best: list[tuple[float, int, int]] = []
-    least = np.inf
-    for i, normals in enumerate(sides):
-        length = np.linalg.norm(normals, axis=1)
-        kept = np.flatnonzero(length > 1e-9 * length.max())
-        unit = normals[kept] / length[kept, None]
-        for sign in (1, -1):
-            extent = (clouds[0] @ (sign * unit.T)).max(0) - (clouds[1] @ (sign * unit.T)).min(0)
-            least = min(least, extent.min(initial=np.inf))
-            best += [(float(extent[k]), i, sign * (int(kept[k]) + 1)) for k in np.flatnonzero(extent < least + 1e-9)]
-    if least <= 0:
-        return Fraction(0)
-    squares = []
-    for extent, i, signed in best:
-        if extent < least + 1e-9:
-            k = abs(signed) - 1
-            normal = faces[k] if i == 0 else exact.cross(edges[0][i - 1], edges[1][k])
-            if signed < 0:
-                normal = exact.vector(-c for c in normal)
-            reach = max(exact.dot(normal, p) for p in solids[0]) - min(exact.dot(normal, q) for q in solids[1])
-            squares.append(reach * reach / exact.dot(normal, normal))
-    return square_root(min(squares))
-
-
-def edge_vectors(body: exact.Polytope) -> list[exact.Vector]:
-    """One way along each edge."""
-    around = {frozenset(edge) for facet in body.facets for edge in exact.edges_of(facet.ring)}
-    return [exact.subtract(*map(exact.coordinates, edge)) for edge in around]
-
-
-def square_root(square: Fraction) -> Fraction:
-    scale = 10**40
-    return Fraction(isqrt(square.numerator * scale * scale // square.denominator), scale)
+    return max(-of_cores(*bodies), Fraction(0))

@@ -685,6 +685,31 @@ def posed_round(rng):
     return Case(f"{type(a).__name__} and {type(b).__name__}", depth, bodies)
 
 
+def round_contacts(rng):
+    """An upright ball, capsule or cylinder sunk by `parameter` into a facet, an edge or a corner of a turned box of
+    another size, or into a ball or capsule; or held apart by as much.
+
+    A capsule that is met beside its end is not as deep, or is farther apart. Only the box is turned, by its vertices.
+    """
+    depth, size = power(rng, -12, -1) * float(rng.choice([1, 1, -1])), power(rng, 0, 4)
+    r, s = rng.integers(4, 17, 2) / 8
+    shape = [Sphere(r), Capsule(r, s), Cylinder(r, s)][int(rng.integers(3))]
+    facing = ["facet", "facet"] if isinstance(shape, Cylinder) else ["facet", "edge", "corner", "ball", "capsule"]
+    met, kind = str(rng.choice(facing)), type(shape).__name__.lower()
+    away = directions(rng, 1)[0] * float(rng.choice([0, 0, 1e3, 1e6]))
+    if met in ("ball", "capsule"):
+        other = Sphere(s * size) if met == "ball" else Capsule(s * size, r)
+        up = directions(rng, 1)[0]
+        room = reach(Placed(shape), -up) + reach(Placed(other), up)
+        return Case(f"{kind} on {met}", depth, (Placed(shape, away + up * (room - depth)), Placed(other, away)))
+    matrix, extents = rotation(quaternion(rng)), size * rng.uniform(1, 2, 3)
+    # What is met is in the middle of so many axes of the box, and at the end of the others.
+    ends = np.array([1.0] * {"facet": 1, "edge": 2, "corner": 3}[met] + [0.0] * 2)[:3]
+    up, foot = mapped(np.array([ends / np.linalg.norm(ends), ends * extents]), matrix)
+    at = away + foot + up * (reach(Placed(shape), -up) - depth)
+    return Case(f"{kind} on {met}", depth, (Placed(shape, at), mapped(CORNERS * extents, matrix) + away))
+
+
 def lens(r, s, d):
     """The volume of two balls' common part, their centres d apart, each outside of the other."""
     return float(lens_over_pi(r, s, d)) * pi
@@ -702,6 +727,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
+        round_contacts,
     )
 }  # fmt: skip
 
