@@ -4,8 +4,8 @@
     python benchmarks/stability.py --page            only the page and its pictures, from the results there are
 
 Writes DIR/results/stability.csv (a case a line) and what benchmarks/stability_page.py makes of it. The cases are those
-of tests/support/families.py made of vertices alone, so that every peer can be given them. The truth is exact: rational
-arithmetic on the doubles that the peers get.
+of tests/support/families.py made of vertices alone, so that every peer can be given them, and contacts of round bodies,
+of which only depths and distances are asked. The truth is exact: rational arithmetic on the doubles that the peers get.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import csv
 import inspect
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -24,12 +25,14 @@ ROOT = HERE.parent
 sys.path[:0] = [str(HERE), str(HERE / "paper"), str(ROOT / "tests" / "support")]
 
 try:
+    import distance_peers
     import exact
     import families
     import numpy as np
+    from distance_peers import DISTANCE_PEERS
     from paper_steps import lost_at, lost_given_a_point, volume_without_exact_signs
     from peers import PEERS
-    from stability_results import NOT_ASKED, RIGHT, Question, failed, verdict
+    from stability_results import NOT_ASKED, RIGHT, Question, distance_column, distance_verdict, failed, verdict
     from watched import Watched
 
     from overlapper import Placed
@@ -45,23 +48,30 @@ TIME_LIMIT = 10.0  # s, for a question
 LARGEST = 170
 
 # Families whose parameter runs over many decades get more cases, so that each decade has some.
-DECADES = ("slivers", "tilted_slivers", "nearly_touching", "needles_and_plates", "far_away", "scaled")
+DECADES = ("slivers", "tilted_slivers", "nearly_touching", "needles_and_plates", "far_away", "scaled", "round_contacts")
 SHARE = dict.fromkeys(DECADES, 3)
+
+# Families with round bodies whose signed distance is known.
+ROUND = ("round_contacts",)
+
+Judge = Callable[[Question, Any], str]
 
 # A question without difficulty, asked before time counts.
 FIRST = (families.CORNERS, families.CORNERS + 1.0)
 
 
 def questions(seed: int, count: int) -> list[Question]:
-    """About so many, from every family that is made of vertices."""
-    asked = [name for name in families.FAMILIES if families_of_vertices(name)]
+    """About so many, from every family that is made of vertices, and from ROUND."""
+    asked = [name for name in families.FAMILIES if families_of_vertices(name) or name in ROUND]
     unit = count / sum(SHARE.get(name, 1) for name in asked)
     found = []
     for name in asked:
         for i in range(max(1, round(unit * SHARE.get(name, 1)))):
             case = families.make(name, seed + i)
-            bodies = tuple(np.array(families.points_of(body), float) for body in case.bodies)
-            if max(map(len, bodies)) <= LARGEST:
+            bodies = tuple(
+                body if isinstance(body, Placed) else np.array(families.points_of(body), float) for body in case.bodies
+            )
+            if all(isinstance(body, Placed) or len(body) <= LARGEST for body in bodies):
                 found.append(Question(case, bodies))
     return found
 
@@ -70,9 +80,11 @@ def families_of_vertices(name: str) -> bool:
     return not any(isinstance(body, (families.Below, Placed)) for body in families.make(name, 0).bodies)
 
 
-def takes(answer: Callable[..., float | bool], count: int) -> bool:
+def takes(answer: Callable[..., float | bool], question: Question) -> bool:
+    """Whether a peer can be asked for what bodies have in common: they have vertices, and are not too many."""
     parameters = inspect.signature(answer).parameters.values()
-    return count == len(parameters) or any(p.kind is p.VAR_POSITIONAL for p in parameters)
+    as_many = len(question.bodies) == len(parameters) or any(p.kind is p.VAR_POSITIONAL for p in parameters)
+    return as_many and not question.round
 
 
 # The run
@@ -83,21 +95,27 @@ def run(seed: int, count: int, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     rows = [described(question) for question in asked]
     missing = []
-    for name, answer in PEERS.items():
+
+    def put(name: str, answer: Callable[..., Any], fits: Callable[[Question], bool], judged: Judge) -> None:
         column = []
         with Watched(answer, TIME_LIMIT, FIRST) as peer:
             try:
                 for question in tracked(asked, name):
-                    fits = takes(answer, len(question.bodies))
-                    column.append(verdict(question, peer.ask(*question.bodies)) if fits else NOT_ASKED)
+                    column.append(judged(question, peer.ask(*question.bodies)) if fits(question) else NOT_ASKED)
             except ImportError as error:
                 missing.append(f"{name} ({error.name} is not installed)")
                 column = [NOT_ASKED] * len(asked)
         for row, cell in zip(rows, column):
             row[name] = cell
+
+    for name, volume in PEERS.items():
+        put(name, volume, partial(takes, volume), verdict)
+    for name, distance in DISTANCE_PEERS.items():
+        put(distance_column(name), distance, lambda question: question.signed_distance is not None, distance_verdict)
+    put("way", distance_peers.way, lambda question: True, lambda _, answer: answer)
     for row, question in zip(rows, tracked(asked, "steps")):
         row["paper lost at"] = lost_at(*question.bodies) if failed(row["paper"]) else NOT_ASKED
-        solid = question.clear and question.common.dimension == 3
+        solid = not question.round and question.clear and question.common.dimension == 3
         row["given a point"] = lost_given_a_point(question.bodies, question.common) or RIGHT if solid else NOT_ASKED
         row["and by qhull"] = by_qhull(question) if solid else NOT_ASKED
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -118,16 +136,17 @@ def by_qhull(question: Question) -> str:
 
 
 def described(question: Question) -> dict[str, str]:
-    case = question.case
+    case, distance = question.case, question.signed_distance
     return {
         "family": case.family,
         "seed": str(case.seed),
         "detail": case.detail,
         "parameter": f"{case.parameter:.3g}",
         "bodies": str(len(question.bodies)),
-        "common": exact.NAMES[question.common.dimension],
-        "clear": "yes" if question.clear else "no",
-        "volume": f"{float(question.volume):.6g}",
+        "common": NOT_ASKED if question.round else exact.NAMES[question.common.dimension],
+        "clear": NOT_ASKED if question.round else "yes" if question.clear else "no",
+        "volume": NOT_ASKED if question.round else f"{float(question.volume):.6g}",
+        "signed distance": NOT_ASKED if distance is None else f"{float(distance):.6g}",
     }
 
 

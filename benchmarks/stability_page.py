@@ -13,12 +13,13 @@ import exact
 import families
 import matplotlib
 import numpy as np
+from distance_peers import DISTANCE_PEERS, OUT_OF_ITERATIONS
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 from paper_pictures import PICTURES, save, steps_in_thicknesses
 from paper_steps import STEPS
 from peers import PEERS
-from stability_results import NOT_ASKED, RIGHT, error_of, failed, read
+from stability_results import NO_ANSWER, NOT_ASKED, RIGHT, distance_column, error_of, failed, read
 from stress import TABLE as STRESS
 
 matplotlib.use("Agg")
@@ -39,6 +40,7 @@ GROUPS = {
     "published failures": ("published",),
     "moments of a motion": ("sequences",),
     "round hulls": ("round_hulls", "prisms", "pole_slivers"),
+    "round bodies": ("round_contacts",),
     "several bodies": ("compounds", "many_bodies", "crowds", "empty_triples", "slender_groups"),
 }
 
@@ -52,7 +54,17 @@ DEGENERACIES = {
     "scaled": "size, in m",
 }
 
+# The same where it matters to depths and distances, which of round bodies are all that is asked.
+DEGENERACIES_OF_PAIRS = {
+    "slivers": "depth of the overlap, in sizes",
+    "tilted_slivers": "tilt of one body, in radians",
+    "tiny_in_huge": "size of the larger body, in sizes of the smaller",
+    "far_away": "distance from the origin, in sizes",
+    "round_contacts": "depth or gap, in m",
+}
+
 VOLUMES = ["auto", "paper", "clipping", "scipy", "manifold3d", "trimesh"]
+DISTANCES = {distance_column(peer): peer for peer in DISTANCE_PEERS}
 
 # One hue from pale to dark: told apart without colours, too, and the figures stand in the cells.
 FAILURES = LinearSegmentedColormap.from_list("failures", ["#fdebd3", "#f4a259", "#c8553d", "#5b1a18"])
@@ -64,8 +76,12 @@ def write_page(results: Path, folder: Path) -> Path:
     notes, rows = read(results)
     folder.mkdir(parents=True, exist_ok=True)
     plt.rcParams.update({"font.size": 8, "font.family": "DejaVu Sans", "axes.linewidth": 0.0})
-    overview(rows, folder / "stability.png")
-    by_degeneracy(rows, folder / "stability_degeneracy.png")
+    overview(with_volumes(rows), folder / "stability.png")
+    by_degeneracy(rows, folder / "stability_degeneracy.png", DEGENERACIES, list(PEERS), VOLUMES, "a volume")
+    overview_of_distances(rows, folder / "stability_distances.png")
+    columns = list(DISTANCES)
+    path = folder / "stability_distances_degeneracy.png"
+    by_degeneracy(rows, path, DEGENERACIES_OF_PAIRS, columns, columns, "a depth or distance")
     shown = shown_cases(rows)
     for step, row in shown.items():
         PICTURES[CAUSES[step]](*case_of(row), folder / f"stability_{CAUSES[step]}.png")
@@ -75,6 +91,20 @@ def write_page(results: Path, folder: Path) -> Path:
 
 
 # Figures
+
+
+def with_volumes(rows: Iterable[Row]) -> list[Row]:
+    return [row for row in rows if row["volume"] != NOT_ASKED]
+
+
+def deep(rows: Iterable[Row]) -> list[Row]:
+    """Those of pairs that share inner points."""
+    return [row for row in rows if row["signed distance"] != NOT_ASKED and float(row["signed distance"]) < 0]
+
+
+def not_deep(rows: Iterable[Row]) -> list[Row]:
+    """Those of pairs that are apart or touch."""
+    return [row for row in rows if row["signed distance"] != NOT_ASKED and float(row["signed distance"]) >= 0]
 
 
 def asked(rows: Iterable[Row], peer: str) -> list[str]:
@@ -88,7 +118,7 @@ def failure_share(rows: Iterable[Row], peer: str) -> float:
 
 
 def worst_error(rows: Iterable[Row], peer: str) -> float:
-    """Relative, of the volumes that were wanted and given; nan if there are none."""
+    """Relative, of the volumes or distances that were wanted and given; nan if there are none."""
     errors = [error for cell in asked(rows, peer) if not np.isnan(error := error_of(cell))]
     return max(errors, default=np.nan)
 
@@ -164,28 +194,53 @@ def overview(rows: list[Row], path: Path) -> None:
     save(figure, path)
 
 
-def by_degeneracy(rows: list[Row], path: Path) -> None:
-    panels = {family: [r for r in rows if r["family"] == family] for family in DEGENERACIES}
+def overview_of_distances(rows: list[Row], path: Path) -> None:
+    groups = {name: group for name, group in grouped(rows).items() if deep(group) or not_deep(group)}
+    figure, axes = plt.subplots(1, 4, figsize=(9, 0.36 * len(groups) + 1.75))
+    for j, (part, word) in enumerate([(deep, "depth"), (not_deep, "distance")]):
+        parts = [part(group) for group in groups.values()]
+        shares = np.array([[failure_share(group, column) for column in DISTANCES] for group in parts])
+        errors = np.array([[worst_error(group, column) for column in DISTANCES] for group in parts])
+        heat_map(axes[j], shares, failure_shade, percent, FAILURES)
+        heat_map(axes[2 + j], errors, error_shade, exponent, ERRORS)
+        axes[j].set_xlabel(f"{word}: failures, %", labelpad=6)
+        axes[2 + j].set_xlabel(f"{word}: worst error", labelpad=6)
+    counts = [f"{name}  ({len(deep(group))}, {len(not_deep(group))})" for name, group in groups.items()]
+    for ax in axes:
+        ax.set_yticks(range(len(groups)) if ax is axes[0] else [], counts if ax is axes[0] else [])
+        ax.xaxis.tick_top()
+        ax.set_xticks(range(len(DISTANCES)), list(DISTANCES.values()), rotation=40, ha="left", rotation_mode="anchor")
+        ax.get_xticklabels()[0].set_fontweight("bold")
+        ax.axvline(0.5, color=INK, lw=0.8)
+    figure.tight_layout(w_pad=1.2)
+    save(figure, path)
+
+
+def by_degeneracy(
+    rows: list[Row], path: Path, families: dict[str, str], columns: list[str], measured: list[str], what: str
+) -> None:
+    """Failures of these columns and worst errors of those that are measures, by the parameter of families."""
+    panels = {family: [r for r in rows if r["family"] == family] for family in families}
     panels = {family: members for family, members in panels.items() if members}
     figure, axes = plt.subplots(len(panels), 2, figsize=(9, 2.3 * len(panels)), squeeze=False)
     for (left, right), (family, members) in zip(axes, panels.items()):
         decades = sorted({decade(row) for row in members})
-        columns = [[row for row in members if decade(row) == d] for d in decades]
-        peers = [peer for peer in PEERS if asked(members, peer)]
-        volumes = [peer for peer in VOLUMES if peer in peers]
-        shares = np.array([[failure_share(column, peer) for column in columns] for peer in peers])
-        errors = np.array([[worst_error(column, peer) for column in columns] for peer in volumes])
+        parts = [[row for row in members if decade(row) == d] for d in decades]
+        shown = [column for column in columns if asked(members, column)]
+        exact_ones = [column for column in measured if column in shown]
+        shares = np.array([[failure_share(part, column) for part in parts] for column in shown])
+        errors = np.array([[worst_error(part, column) for part in parts] for column in exact_ones])
         heat_map(left, shares, failure_shade, percent, FAILURES)
         heat_map(right, errors, error_shade, exponent, ERRORS)
-        for ax, names in ((left, peers), (right, volumes)):
-            ax.set_yticks(range(len(names)), names)
+        for ax, names in ((left, shown), (right, exact_ones)):
+            ax.set_yticks(range(len(names)), [DISTANCES.get(name, name) for name in names])
             ax.get_yticklabels()[0].set_fontweight("bold")
             ax.set_xticks(range(len(decades)), ["0" if np.isinf(d) else f"1e{d:.0f}" for d in decades])
             ax.tick_params(axis="x", labelsize=6 if len(decades) > 10 else 7.5)
-            ax.set_xlabel(DEGENERACIES[family])
+            ax.set_xlabel(families[family])
         name = family.replace("_", " ")
         left.set_title(f"{name}: failures, %", loc="left", fontsize=8.5, fontweight="bold")
-        right.set_title("worst error of a volume, power of ten (× lost)", loc="left", fontsize=8.5)
+        right.set_title(f"worst error of {what}, power of ten (× lost)", loc="left", fontsize=8.5)
     figure.tight_layout(h_pad=1.2, w_pad=1.5)
     save(figure, path)
 
@@ -227,11 +282,16 @@ def case_of(row: Row) -> tuple[list[np.ndarray], exact.Polytope]:
 # Words
 
 KINDS = ("wrong volume", "missed", "phantom", "raised", "crashed", "hung")
+KINDS_OF_DISTANCES = ("off by > 1e-6", *KINDS[1:3], NO_ANSWER, OUT_OF_ITERATIONS, *KINDS[3:])
+
+# A depth or distance further off than this, relative to the true one, is counted for itself.
+COARSE = 0.01
 
 
-def kind(cell: str) -> str:
-    words = {"raises": "raised", "crash": "crashed", "hang": "hung", "missed": "missed", "phantom": "phantom"}
-    return words.get(cell.split()[0], "wrong volume")
+def kind(cell: str, wrong: str = KINDS[0]) -> str:
+    if cell in (NO_ANSWER, OUT_OF_ITERATIONS, "missed", "phantom"):
+        return cell
+    return {"raises": "raised", "crash": "crashed", "hang": "hung"}.get(cell.split()[0], wrong)
 
 
 def text(notes: list[str], rows: list[Row], shown: dict[str, Row]) -> str:
@@ -239,16 +299,26 @@ def text(notes: list[str], rows: list[Row], shown: dict[str, Row]) -> str:
     solids = [row for row in rows if row["given a point"] != NOT_ASKED]
     paper = Counter(row["paper lost at"] for row in rows if row["paper lost at"] != NOT_ASKED)
     parts = {
-        "cases": f"{len(rows):,}",
+        "cases": f"{len(with_volumes(rows)):,}",
+        "pairs": f"{len(deep(rows)) + len(not_deep(rows)):,}",
+        "rounds": f"{len(rows) - len(with_volumes(rows)):,}",
+        "depths": totals_of_distances(deep(rows)),
+        "distances": totals_of_distances(not_deep(rows)),
+        "ways": ways(rows),
         "solids": f"{len(solids):,}",
         "notes": "\n".join(f"    {line}" for line in notes),
-        "totals": totals(rows),
+        "totals": totals(with_volumes(rows)),
         "steps": steps(rows, solids, paper),
         "auto": about_auto(rows),
         "stress": stress_run(),
         "paper_failures": str(sum(paper.values())),
         "shift_failures": str(paper["2 shifts"]),
     }
+    for column, peer in DISTANCES.items():
+        key = peer.split(",")[0] + "_tight" * ("," in peer)
+        for part, word in ((deep, "depth"), (not_deep, "distance")):
+            parts |= {f"{word}_{key}": f"{percent(failure_share(part(rows), column))} %"}
+            parts |= {f"{word}_{key}_at": worst_places(part(rows), column)}
     for peer in PEERS:
         key = peer.replace(" ", "_")
         kinds = Counter(kind(cell) for cell in asked(rows, peer) if failed(cell))
@@ -288,6 +358,32 @@ def totals(rows: list[Row]) -> str:
     return "\n".join(lines)
 
 
+def totals_of_distances(rows: list[Row]) -> str:
+    heading = ["", "cases", "failures", *KINDS_OF_DISTANCES, f"off by > {COARSE * 100:.0f} %", "worst error"]
+    lines = [f"| {' | '.join(heading)} |", "|---|" + "--:|" * (len(heading) - 1)]
+    for column, peer in DISTANCES.items():
+        cells = asked(rows, column)
+        kinds = Counter(kind(cell, KINDS_OF_DISTANCES[0]) for cell in cells if failed(cell))
+        coarse = sum(error_of(cell) > COARSE for cell in cells if cell not in KINDS_OF_DISTANCES)
+        error = worst_error(rows, column)
+        share = f"{percent(failure_share(rows, column))} %" if cells else "not installed"
+        counts = [str(count or "") for count in [*(kinds[name] for name in KINDS_OF_DISTANCES), coarse]]
+        line = [peer, str(len(cells)), share, *counts, "" if np.isnan(error) else f"{error:.0e}"]
+        lines.append(f"| {' | '.join(line)} |")
+    return "\n".join(lines)
+
+
+def ways(rows: list[Row]) -> str:
+    """By which way the package answered, in percent of each group, the most frequent of all first."""
+    names = [way for way, _ in Counter(asked(rows, "way")).most_common()]
+    lines = [f"| | {' | '.join(names)} |", "|---|" + "--:|" * len(names)]
+    for name, group in [*grouped(rows).items(), ("all", rows)]:
+        counts = Counter(asked(group, "way"))
+        shares = (percent(100 * counts[way] / counts.total()) if counts[way] else "" for way in names)
+        lines.append(f"| {name} | {' | '.join(shares)} |")
+    return "\n".join(lines)
+
+
 def stress_run() -> str:
     """What benchmarks/stress.py has recorded, and in which words."""
     with STRESS.open(encoding="utf-8") as file:
@@ -308,6 +404,6 @@ def steps(rows: list[Row], solids: list[Row], paper: Counter[str]) -> str:
         lines.append(f"| {step}: {words} | {paper[step]} | {'' if late else given[step]} |")
     by_qhull = sum(failed(row["and by qhull"]) for row in solids)
     lost = sum(given.values()) - given[RIGHT]
-    lines.append(f"| **all** | **{sum(paper.values())}** of {len(rows)} | **{lost}** of {len(solids)} |")
+    lines.append(f"| **all** | **{sum(paper.values())}** of {len(with_volumes(rows))} | **{lost}** of {len(solids)} |")
     lines.append(f"| the same with qhull in place of exact signs | | {by_qhull} of {len(solids)} |")
     return "\n".join(lines)

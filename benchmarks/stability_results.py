@@ -10,17 +10,23 @@ from math import isfinite, isqrt
 from pathlib import Path
 
 import exact
+import exact_distance
 import families
 import numpy as np
 
-# A volume further off than this, relative to the true one, is a failure.
+from overlapper import Placed
+
+# A volume, depth or distance further off than this, relative to the true one, is a failure.
 ACCURACY = 1e-6
 
 # Fraction of the smaller body's size within which bodies may as well be said to overlap as not to.
 MARGIN = Fraction(1, 10**12)
 
-# What stands in the table for a peer that was not asked, and for a right yes or no.
-NOT_ASKED, RIGHT = "-", "ok"
+# What stands in the table for a peer that was not asked, for a right yes or no, and for one that has no answer.
+NOT_ASKED, RIGHT, NO_ANSWER = "-", "ok", "no answer"
+
+# What a library gives for want of a distance is larger than this, in m.
+NO_DISTANCE = 1e300
 
 
 @dataclass(frozen=True)
@@ -28,11 +34,16 @@ class Question:
     """A case as the peers get it, and what is exactly true of it."""
 
     case: families.Case
-    bodies: tuple[np.ndarray, ...]
+    bodies: tuple[np.ndarray | Placed, ...]
+
+    @property
+    def round(self) -> bool:
+        """Whether there are bodies that have no vertices: only their signed distance is asked for."""
+        return any(isinstance(body, Placed) for body in self.bodies)
 
     @cached_property
-    def solids(self) -> list[exact.Polytope]:
-        return [exact.hull(body) for body in self.bodies]
+    def solids(self) -> list[exact.Polytope | Placed]:
+        return [body if isinstance(body, Placed) else exact.hull(body) for body in self.bodies]
 
     @cached_property
     def common(self) -> exact.Polytope:
@@ -45,7 +56,13 @@ class Question:
     @cached_property
     def size(self) -> Fraction:
         """The diagonal of the smallest body's box."""
-        return Fraction(min(float(np.linalg.norm(np.ptp(body, axis=0))) for body in self.bodies))
+        boxes = (body.bounds if isinstance(body, Placed) else body for body in self.bodies)
+        return Fraction(min(float(np.linalg.norm(np.ptp(box, axis=0))) for box in boxes))
+
+    @cached_property
+    def signed_distance(self) -> Fraction | None:
+        """Of a pair: minus the depth where they overlap. None of more bodies, and of cylinders met at an edge."""
+        return exact_distance.signed_distance(*self.solids) if len(self.bodies) == 2 else None
 
     @cached_property
     def clear(self) -> bool:
@@ -84,6 +101,26 @@ def verdict(question: Question, answer: float | bool | str) -> str:
         return RIGHT if answer == 0 else "phantom"
     # As much as a sheet of that thickness and of the smaller body's size.
     return RIGHT if off <= 2 * MARGIN * question.size**3 else "phantom"
+
+
+def distance_column(peer: str) -> str:
+    return f"{peer}: signed distance"
+
+
+def distance_verdict(question: Question, answer: float | str) -> str:
+    """The same of a signed distance. Bodies that are less than MARGIN of their size deep or apart touch."""
+    if isinstance(answer, str):
+        return answer
+    if not isfinite(answer) or abs(answer) > NO_DISTANCE:
+        return NO_ANSWER
+    truth, band = question.signed_distance, MARGIN * question.size
+    assert truth is not None
+    off = abs(Fraction(answer) - truth)
+    if abs(truth) <= band:
+        return RIGHT if off <= 2 * band else "missed" if answer > 0 else "phantom"
+    if truth * Fraction(answer) <= 0:
+        return "missed" if truth < 0 else "phantom"
+    return f"{float(off / abs(truth)):.1e}"
 
 
 def failed(cell: str) -> bool:

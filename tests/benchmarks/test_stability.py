@@ -7,15 +7,18 @@ import sys
 import time
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import families
 import numpy as np
 import pytest
 
+from overlapper import Capsule, Cylinder, Placed, Sphere
 from overlapper.cli import bench
 
 ROOT = Path(__file__).parents[2]
 
+import distance_peers  # noqa: E402
 import paper_steps  # noqa: E402
 import stability  # noqa: E402
 import stability_page  # noqa: E402
@@ -100,6 +103,121 @@ def test_yes_and_no_are_judged_beyond_a_margin_of_the_size(depth, clear):
     assert question(CUBE, CUBE + [2 - depth, 0.25, 0.5]).clear is clear
 
 
+@pytest.mark.parametrize(
+    ("asked", "answer", "words"),
+    [
+        (DEEP, -0.5, "0.0e+00"),
+        (DEEP, -0.5 * (1 + 1e-9), "1.0e-09"),
+        (APART, 0.5, "0.0e+00"),
+        (TOUCHING, 0.0, "ok"),
+        (TOUCHING, -1e-12, "ok"),
+    ],
+)
+def test_right_depths_and_distances_are_no_failures(asked, answer, words):
+    assert stability_results.distance_verdict(asked, answer) == words
+    assert not stability_results.failed(words)
+
+
+@pytest.mark.parametrize(
+    ("asked", "answer", "words"),
+    [
+        (DEEP, -0.51, "2.0e-02"),
+        (DEEP, 0.0, "missed"),
+        (DEEP, 0.5, "missed"),
+        (APART, -0.5, "phantom"),
+        (APART, 0.0, "phantom"),
+        (TOUCHING, 1e-6, "missed"),
+        (TOUCHING, -1e-6, "phantom"),
+        (APART, float("nan"), "no answer"),
+        (DEEP, -np.finfo(float).max, "no answer"),
+        (DEEP, "hang", "hang"),
+    ],
+)
+def test_wrong_depths_and_distances_are_failures(asked, answer, words):
+    assert stability_results.distance_verdict(asked, answer) == words
+    assert stability_results.failed(words)
+
+
+# As much as pybullet can tell, which of all of these libraries asks with the least digits.
+ROUGH = 1e-3
+
+ROUND = [
+    (Placed(Sphere(0.5), (0, 0, 1.25)), -0.25),
+    (Placed(Capsule(0.5, 1), (0, 0, 2.25)), 0.25),
+    (Placed(Cylinder(0.5, 1), (0, 0, 1.25)), -0.25),
+]
+
+
+@pytest.mark.parametrize("name", [name for name in distance_peers.DISTANCE_PEERS if "coal" not in name])
+def test_each_library_is_asked_for_depths_and_distances_of_every_kind_of_body(name):
+    answer = distance_peers.DISTANCE_PEERS[name]
+    assert answer(*DEEP.bodies) == pytest.approx(-0.5, abs=ROUGH)
+    assert answer(*APART.bodies) == pytest.approx(0.5, abs=ROUGH)
+    for body, distance in ROUND:
+        assert answer(CUBE, body) == pytest.approx(distance, abs=ROUGH)
+        assert answer(body, CUBE) == pytest.approx(distance, abs=ROUGH)
+
+
+class Anything:
+    """What takes any argument and any attribute."""
+
+    def __init__(self, *_: object, **__: object) -> None: ...
+
+
+def coal_that_answers(monkeypatch, answer):
+    """A stand-in for coal that does as `answer(request)` says, and what it was given."""
+    given = []
+
+    class Request:
+        gjk_max_iterations, epa_max_iterations = 128, 64
+
+    def kept(name):
+        return lambda *arguments, **_: given.append((name, *arguments)) or name
+
+    fake = SimpleNamespace(
+        DistanceRequest=Request,
+        DistanceResult=Anything,
+        StdVec_Vec3s=list,
+        ConvexBase=SimpleNamespace(convexHull=kept("hull")),
+        Transform3s=type("Transform3s", (Anything,), {"Identity": staticmethod(lambda: None)}),
+        Sphere=kept("sphere"),
+        Capsule=kept("capsule"),
+        Cylinder=kept("cylinder"),
+        distance=lambda one, at, other, there, request, result: answer(request),
+    )
+    monkeypatch.setitem(sys.modules, "coal", fake)
+    return given
+
+
+def test_coal_is_asked_with_the_shapes_and_the_tolerance_that_are_meant(monkeypatch):
+    for name, tolerance in (("coal", 1e-6), ("coal, 1e-12", 1e-12)):
+        given = coal_that_answers(monkeypatch, lambda request: request.epa_tolerance + request.gjk_tolerance)
+        for body, _ in ROUND:
+            assert distance_peers.DISTANCE_PEERS[name](CUBE, body) == 2 * tolerance
+        kinds = [("sphere", 0.5), ("capsule", 0.5, 1), ("cylinder", 0.5, 1)]
+        assert [each for each in given if each[0] != "hull"] == kinds
+
+
+def test_an_answer_of_coal_that_more_iterations_change_is_none(monkeypatch):
+    coal_that_answers(monkeypatch, lambda request: 1 / request.gjk_max_iterations)
+    assert distance_peers.coal(*DEEP.bodies) == "out of iterations"
+    coal_that_answers(monkeypatch, lambda request: -np.finfo(float).max / request.gjk_max_iterations)
+    assert stability_results.distance_verdict(DEEP, distance_peers.coal(*DEEP.bodies)) == "no answer"
+
+
+def test_pybullet_that_finds_no_points_has_no_answer(monkeypatch):
+    import pybullet
+
+    monkeypatch.setattr(pybullet, "getClosestPoints", lambda *_: ())
+    assert distance_peers.pybullet(*DEEP.bodies) == "no answer"
+
+
+def test_kinds_of_failures_are_told_apart():
+    cells = ["2.0e-02", "missed", "phantom", "no answer", "out of iterations", "raises ValueError", "crash 1", "hang"]
+    wrong = stability_page.KINDS_OF_DISTANCES[0]
+    assert [stability_page.kind(cell, wrong) for cell in cells] == list(stability_page.KINDS_OF_DISTANCES)
+
+
 def test_a_crash_and_a_hang_are_answers_and_the_next_case_is_asked_again():
     for answer, end in ((aborts_when_apart, "crash SIGABRT"), (hangs_when_apart, "hang")):
         with Watched(answer, 2.0, stability.FIRST) as peer:
@@ -143,7 +261,7 @@ def test_planes_beside_the_true_ones_are_found_to_lose_the_overlap():
 def test_the_page_says_what_the_committed_results_say():
     notes, rows = stability_results.read(stability.RESULTS)
     assert len(rows) > 800
-    assert set(stability.PEERS) <= set(rows[0])
+    assert {*stability.PEERS, *stability_page.DISTANCES, "way"} <= set(rows[0])
     page = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
     # Which of the failing cases is drawn depends on their geometry, to the last bit: it is as the page has it.
     drawn = re.findall(r"stability_(\w+)\.png\)\n\nThe case is `(\w+)` (\d+) ", page)
@@ -161,10 +279,14 @@ def test_the_command_writes_results_page_and_pictures(tmp_path):
     notes, rows = stability_results.read(tmp_path / "stability.csv")
     assert notes[0].startswith("seed 3; overlapper")
     missing = {note.removeprefix("missing: ").partition(" (")[0] for note in notes[1:]}
-    for peer in stability.PEERS:
+    for peer in [*stability.PEERS, *map(stability_results.distance_column, stability.DISTANCE_PEERS)]:
         asked = [row for row in rows if row[peer] != stability_results.NOT_ASKED]
         assert bool(asked) is (peer not in missing)
-    assert {"stability.md", "stability.png", "stability_degeneracy.png"} <= {path.name for path in tmp_path.iterdir()}
+    rounds = [row for row in rows if row["family"] in stability.ROUND]
+    assert {row["auto"] for row in rounds} == {stability_results.NOT_ASKED}
+    assert "separation" in {row["way"] for row in rows}
+    pictures = {f"stability{name}.png" for name in ("", "_degeneracy", "_distances", "_distances_degeneracy")}
+    assert {"stability.md", *pictures} <= {path.name for path in tmp_path.iterdir()}
 
 
 def test_without_a_checkout_the_command_says_so(tmp_path, monkeypatch):

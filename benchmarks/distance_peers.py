@@ -1,0 +1,129 @@
+"""Who is asked how deep two bodies are in each other or how far apart: each peer is one function, and its answer in m.
+
+A peer takes two bodies, each the vertices (n,3) of a hull or an upright ball, capsule or cylinder at its place, and
+returns the signed distance, which is minus the least translation that separates them where they overlap. A peer that
+gives none says so in words. It imports its package itself, so that one that is not installed is known by its
+ImportError. To add a peer, write its function and name it in DISTANCE_PEERS.
+
+Peers are asked in the most exact way that they have: FCL's signed distance is nearer to the truth than the depths of
+its contacts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+
+import numpy as np
+from peers import fcl_object
+from stability_results import NO_ANSWER, NO_DISTANCE
+
+from overlapper import Capsule, Cylinder, Placed, Sphere, overlap
+
+Body = np.ndarray | Placed
+Answer = float | str
+
+OUT_OF_ITERATIONS = "out of iterations"
+
+
+def auto(a: Body, b: Body) -> float:
+    found = overlap(a, b)
+    return -found.depth if found else found.distance
+
+
+def way(*bodies: Body) -> str:
+    """By which way the package itself answers."""
+    return overlap(*bodies).way
+
+
+def fcl(a: Body, b: Body) -> Answer:
+    import fcl
+
+    def placed(body: Body) -> fcl.CollisionObject:
+        if isinstance(body, np.ndarray):
+            return fcl_object(body)
+        shape = body.shape
+        if isinstance(shape, Sphere):
+            model = fcl.Sphere(shape.radius)
+        else:
+            model = (fcl.Capsule if isinstance(shape, Capsule) else fcl.Cylinder)(shape.radius, shape.length)
+        return fcl.CollisionObject(model, fcl.Transform(body.position))
+
+    return fcl.distance(placed(a), placed(b), fcl.DistanceRequest(enable_signed_distance=True))
+
+
+def coal(a: Body, b: Body) -> Answer:
+    return coal_distance(a, b, 1e-6)
+
+
+def coal_tight(a: Body, b: Body) -> Answer:
+    return coal_distance(a, b, 1e-12)
+
+
+def coal_distance(a: Body, b: Body, tolerance: float) -> Answer:
+    """With as many iterations as it makes by itself: an answer that a hundred times as many do not confirm is none."""
+    import coal
+
+    def shape_and_pose(body: Body) -> tuple[coal.ShapeBase, coal.Transform3s]:
+        if isinstance(body, np.ndarray):
+            points = coal.StdVec_Vec3s()
+            points.extend(list(body))
+            return coal.ConvexBase.convexHull(points, True, "Qt"), coal.Transform3s.Identity()
+        shape = body.shape
+        if isinstance(shape, Sphere):
+            model = coal.Sphere(shape.radius)
+        else:
+            model = (coal.Capsule if isinstance(shape, Capsule) else coal.Cylinder)(shape.radius, shape.length)
+        return model, coal.Transform3s(np.eye(3), body.position)
+
+    (one, at), (other, there) = shape_and_pose(a), shape_and_pose(b)
+
+    def asked(patience: int) -> float:
+        request = coal.DistanceRequest()
+        request.gjk_tolerance = request.epa_tolerance = tolerance
+        request.gjk_max_iterations *= patience
+        request.epa_max_iterations *= patience
+        return float(coal.distance(one, at, other, there, request, coal.DistanceResult()))
+
+    found, confirmed = asked(1), asked(100)
+    # Nothing but the limits of iterations differs between the two, so that answers of the same steps are the same bits.
+    if found != confirmed and isfinite(confirmed) and abs(confirmed) < NO_DISTANCE:
+        return OUT_OF_ITERATIONS
+    return found
+
+
+def pybullet(a: Body, b: Body) -> Answer:
+    """The margin by which pybullet grows hulls, and nothing else, is taken off."""
+    import pybullet
+
+    if not pybullet.isConnected():
+        pybullet.connect(pybullet.DIRECT)
+    pybullet.resetSimulation()
+    margin, ids, corners = 0.0, [], []
+    for body in (a, b):
+        if isinstance(body, np.ndarray):
+            model = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=body.tolist())
+            ids.append(pybullet.createMultiBody(0, model))
+            margin += 0.001  # m
+            corners += [body.min(0), body.max(0)]
+            continue
+        shape = body.shape
+        if isinstance(shape, Sphere):
+            model = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=shape.radius)
+        else:
+            kind = pybullet.GEOM_CYLINDER if isinstance(shape, Cylinder) else pybullet.GEOM_CAPSULE
+            model = pybullet.createCollisionShape(kind, radius=shape.radius, height=shape.length)
+        ids.append(pybullet.createMultiBody(0, model, basePosition=body.position.tolist()))
+        corners += list(body.bounds)
+    farthest = float(np.ptp(corners, axis=0).sum())
+    points = pybullet.getClosestPoints(*ids, farthest)
+    return min(point[8] for point in points) + margin if points else NO_ANSWER
+
+
+DISTANCE_PEERS: dict[str, Callable[[Body, Body], Answer]] = {
+    "auto": auto,
+    "fcl": fcl,
+    "coal": coal,
+    "coal, 1e-12": coal_tight,
+    "pybullet": pybullet,
+}
