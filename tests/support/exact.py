@@ -142,6 +142,14 @@ class Polytope:
                 total = add(total, area_vector(facet))
         return total
 
+    def moment(self, body: int, about: Vector) -> Vector:
+        """Sum over the facets of one body of ∫ (x - about) × n dA: d volume / d rotation vector of it about there."""
+        total = (Fraction(0), Fraction(0), Fraction(0))
+        for facet in self.facets:
+            if body in facet.owners:
+                total = add(total, moment_of(facet, about))
+        return total
+
     def contains(self, xyz: Iterable[float | Fraction]) -> bool:
         p = point(xyz)
         return all(side(plane, p) <= 0 for plane in self.planes)
@@ -183,6 +191,16 @@ def area_vector(facet: Facet) -> Vector:
     for q, r in pairwise(corners[1:]):
         total = add(total, cross(subtract(q, corners[0]), subtract(r, corners[0])))
     return total[0] / 2, total[1] / 2, total[2] / 2
+
+
+def moment_of(facet: Facet, about: Vector) -> Vector:
+    """∫ (x - about) × n dA over a facet, triangle by triangle of its fan."""
+    corners = [subtract(coordinates(p), about) for p in facet.ring]
+    total = (Fraction(0), Fraction(0), Fraction(0))
+    for q, r in pairwise(corners[1:]):
+        twice = cross(subtract(q, corners[0]), subtract(r, corners[0]))
+        total = add(total, cross(add(add(corners[0], q), r), twice))
+    return total[0] / 6, total[1] / 6, total[2] / 6
 
 
 # The hull of points

@@ -8,7 +8,7 @@ as given, so that the exact truth and the core see the same numbers.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import product
@@ -85,11 +85,15 @@ class Case:
 
     @cached_property
     def truth(self) -> exact.Polytope:
-        """The common part without rounding."""
+        """The common part without rounding. Owners of its facets are places in `bodies`."""
+        bounded = [i for i, body in enumerate(self.bodies) if not isinstance(body, Below)]
         part = exact.common(*self.solids) if self.solids else exact.hull(CORNERS * 2.0**20)
-        for body in self.bodies:
+        names = dict(enumerate(bounded))
+        owned = (replace(facet, owners=tuple(names.get(i, -1) for i in facet.owners)) for facet in part.facets)
+        part = replace(part, facets=tuple(owned))
+        for i, body in enumerate(self.bodies):
             if isinstance(body, Below):
-                part = exact.clipped(part, exact.halfspace(*body), -1)
+                part = exact.clipped(part, exact.halfspace(*body), i)
         return part
 
     @cached_property

@@ -4,6 +4,7 @@ a complaint, or nothing if they are kept."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from fractions import Fraction
 from math import isqrt
 
@@ -18,6 +19,9 @@ from overlapper.proof.certificate import certificate
 HALF_ULP = 2.0**-53
 NEGLIGIBLE = 1e-12  # of the size of the smallest body: what is nearer or thinner may be called touching
 TOLERANCE = 1e-2  # of round bodies, whose closed form must lie in the bracket whatever it is
+
+DIRECTIONS = np.vstack([CORNERS / np.sqrt(3), np.eye(3), -np.eye(3), *np.random.default_rng(0).normal(size=(32, 1, 3))])
+DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 
 Rule = Callable[[Case, Overlap], str]
 
@@ -188,6 +192,69 @@ def nearly(length: float, square: Fraction) -> bool:
     return abs(Fraction(length) ** 2 - square) <= 2e-9 * square
 
 
+def the_errors_hold_the_measures(case: Case, found: Overlap) -> str:
+    if not measured(case, found):
+        return ""
+    errors, truth = found.errors, case.truth
+    inertia = max(abs(Fraction(float(found.inertia[i, j])) - truth.inertia[i][j]) for i in range(3) for j in range(3))
+    off = {
+        "area": (abs(found.area - truth.area) - 8 * HALF_ULP * truth.area, errors.area),
+        "centroid": (length(found.centroid, truth.centroid), errors.centroid),
+        "inertia": (float(inertia), errors.inertia),
+        "vertices": (hausdorff_distance_at_least(found, truth) - 8 * HALF_ULP * diameter(truth), errors.vertices),
+    }
+    for body, (placed, slopes) in enumerate(zip(found.shapes, found.gradient, strict=True)):
+        force, moment = slopes_off(truth, body, exact.vector(placed.position), slopes)
+        off[f"force on body {body}"] = force, errors.gradient[body, 0]
+        off[f"moment on body {body}"] = moment, errors.gradient[body, 3]
+    beyond = (f"{name} is off by {by:.3g}, not {error:.3g}" for name, (by, error) in off.items() if not by <= error)
+    return "; ".join(beyond)
+
+
+def slopes_off(truth: exact.Polytope, body: int, position: exact.Vector, slopes: np.ndarray) -> tuple[float, float]:
+    """How far force and moment may be off. A facet that the body shares with others counts or does not, as the volume
+    has a slope to one side and another to the other: whichever is farther, along some directions."""
+    own = replace(truth, facets=tuple(facet for facet in truth.facets if facet.owners == (body,)))
+    shared = [facet for facet in truth.facets if body in facet.owners and facet.owners != (body,)]
+    ways_off = []
+    for given, sure, parts in (
+        (slopes[:3], own.pull(body), [exact.area_vector(facet) for facet in shared]),
+        (slopes[3:], own.moment(body, position), [exact.moment_of(facet, position) for facet in shared]),
+    ):
+        base = np.array([float(Fraction(g) - s) for g, s in zip(given.tolist(), sure, strict=True)])
+        along = np.array(parts, float).reshape(-1, 3) @ DIRECTIONS.T
+        ways_off.append(max(float(np.linalg.norm(base)), float((base @ DIRECTIONS.T - along.clip(max=0).sum(0)).max())))
+    return ways_off[0], ways_off[1]
+
+
+def hausdorff_distance_at_least(found: Overlap, truth: exact.Polytope) -> float:
+    """Of the hull of the vertices from the common part, by how far each reaches along some directions."""
+    ours = np.array([exact.subtract(exact.vector(v), truth.centroid) for v in found.vertices.tolist()], float)
+    theirs = np.array([exact.subtract(exact.coordinates(p), truth.centroid) for p in truth.vertices], float)
+    return float(np.abs((ours @ DIRECTIONS.T).max(0) - (theirs @ DIRECTIONS.T).max(0)).max())
+
+
+def length(given: np.ndarray, truth: exact.Vector) -> float:
+    return float(np.linalg.norm([float(Fraction(g) - t) for g, t in zip(given.tolist(), truth, strict=True)]))
+
+
+def errors_of_measures_are_as_small_as_that_of_the_volume(case: Case, found: Overlap) -> str:
+    """But for the last bits of coordinates in the world, a drawing that is a hundred times rougher, and the gradient
+    where bodies may share a facet."""
+    if not measured(case, found):
+        return ""
+    errors, size, volume = found.errors, diameter(case.truth), float(case.truth.volume)
+    world = 8 * 2 * HALF_ULP * (float(np.linalg.norm(found.centroid)) + size)
+    stated = {
+        "area": errors.area / case.truth.area,
+        "centroid": (errors.centroid - world) / size,
+        "inertia": errors.inertia / (volume * size**2),
+        "vertices": (errors.vertices - world) / size / 100,
+    }
+    beyond = (f"the error of {name} is {error:.3g} of it" for name, error in stated.items() if not error <= 1e-11)
+    return "; ".join(beyond)
+
+
 def measured(case: Case, found: Overlap) -> bool:
     return bool(found) and not case.round and case.truth.dimension == 3
 
@@ -300,6 +367,8 @@ UNPROVED: tuple[Rule, ...] = (
     volume_of_hulls_is_right_to_twelve_digits,
     centroid_is_as_right_as_its_conditioning,
     depth_and_distance_are_right_to_nine_digits,
+    the_errors_hold_the_measures,
+    errors_of_measures_are_as_small_as_that_of_the_volume,
     the_order_of_bodies_keeps_the_status,
     the_order_of_bodies_keeps_every_bit,
     a_power_of_two_scales_every_bit,

@@ -285,6 +285,21 @@ MeasuresAndInertia by_region(const Region& region, std::span<const Placed> bodie
   return answer;
 }
 
+bool polyhedral(std::span<const Placed> bodies) {
+  return std::ranges::none_of(bodies, [](const Placed& body) { return smooth(body.shape); });
+}
+
+/// The region about the middle of the largest ball that double-doubles find, if there is one: the point about which
+/// doubles grow a region may not be inside after all, or its frame not be round.
+std::optional<Region> grown_in_wide_arithmetic(const OverlappingBodies& overlapping) {
+  const double reach = overlapping.search().reach, plane_rounding = wide_rounding(reach);
+  const Arrangement& at = overlapping.at;
+  const WideBall ball =
+      wide_deepest_ball(at.wide_bodies(), overlapping.inside().ball.cuts, 4 * plane_rounding, reach, plane_rounding);
+  if (!(ball.lower > 0)) return std::nullopt;
+  return grown_about(ball, at, reach, overlapping.tolerance);
+}
+
 /// The error of a volume, without bound where rounding has turned the polytope inside out.
 double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 ? m.volume_error : kInfinity; }
 
@@ -305,23 +320,26 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
     MeasuresAndInertia again = by_region(region, overlapping.bodies, Way::kWideDual);
     if (!widened(kept.measures.way) || error_of(again.measures) < error_of(kept.measures)) kept = std::move(again);
   };
-  const bool polyhedral =
-      std::ranges::none_of(overlapping.bodies, [](const Placed& body) { return smooth(body.shape); });
   const auto enough = [&] { return error_of(kept.measures) <= kEnough * kept.measures.volume; };
-  if (polyhedral && !enough())
+  const bool exact = polyhedral(overlapping.bodies);
+  if (exact && !enough())
     if (auto wide = widened(at.relative, overlapping.region())) keep_better(owned_as_given(std::move(*wide), at));
   const auto reach = [&] { return overlapping.search().reach; };
-  if (polyhedral ? !enough() : rounding(reach()) * kept.measures.area > finest * kept.measures.volume) {
-    // The point about which the region was grown may not be inside after all, or its frame not be round.
-    const double plane_rounding = wide_rounding(reach());
-    const WideBall ball = wide_deepest_ball(at.wide_bodies(), overlapping.inside().ball.cuts, 4 * plane_rounding,
-                                            reach(), plane_rounding);
-    if (ball.lower > 0) keep_better(grown_about(ball, at, reach(), overlapping.tolerance));
-    else if (polyhedral)
+  if (exact ? !enough() : rounding(reach()) * kept.measures.area > finest * kept.measures.volume) {
+    if (const auto wide = grown_in_wide_arithmetic(overlapping)) keep_better(*wide);
+    else if (exact)
       kept.measures.volume_error +=
           kept.measures.volume + touching_volume(overlapping.bodies, overlapping.inside().ball);
   }
   return kept;
+}
+
+Region finest_region(const OverlappingBodies& overlapping) {
+  if (!polyhedral(overlapping.bodies)) return overlapping.region();
+  if (auto wide = widened(overlapping.at.relative, overlapping.region()))
+    return owned_as_given(std::move(*wide), overlapping.at);
+  if (auto wide = grown_in_wide_arithmetic(overlapping)) return std::move(*wide);
+  return overlapping.region();
 }
 
 }  // namespace overlapper

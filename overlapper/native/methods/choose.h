@@ -119,6 +119,10 @@ struct OverlappingBodies {
   std::function<const Inside&()> inside;
   std::function<const Region&()> region;  ///< owners are numbers of `bodies`
 };
+/// The region of bodies that overlap as right as any way makes it: of polyhedra, with planes placed in double-doubles.
+/// Owners are numbers of the bodies as given.
+Region finest_region(const OverlappingBodies& overlapping);
+
 /// What measure_at_once() cannot measure well enough.
 MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping);
 

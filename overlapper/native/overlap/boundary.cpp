@@ -6,33 +6,10 @@
 #include <unordered_map>
 #include <utility>
 
+#include "geometry/ridges.h"
+
 namespace overlapper {
 namespace {
-
-/// The facet on the other side of each directed ridge of a polytope.
-class Ridges {
- public:
-  explicit Ridges(const Polytope& polytope)
-      : polytope_(polytope), count_(static_cast<int64_t>(polytope.vertices.size())) {
-    for (int f = 0; f < polytope.facets(); ++f) {
-      const auto ring = polytope.facet(f);
-      for (size_t i = 0; i < ring.size(); ++i) facet_left_of_[key(ring[i], ring[(i + 1) % ring.size()])] = f;
-    }
-  }
-  int left_of(int from, int to) const { return facet_left_of_.at(key(from, to)); }
-  int next_in(int facet, int vertex) const {
-    const auto ring = polytope_.facet(facet);
-    size_t i = 0;
-    while (ring[i] != vertex) ++i;
-    return ring[(i + 1) % ring.size()];
-  }
-
- private:
-  int64_t key(int from, int to) const { return from * count_ + to; }
-  const Polytope& polytope_;
-  int64_t count_;
-  std::unordered_map<int64_t, int> facet_left_of_;
-};
 
 /// Closed loops of vertices around every connected part of the surface that belongs to `owner`, counter-clockwise from
 /// outside.
@@ -145,6 +122,9 @@ Boundary boundary_of(const Region& region, int bodies) {
   boundary.vertices.resize(groups);
   const std::vector<int> chosen = representatives(p, group, groups);
   for (int g = 0; g < groups; ++g) boundary.vertices[g] = region.to_world(p.vertices[chosen[g]]);
+  for (size_t v = 0; v < p.vertices.size(); ++v)
+    boundary.merged =
+        std::max(boundary.merged, norm(region.frame.axes * (p.vertices[v] - p.vertices[chosen[group[v]]])));
   boundary.ring_start.push_back(0);
   for (int f = 0; f < p.facets(); ++f) {
     const std::vector<int> ring = contracted(p.facet(f), group);

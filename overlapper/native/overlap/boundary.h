@@ -15,6 +15,7 @@ struct Boundary {
   std::vector<Plane> planes;
   std::vector<int> owner;
   std::vector<std::vector<Vec3>> patch;
+  double merged = 0;  ///< m: how far any vertex of the polytope is from the one that stands for it
 
   std::span<const int> facet(int f) const {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);

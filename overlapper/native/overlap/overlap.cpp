@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <limits>
 #include <stdexcept>
 
 #include "methods/paper.h"
@@ -74,8 +75,20 @@ const MeasuresAndInertia& Overlap::in_full() const {
   return lazy().in_full.get([this] { return measured_in_full(); });
 }
 
+const Region& Overlap::finest_region() const {
+  return lazy().finest_region.get([this] { return overlapper::finest_region(overlapping_bodies()); });
+}
+
+const Region& Overlap::drawn() const {
+  // The finest has every triangle of a hull by itself, where the others have facets.
+  constexpr double kRough = 1e-10;
+  const auto rough = [](const Region::Facet& facet) { return !(facet.rounding <= kRough * facet.slack); };
+  const bool of_paper = method_ == Method::kPaper;
+  return !of_paper && std::ranges::any_of(region().facets, rough) ? finest_region() : region();
+}
+
 const Boundary& Overlap::boundary() const {
-  return lazy().boundary.get([this] { return boundary_of(region(), static_cast<int>(bodies().size())); });
+  return lazy().boundary.get([this] { return boundary_of(drawn(), static_cast<int>(bodies().size())); });
 }
 
 Region Overlap::region_of_overlap() const {
@@ -90,15 +103,23 @@ Region Overlap::region_of_overlap() const {
   return grown(at, inside(), search().reach, tolerance_);
 }
 
+OverlappingBodies Overlap::overlapping_bodies() const {
+  return {arrangement(),
+          bodies(),
+          tolerance_,
+          traced(),
+          [this]() -> const Search& { return search(); },
+          [this]() -> const Inside& { return inside(); },
+          [this]() -> const Region& { return region(); }};
+}
+
 MeasuresAndInertia Overlap::measured_in_full() const {
   if (method_ == Method::kPaper) {
     MeasuresAndInertia as_in_paper = measure(region(), bodies());
     as_in_paper.measures.way = Way::kPaper;
     return as_in_paper;
   }
-  return measure_in_full({arrangement(), bodies(), tolerance_, traced(), [this]() -> const Search& { return search(); },
-                          [this]() -> const Inside& { return inside(); },
-                          [this]() -> const Region& { return region(); }});
+  return measure_in_full(overlapping_bodies());
 }
 
 const Measures& Overlap::measures() const { return measured_at_once() ? *at_once_ : in_full().measures; }
@@ -112,7 +133,8 @@ Way Overlap::way() const {
 double Overlap::volume() const { return status_ == Status::kOverlapping ? measures().volume : 0; }
 
 double Overlap::volume_error() const {
-  if (method_ == Method::kPaper) return lazy().error_of_paper.get([this] { return error_of_paper(); });
+  if (method_ == Method::kPaper)
+    return std::abs(volume() - judge_of_paper().volume()) + judge_of_paper().volume_error();
   switch (status_) {
     case Status::kSeparated: return 0;
     case Status::kTouching: return touching_volume(bodies(), inside().ball);
@@ -121,10 +143,55 @@ double Overlap::volume_error() const {
   return 0;
 }
 
-double Overlap::error_of_paper() const {
-  const Overlap judge({bodies().begin(), bodies().end()}, tolerance_, Method::kAuto);
-  return std::abs(volume() - judge.volume()) + judge.volume_error();
+const Overlap& Overlap::judge_of_paper() const {
+  return lazy().judge_of_paper.get(
+      [this] { return Overlap({bodies().begin(), bodies().end()}, tolerance_, Method::kAuto); });
 }
+
+const Errors& Overlap::errors() const {
+  return lazy().errors.get([this] {
+    if (method_ == Method::kPaper) return errors_of_paper();
+    switch (status_) {
+      case Status::kSeparated: return Errors{0, 0, 0, 0, 0, std::vector<std::array<double, 2>>(bodies().size())};
+      case Status::kTouching: return errors_of_anything(volume_error(), bodies());
+      case Status::kOverlapping: return errors_of_measures();
+    }
+    return Errors{};
+  });
+}
+
+Stated Overlap::stated() const {
+  if (status_ != Status::kOverlapping) return {0, {}, {{}, {}, {}}, gradient()};
+  return {area(), centroid(), inertia(), gradient()};
+}
+
+Errors Overlap::errors_of_measures() const {
+  if (!(volume_error() < volume())) return errors_of_anything(volume_error(), bodies());
+  const StatedWithErrors of_region = measured_with_errors(finest_region(), bodies());
+  Errors errors = errors_beside(of_region, stated());
+  if (way() == Way::kClosedForm) {
+    const double of_inertia = errors.inertia;
+    errors = errors_of_formula(measures(), bodies());
+    if (!in_full().inertia) errors.inertia = of_inertia;
+  }
+  errors.volume = volume_error();
+  errors.vertices = error_of_vertices(drawn(), boundary(), bodies());
+  return no_more_than_all(std::move(errors), bodies());
+}
+
+Errors Overlap::errors_of_paper() const {
+  const Overlap& judge = judge_of_paper();
+  const Errors of_judge = judge.errors();
+  Errors errors = errors_beside({judge.stated(), of_judge}, stated());
+  errors.volume = volume_error();
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  const bool both = status_ == Status::kOverlapping && judge.status() == Status::kOverlapping;
+  if (both) errors.vertices = of_judge.vertices + farthest_apart(boundary().vertices, judge.boundary().vertices);
+  else errors.centroid = errors.vertices = kUnknown;
+  return no_more_than_all(std::move(errors), bodies());
+}
+
+bool Overlap::converged() const { return status_ != Status::kOverlapping || volume_error() <= tolerance_ * volume(); }
 
 double Overlap::area() const { return status_ == Status::kOverlapping ? measures().area : 0; }
 

@@ -10,6 +10,7 @@
 #include "methods/dual/region.h"
 #include "overlap/boundary.h"
 #include "overlap/contact.h"
+#include "overlap/errors.h"
 #include "overlap/once.h"
 #include "shapes/shape.h"
 
@@ -21,8 +22,8 @@ enum class Method { kAuto, kPaper };
 /// asked for, then kept. Safe to share between threads, none of which waits for another.
 class Overlap {
  public:
-  /// Throws std::invalid_argument if the common set is unbounded. `tolerance` is the fraction by which the polytope may
-  /// have to shrink, about its inner point, to fit into smooth shapes; polyhedra are exact whatever it is.
+  /// Throws std::invalid_argument if the common set is unbounded. `tolerance` is the fraction of the volume by
+  /// which the polytope of smooth shapes may be off; polyhedra are exact whatever it is.
   Overlap(std::vector<Placed> bodies, double tolerance, Method method);
   Overlap(const Placed& a, const Placed& b, double tolerance, Method method);
   Overlap(Overlap&& other) noexcept;
@@ -61,6 +62,12 @@ class Overlap {
   /// zeros unless overlapping.
   std::vector<std::array<double, 6>> gradient() const;
 
+  /// How far what is stated may be off; of kPaper, the difference from what kAuto finds, plus the error of that.
+  const Errors& errors() const;
+
+  /// False where the bodies overlap, and the volume may be off by more than the fraction `tolerance`.
+  bool converged() const;
+
   /// The contact of a pair; not for more bodies.
   const Contact& contact() const;
   const ContactErrors& contact_errors() const;
@@ -77,7 +84,9 @@ class Overlap {
     Once<Boundary> boundary;
     Once<Contact> contact;
     Once<ContactErrors> contact_errors;
-    Once<double> error_of_paper;
+    Once<Region> finest_region;
+    Once<Errors> errors;
+    Once<Overlap> judge_of_paper;
   };
 
   const Lazy& lazy() const;
@@ -86,8 +95,14 @@ class Overlap {
   const Inside& inside() const;
   const MeasuresAndInertia& in_full() const;
   Region region_of_overlap() const;
+  OverlappingBodies overlapping_bodies() const;
   MeasuresAndInertia measured_in_full() const;
-  double error_of_paper() const;
+  const Region& finest_region() const;
+  const Region& drawn() const;  ///< for the boundary: the finest where doubles do not place planes well enough
+  Stated stated() const;
+  const Overlap& judge_of_paper() const;
+  Errors errors_of_paper() const;
+  Errors errors_of_measures() const;
 
   void start();
   void start_as_in_paper();

@@ -162,6 +162,70 @@ arithmetic from the shapes' own numbers, as were centroid, area, inertia and gra
 of the facets that the body owns, and its moment. m² and m³; zeros unless overlapping.)");
 }
 
+/// Of an overlap, whose figures it is about.
+struct ErrorsOf {
+  Errors errors;
+  bool solid;
+  std::optional<ContactErrors> contact;  ///< of a pair
+};
+
+std::string repr(const ErrorsOf& e) {
+  std::string text = "Errors(volume=" + number(e.errors.volume) + " m³, area=" + number(e.errors.area) + " m²";
+  if (e.solid) text += ", centroid=" + number(e.errors.centroid) + " m, vertices=" + number(e.errors.vertices) + " m";
+  if (e.contact) text += ", depth=" + number(e.contact->depth) + " m, distance=" + number(e.contact->distance) + " m";
+  return text + ")";
+}
+
+nb::object of_contact(const ErrorsOf& e, double ContactErrors::* error) {
+  return e.contact ? nb::object(nb::float_(*e.contact.*error)) : nb::none();
+}
+
+nb::object if_solid(const ErrorsOf& e, double error) { return e.solid ? nb::object(nb::float_(error)) : nb::none(); }
+
+void define_errors(nb::module_& m) {
+  nb::class_<ErrorsOf> cls(m, "Errors",
+                           R"(How far the figures of an Overlap may be off: bounds that hold, in the same units.
+
+They rest on another way to the same figures, whose rounding is bounded from its operations, and on how far that and the
+figures are apart.)");
+  cls.def_prop_ro("volume", [](const ErrorsOf& e) { return e.errors.volume; }, "m³, the same as `volume_error`.");
+  cls.def_prop_ro("area", [](const ErrorsOf& e) { return e.errors.area; }, "m².");
+  cls.def_prop_ro(
+      "centroid", [](const ErrorsOf& e) { return if_solid(e, e.errors.centroid); },
+      nb::sig("def centroid(self) -> float | None"),
+      "m: the true centroid is no farther away. None unless overlapping.");
+  cls.def_prop_ro("inertia", [](const ErrorsOf& e) { return e.errors.inertia; }, "m⁵, of each entry.");
+  cls.def_prop_ro(
+      "vertices", [](const ErrorsOf& e) { return if_solid(e, e.errors.vertices); },
+      nb::sig("def vertices(self) -> float | None"),
+      R"(m: no point of the hull of the vertices is farther from the common set, and none of that from the hull. None unless
+overlapping.)");
+  array_property(
+      cls, "gradient",
+      [](const ErrorsOf& e) {
+        std::vector<double> values;
+        for (const auto& [force, moment] : e.errors.gradient)
+          values.insert(values.end(), {force, force, force, moment, moment, moment});
+        return to_numpy<Matrix>(std::move(values), {e.errors.gradient.size(), 6});
+      },
+      R"((m, 6) m² and m³: of the length of the three numbers that they stand for, and so of each.
+
+Where facets of two bodies lie in one plane the volume has a slope to one side and another to the other, and what is
+stated may be either: the error is then as large as the facet.)");
+  cls.def_prop_ro(
+      "depth", [](const ErrorsOf& e) { return of_contact(e, &ContactErrors::depth); },
+      nb::sig("def depth(self) -> float | None"), "m. None for three or more bodies, as are the next two.");
+  cls.def_prop_ro(
+      "distance", [](const ErrorsOf& e) { return of_contact(e, &ContactErrors::distance); },
+      nb::sig("def distance(self) -> float | None"), "m.");
+  cls.def_prop_ro(
+      "witnesses", [](const ErrorsOf& e) { return of_contact(e, &ContactErrors::witnesses); },
+      nb::sig("def witnesses(self) -> float | None"),
+      R"(m: by how much, both together, the witnesses are outside of their bodies and farther apart than the bodies are. 0 if
+overlapping.)");
+  cls.def("__repr__", [](const ErrorsOf& e) { return repr(e); });
+}
+
 void define_boundary(nb::class_<Overlap>& cls) {
   array_property(
       cls, "vertices", [](const Overlap& o) { return solid(o) ? to_numpy(o.boundary().vertices) : empty_rows(3); },
@@ -216,7 +280,7 @@ void define_overlap(nb::module_& m) {
                           R"(What two or more convex shapes share. True only if they overlap.
 
 Immutable; each quantity is computed when first asked for. SI units, world coordinates. For smooth shapes the
-polytope contains the common set and could shrink into it by the fraction `tolerance`.)");
+polytope contains the common set, as closely as `tolerance` asks.)");
   cls.def_prop_ro(
       "status", [](const Overlap& o) { return status_name(o.status()); },
       nb::sig("def status(self) -> typing.Literal['separated', 'touching', 'overlapping']"),
@@ -230,7 +294,12 @@ polytope contains the common set and could shrink into it by the fraction `toler
         return nb::tuple(list);
       },
       nb::sig("def shapes(self) -> tuple[Placed, ...]"), "The bodies in the order given.");
-  cls.def_prop_ro("tolerance", &Overlap::tolerance);
+  cls.def_prop_ro("tolerance", &Overlap::tolerance,
+                  "The fraction of its volume by which the polytope of smooth shapes may be off.");
+  cls.def_prop_ro(
+      "converged", [](const Overlap& o) { return measured(o).converged(); },
+      R"(False if the volume may be off by more than the fraction `tolerance`: where rounding, or the most planes that a
+smooth shape is given, leave more in doubt. True of bodies that do not overlap.)");
   cls.def_prop_ro(
       "method", [](const Overlap& o) { return o.method() == Method::kAuto ? "auto" : "paper"; },
       nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
@@ -247,6 +316,14 @@ inside, so that the bodies are said to touch. 'paper': the method asked for.)");
   cls.def_prop_ro(
       "facets_touched", [](const Overlap& o) { return o.facets_touched(); },
       "How many planes of the shapes took part in the measures.");
+  cls.def_prop_ro(
+      "errors",
+      [](const Overlap& o) {
+        const nb::gil_scoped_release release;
+        return ErrorsOf{o.errors(), solid(o), o.pair() ? std::optional(o.contact_errors()) : std::nullopt};
+      },
+      R"(How far each figure may be off, as `volume_error` is that of the volume. It costs about as much as all figures
+together.)");
   define_measures(cls);
   define_boundary(cls);
   define_contact(cls);
@@ -313,7 +390,8 @@ void define_functions(nb::module_& m) {
       R"(The common set of two or more convex shapes.
 
 Each is a Placed, a bare shape, or an (n, 3) array of points, which stands for their hull. `tolerance`, between 0 and 1,
-is the fraction by which the polytope may have to shrink to fit inside smooth shapes; polyhedra are exact whatever it is.
+is the fraction of the volume by which the polytope of smooth shapes may be off, which `converged` says whether it keeps;
+polyhedra are exact whatever it is.
 No overlap is an answer, not an error. Raises ValueError if the common set is unbounded.
 
 method 'auto' grows the hull of the dual points about a point well inside, in a frame in which the common set is round.
@@ -373,6 +451,7 @@ Method to_method(nb::handle value) {
 }
 
 void define_overlaps(nb::module_& m) {
+  define_errors(m);
   define_overlap(m);
   define_functions(m);
 }

@@ -47,6 +47,7 @@ def test_an_answer_with_a_fault_breaks_the_rule_about_it():
     deep, touching, apart = make("general", 1), make("touching", 1), make("nearly_touching", 0)
     moving = next(case for case in (make("sequences", seed) for seed in range(99)) if case.parameter < 1e-5)
     off = dict.fromkeys(("volume",), rules.answer(deep.placed).volume * (1 + 2e-12))
+    errors = rules.answer(deep.placed).errors
     planted = [
         (deep, {"area": np.nan}, "figures_are_finite"),
         (deep, {"volume_error": -1.0}, "sizes_are_not_negative"),
@@ -59,6 +60,13 @@ def test_an_answer_with_a_fault_breaks_the_rule_about_it():
         (deep, {"centroid": rules.answer(deep.placed).centroid + 1e-11}, "centroid_is_as_right_as_its_conditioning"),
         (deep, {"depth": rules.answer(deep.placed).depth * (1 + 2e-9)}, "depth_and_distance_are_right_to_nine_digits"),
         (apart, {"distance": 7.0}, "depth_and_distance_are_right_to_nine_digits"),
+        (deep, {"area": rules.answer(deep.placed).area * (1 + 1e-12)}, "the_errors_hold_the_measures"),
+        (deep, {"errors": Planted(errors, gradient=np.zeros((2, 6)))}, "the_errors_hold_the_measures"),
+        (
+            deep,
+            {"errors": Planted(errors, inertia=1.0)},
+            "errors_of_measures_are_as_small_as_that_of_the_volume",
+        ),
         (touching, {"status": "separated"}, "the_order_of_bodies_keeps_the_status"),
         (deep, {"area": np.nextafter(rules.answer(deep.placed).area, 9)}, "a_power_of_two_scales_every_bit"),
         (touching, {"status": "separated"}, "mirror_image_and_turns_of_the_axes_keep_the_status"),

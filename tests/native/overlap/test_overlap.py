@@ -66,7 +66,7 @@ def assert_is_a_closed_polytope(answer):
     doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert_allclose(doubled.sum(0), 0, atol=1e-14 * np.abs(doubled).sum())
     smooth = any(isinstance(body.shape, Sphere | Capsule | Cylinder) for body in answer.shapes)
-    # The polytope around a smooth part may have to shrink by the tolerance to fit inside.
+    # The area is that of the polytope around a smooth part, or of the part itself.
     rel = 3 * answer.tolerance if smooth else 1e-12
     assert np.linalg.norm(doubled, axis=1).sum() / 2 == pytest.approx(answer.area, rel=rel)
     assert_array_equal(answer.bounds, [answer.vertices.min(0), answer.vertices.max(0)])

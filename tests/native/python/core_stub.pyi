@@ -360,12 +360,69 @@ class Placed:
 
     def __deepcopy__(self, memo: object) -> object: ...
 
+class Errors:
+    """
+    How far the figures of an Overlap may be off: bounds that hold, in the same units.
+
+    They rest on another way to the same figures, whose rounding is bounded from its operations, and on how far that and the
+    figures are apart.
+    """
+
+    @property
+    def volume(self) -> float:
+        """m³, the same as `volume_error`."""
+
+    @property
+    def area(self) -> float:
+        """m²."""
+
+    @property
+    def centroid(self) -> float | None:
+        """m: the true centroid is no farther away. None unless overlapping."""
+
+    @property
+    def inertia(self) -> float:
+        """m⁵, of each entry."""
+
+    @property
+    def vertices(self) -> float | None:
+        """
+        m: no point of the hull of the vertices is farther from the common set, and none of that from the hull. None unless
+        overlapping.
+        """
+
+    @property
+    def gradient(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (m, 6) m² and m³: of the length of the three numbers that they stand for, and so of each.
+
+        Where facets of two bodies lie in one plane the volume has a slope to one side and another to the other, and what is
+        stated may be either: the error is then as large as the facet.
+        """
+
+    @property
+    def depth(self) -> float | None:
+        """m. None for three or more bodies, as are the next two."""
+
+    @property
+    def distance(self) -> float | None:
+        """m."""
+
+    @property
+    def witnesses(self) -> float | None:
+        """
+        m: by how much, both together, the witnesses are outside of their bodies and farther apart than the bodies are. 0 if
+        overlapping.
+        """
+
+    def __repr__(self) -> str: ...
+
 class Overlap:
     """
     What two or more convex shapes share. True only if they overlap.
 
     Immutable; each quantity is computed when first asked for. SI units, world coordinates. For smooth shapes the
-    polytope contains the common set and could shrink into it by the fraction `tolerance`.
+    polytope contains the common set, as closely as `tolerance` asks.
     """
 
     @property
@@ -381,7 +438,17 @@ class Overlap:
         """The bodies in the order given."""
 
     @property
-    def tolerance(self) -> float: ...
+    def tolerance(self) -> float:
+        """
+        The fraction of its volume by which the polytope of smooth shapes may be off.
+        """
+
+    @property
+    def converged(self) -> bool:
+        """
+        False if the volume may be off by more than the fraction `tolerance`: where rounding, or the most planes that a
+        smooth shape is given, leave more in doubt. True of bodies that do not overlap.
+        """
 
     @property
     def method(self) -> Literal['auto', 'paper']: ...
@@ -400,6 +467,13 @@ class Overlap:
     @property
     def facets_touched(self) -> int:
         """How many planes of the shapes took part in the measures."""
+
+    @property
+    def errors(self) -> Errors:
+        """
+        How far each figure may be off, as `volume_error` is that of the volume. It costs about as much as all figures
+        together.
+        """
 
     @property
     def volume(self) -> float:
@@ -546,7 +620,8 @@ def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | Ha
     The common set of two or more convex shapes.
 
     Each is a Placed, a bare shape, or an (n, 3) array of points, which stands for their hull. `tolerance`, between 0 and 1,
-    is the fraction by which the polytope may have to shrink to fit inside smooth shapes; polyhedra are exact whatever it is.
+    is the fraction of the volume by which the polytope of smooth shapes may be off, which `converged` says whether it keeps;
+    polyhedra are exact whatever it is.
     No overlap is an answer, not an error. Raises ValueError if the common set is unbounded.
 
     method 'auto' grows the hull of the dual points about a point well inside, in a frame in which the common set is round.

@@ -83,6 +83,10 @@ double farthest_vertex(const Polytope& polytope) {
   return farthest;
 }
 
+/// How far a polytope may shrink about its origin for the volume to be right to the fraction `tolerance`: by s it loses
+/// less than 3 s of its volume, of which measure() leaves 7/12 in doubt; rounding has the rest.
+double shrinking_within(double tolerance) { return 0.56 * tolerance; }
+
 /// A dual point rounded once moves its plane, as seen from the origin, by an ulp at the distance of the vertices.
 double rounding_of_dual(double slack, Vec3 dual, double farthest) {
   return slack * kLastRounding * std::max(1.0, norm(dual) * farthest);
@@ -114,7 +118,7 @@ Region grow(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> 
   const bool solid = growth.hull.build(negligible);
   assert(solid);
   if (!solid) throw std::logic_error("the dual points of an overlap lie in one plane");
-  growth.refine(tolerance);
+  growth.refine(shrinking_within(tolerance));
 
   Region region;
   set_frame(region, frame, reference);

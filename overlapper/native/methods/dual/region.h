@@ -11,9 +11,9 @@
 
 namespace overlapper {
 
-/// Grows the dual hull of the bodies' common set, whose round frame is given, until vertices reach out of smooth bodies
-/// by no more than the fraction `tolerance`. Bodies, planes and frame relative to `reference`; `rounding` is how far a
-/// plane may be off, in m. Bodies are Placed or WideBody.
+/// Grows the dual hull of the bodies' common set, whose round frame is given, until vertices reach so
+/// little out of smooth bodies that the volume is right to the fraction `tolerance`. Bodies, planes and frame relative
+/// to `reference`; `rounding` is how far a plane may be off, in m. Bodies are Placed or WideBody.
 template <class Body>
 Region grow(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> planes,
             const FrameAbout<PointOf<Body>>& frame, double tolerance, double rounding, Vec3 reference);

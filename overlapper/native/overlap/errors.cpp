@@ -1,0 +1,338 @@
+#include "overlap/errors.h"
+
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <limits>
+
+#include "geometry/ridges.h"
+#include "methods/dual/wide_dual.h"
+
+namespace overlapper {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Sums of products of coordinates, relative to the sum of their sizes: the same as for a region's volume.
+constexpr double kSums = 256 * DBL_EPSILON;
+
+/// The sine between two planes below which one is asked how far it runs along the other.
+constexpr double kNearlyFlush = 0x1p-4;
+
+/// A plane seen from the origin of a region's frame.
+struct Seen {
+  Vec3 dual;    ///< in the frame
+  Vec3 normal;  ///< unit, in the world
+  double slack, moved;
+  int owner;
+
+  double slack_at(Vec3 y) const { return slack * (1 - dot(dual, y)); }
+};
+
+/// How far the surface of a polytope may be from that between its planes, as a fraction of the way from the origin.
+///
+/// Corners lie on their planes, and inside the planes next to those, but for so much; then the closed surface that they
+/// span lies between the polytope so much smaller and so much larger. Where planes nearly coincide, a corner may be
+/// anywhere along their line, and the surface is none the worse for it.
+double misfit(const Polytope& p, const Ridges& ridges) {
+  const auto off = [&](int facet, int vertex) { return dot(p.dual[facet], p.vertices[vertex]) - 1; };
+  double worst = 0, product = 0;
+  for (int f = 0; f < p.facets(); ++f) {
+    const auto ring = p.facet(f);
+    for (size_t i = 0; i < ring.size(); ++i) {
+      const int from = ring[i], to = ring[(i + 1) % ring.size()], next = ring[(i + 2) % ring.size()];
+      worst = std::max({worst, std::abs(off(f, from)), off(ridges.left_of(to, from), next)});
+      product = std::max(product, norm(p.dual[f]) * norm(p.vertices[from]));
+    }
+  }
+  return worst + 2 * DBL_EPSILON * product;
+}
+
+/// The polytope of a region in metres about the origin of its frame, with what is known of its planes.
+class Sandwich {
+ public:
+  Sandwich(const Region& region, std::span<const Placed> bodies)
+      : region_(region), bodies_(bodies), ridges_(region.polytope) {
+    polyhedral_ = std::ranges::none_of(bodies, [](const Placed& body) { return smooth(body.shape); });
+    for (const Placed& body : bodies) relative_.push_back(body.seen_from(region.reference));
+    const Polytope& p = region.polytope;
+    for (Vec3 y : p.vertices) corners_.push_back(region.frame.axes * y);
+    for (double inner : region.inner) pulled_ = std::max(pulled_, 1 - inner);
+    for (int f = 0; f < p.facets(); ++f) {
+      const Region::Facet& facet = region.facets[f];
+      double pulled = 0;
+      for (int v : p.facet(f)) pulled = std::max(pulled, 1 - region.inner[v]);
+      facets_.push_back({p.dual[f], facet.normal, facet.slack, facet.rounding + pulled * facet.slack, facet.owner});
+      moved_ = std::max(moved_, facet.rounding / facet.slack);
+    }
+  }
+
+  double outer() const { return 1 + moved_; }
+  double inner() const { return std::max(0.0, 1 - moved_ - pulled_); }
+
+  /// m: how far the farthest corner is from there.
+  double radius(Vec3 about) const {
+    double farthest = 0;
+    for (Vec3 corner : corners_) farthest = std::max(farthest, norm2(corner - about));
+    return outer() * std::sqrt(farthest);
+  }
+
+  /// m: by the placing of corners, and by the movement of planes.
+  double vertices() const { return (misfit(region_.polytope, ridges_) + outer() - inner()) * radius({}); }
+
+  /// m²: how much of the surface may belong to another body than it is said to.
+  double doubtful_area() const {
+    const std::vector<double> of_facets = polyhedral_ ? doubtful_among_planes() : doubtful_beside_smooth();
+    double sum = 0;
+    for (size_t f = 0; f < of_facets.size(); ++f) {
+      const auto ring = region_.polytope.facet(static_cast<int>(f));
+      double size = 0;
+      for (size_t i = 1; i + 1 < ring.size(); ++i) {
+        const Vec3 from = corners_[ring[0]];
+        size += norm(cross(corners_[ring[i]] - from, corners_[ring[i + 1]] - from)) / 2;
+      }
+      sum += std::min(size, of_facets[f]);
+    }
+    return sum;
+  }
+
+ private:
+  std::vector<Vec3> polygon(size_t facet) const {
+    std::vector<Vec3> corners;
+    for (int v : region_.polytope.facet(static_cast<int>(facet))) corners.push_back(region_.polytope.vertices[v]);
+    return corners;
+  }
+
+  /// m², per facet: where a plane of another body, in the surface or just behind it, may be the outer one.
+  std::vector<double> doubtful_among_planes() const {
+    const std::vector<Seen> planes = planes_of_bodies();
+    std::vector<double> key;
+    double most = 0;
+    for (const Seen& plane : planes) {
+      key.push_back(std::abs(plane.normal.x));
+      most = std::max(most, plane.moved);
+    }
+    std::vector<double> areas;
+    for (size_t f = 0; f < facets_.size(); ++f) {
+      const Seen& facet = facets_[f];
+      const auto ring = region_.polytope.facet(static_cast<int>(f));
+      double around = 0;
+      for (size_t i = 0; i < ring.size(); ++i)
+        around += norm(corners_[ring[i]] - corners_[ring[(i + 1) % ring.size()]]);
+      // Along a plane that is not nearly flush, slack grows by kNearlyFlush or more of the way from the facet's border.
+      double doubtful = around * 2 * (facet.moved + most) / kNearlyFlush;
+      const std::vector<Vec3> corners = polygon(f);
+      const double x = std::abs(facet.normal.x);
+      const auto first = std::ranges::lower_bound(key, x - kNearlyFlush);
+      for (size_t i = first - key.begin(); i < planes.size() && key[i] <= x + kNearlyFlush; ++i) {
+        const Seen& plane = planes[i];
+        const bool flush = norm2(cross(plane.normal, facet.normal)) <= kNearlyFlush * kNearlyFlush;
+        if (flush && plane.owner != facet.owner) doubtful += area_within(corners, plane, facet.moved + plane.moved);
+      }
+      areas.push_back(doubtful);
+    }
+    return areas;
+  }
+
+  /// m², per facet: along the seam, or all of it where a smooth body is just behind the middle.
+  std::vector<double> doubtful_beside_smooth() const {
+    std::vector<double> areas;
+    for (size_t f = 0; f < facets_.size(); ++f) {
+      const std::vector<Vec3> corners = polygon(f);
+      double doubtful = beside_smooth(corners, facets_[f]) ? kInfinity : 0;
+      const auto ring = region_.polytope.facet(static_cast<int>(f));
+      for (size_t i = 0; i < ring.size(); ++i) {
+        const Seen& plane = facets_[ridges_.left_of(ring[(i + 1) % ring.size()], ring[i])];
+        if (plane.owner != facets_[f].owner) doubtful += area_within(corners, plane, facets_[f].moved + plane.moved);
+      }
+      areas.push_back(doubtful);
+    }
+    return areas;
+  }
+
+  /// Planes that may pass through the polytope's facets, by the size of the first coordinate of their normals.
+  std::vector<Seen> planes_of_bodies() const {
+    std::vector<Seen> planes;
+    double farthest = 0;
+    for (Vec3 y : region_.polytope.vertices) farthest = std::max(farthest, norm(y));
+    for (const WideDual& dual : wide_duals(bodies_, region_.reference, region_.frame, farthest)) {
+      const double rounding = dual.slack * kLastRounding * std::max(1.0, norm(dual.point) * farthest);
+      planes.push_back({dual.point, dual.normal, dual.slack, rounding, dual.owner});
+    }
+    std::ranges::sort(planes, {}, [](const Seen& plane) { return std::abs(plane.normal.x); });
+    return planes;
+  }
+
+  /// m²: of a polygon in the frame, where the plane is no farther than that.
+  double area_within(const std::vector<Vec3>& polygon, const Seen& plane, double distance) const {
+    std::vector<Vec3> kept;
+    for (size_t i = 0; i < polygon.size(); ++i) {
+      const Vec3 from = polygon[i], to = polygon[(i + 1) % polygon.size()];
+      const double before = plane.slack_at(from) - distance, after = plane.slack_at(to) - distance;
+      if (before <= 0) kept.push_back(from);
+      if ((before < 0) != (after < 0)) kept.push_back(from + before / (before - after) * (to - from));
+    }
+    double area = 0;
+    for (size_t i = 1; i + 1 < kept.size(); ++i) {
+      const Mat3& axes = region_.frame.axes;
+      area += norm(cross(axes * (kept[i] - kept[0]), axes * (kept[i + 1] - kept[0]))) / 2;
+    }
+    return area;
+  }
+
+  /// True if another, smooth body is as near behind the middle of a facet as the facet may have moved.
+  bool beside_smooth(const std::vector<Vec3>& polygon, const Seen& facet) const {
+    Vec3 middle;
+    for (Vec3 y : polygon) middle += y;
+    middle = middle / static_cast<double>(polygon.size());
+    for (size_t i = 0; i < bodies_.size(); ++i) {
+      if (static_cast<int>(i) == facet.owner || !smooth(bodies_[i].shape)) continue;
+      const Vec3 direction = region_.frame.axes * middle;
+      const Plane plane = relative_[i].ray_exit(region_.frame.origin, direction);
+      if (signed_distance(plane, region_.frame.origin + direction) > -4 * facet.moved) return true;
+    }
+    return false;
+  }
+
+  const Region& region_;
+  std::span<const Placed> bodies_;
+  Ridges ridges_;
+  std::vector<Placed> relative_;  ///< about the region's reference
+  bool polyhedral_;
+  std::vector<Vec3> corners_;  ///< m, about the frame's origin
+  std::vector<Seen> facets_;
+  double moved_ = 0;   ///< of planes, by rounding, relative to their slack
+  double pulled_ = 0;  ///< of vertices, into smooth shapes
+};
+
+Stated stated_of(const MeasuresAndInertia& values, size_t bodies) {
+  const Measures& m = values.measures;
+  Stated stated{m.area, m.centroid, *values.inertia, {}};
+  for (size_t i = 0; i < bodies; ++i)
+    stated.gradient.push_back(gradient_row(bodies == 2 ? m.pulls[i] : m.pulls_of_group[i]));
+  return stated;
+}
+
+/// The lengths of the force and of the moment by which two rows of a gradient differ.
+std::array<double, 2> apart(const std::array<double, 6>& a, const std::array<double, 6>& b) {
+  return {norm(Vec3{a[0] - b[0], a[1] - b[1], a[2] - b[2]}), norm(Vec3{a[3] - b[3], a[4] - b[4], a[5] - b[5]})};
+}
+
+double apart(const Mat3& a, const Mat3& b) {
+  return std::max(
+      {max_component(abs(a.row0 - b.row0)), max_component(abs(a.row1 - b.row1)), max_component(abs(a.row2 - b.row2))});
+}
+
+/// The box around the smallest body.
+struct Room {
+  double diameter = kInfinity, surface = kInfinity;
+  Vec3 middle;
+};
+Room room(std::span<const Placed> bodies) {
+  Room least;
+  for (const Placed& body : bodies) {
+    if (!bounded(body.shape)) continue;
+    const Bounds box = bounds(body);
+    const Vec3 side = box.upper - box.lower;
+    if (!(norm(side) < least.diameter)) continue;
+    const double surface = 2 * (side.x * side.y + side.y * side.z + side.z * side.x);
+    least = {norm(side), surface, box.lower + side / 2};
+  }
+  return least;
+}
+
+}  // namespace
+
+StatedWithErrors measured_with_errors(const Region& region, std::span<const Placed> bodies) {
+  const MeasuresAndInertia values = measure(region, bodies);
+  const Measures& m = values.measures;
+  const Sandwich sandwich(region, bodies);
+  const double outer = sandwich.outer(), inner = sandwich.inner();
+  const double between = outer * outer * outer - inner * inner * inner;
+
+  Errors errors;
+  errors.volume = m.volume_error;
+  errors.area = m.area * (std::max(outer * outer - 1, 1 - inner * inner) + kSums);
+  const double radius = sandwich.radius(m.centroid - region.reference - region.frame.origin);
+  const double last_bits = 4 * DBL_EPSILON * norm(m.centroid);
+  const double displaced = (between / (inner * inner * inner) + kSums) * radius;
+  errors.centroid = displaced + last_bits;
+  const double most = m.volume * (1 + between);
+  errors.inertia = most * ((between + kSums) * radius * radius + displaced * displaced);
+
+  // Patches grow and shrink with the set; beyond that, what is doubtful changes hands.
+  const double force = sandwich.doubtful_area() + (between + kSums) * m.area;
+  for (const Placed& body : bodies)
+    errors.gradient.push_back({force, force * (norm(m.centroid - body.position) + radius)});
+  return {stated_of(values, bodies.size()), std::move(errors)};
+}
+
+double error_of_vertices(const Region& region, const Boundary& boundary, std::span<const Placed> bodies) {
+  const Sandwich sandwich(region, bodies);
+  double world = 0;
+  for (Vec3 v : boundary.vertices) world = std::max(world, norm(v));
+  return sandwich.vertices() + boundary.merged + 4 * DBL_EPSILON * world;
+}
+
+Errors errors_beside(const StatedWithErrors& other, const Stated& stated) {
+  Errors errors = other.errors;
+  errors.area += std::abs(stated.area - other.stated.area);
+  errors.centroid += norm(stated.centroid - other.stated.centroid);
+  errors.inertia += apart(stated.inertia, other.stated.inertia);
+  for (size_t i = 0; i < errors.gradient.size(); ++i) {
+    const auto [force, moment] = apart(stated.gradient[i], other.stated.gradient[i]);
+    errors.gradient[i][0] += force;
+    errors.gradient[i][1] += moment;
+  }
+  return errors;
+}
+
+Errors errors_of_formula(const Measures& stated, std::span<const Placed> bodies) {
+  const double relative = 4 * stated.volume_error / stated.volume;
+  const double diameter = room(bodies).diameter;
+  Errors errors;
+  errors.volume = stated.volume_error;
+  errors.area = relative * stated.area;
+  errors.centroid = relative * diameter + 4 * DBL_EPSILON * norm(stated.centroid);
+  errors.inertia = relative * stated.volume * diameter * diameter;
+  for (const Placed& body : bodies)
+    errors.gradient.push_back({errors.area, errors.area * (norm(stated.centroid - body.position) + diameter)});
+  return errors;
+}
+
+double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b) {
+  double farthest = 0;
+  for (const auto& [from, to] : {std::pair(a, b), std::pair(b, a)}) {
+    for (Vec3 p : from) {
+      double nearest = kInfinity;
+      for (Vec3 q : to) nearest = std::min(nearest, norm2(p - q));
+      farthest = std::max(farthest, nearest);
+    }
+  }
+  return std::sqrt(farthest);
+}
+
+Errors errors_of_anything(double volume, std::span<const Placed> bodies) {
+  Errors errors{volume, kInfinity, kInfinity, kInfinity, kInfinity, {}};
+  errors.gradient.assign(bodies.size(), {kInfinity, kInfinity});
+  errors = no_more_than_all(std::move(errors), bodies);
+  errors.inertia = volume * room(bodies).diameter * room(bodies).diameter;
+  return errors;
+}
+
+Errors no_more_than_all(Errors errors, std::span<const Placed> bodies) {
+  const auto [diameter, surface, middle] = room(bodies);
+  // What is not a number is no bound.
+  const auto cap = [](double& error, double most) { error = error <= most ? error : most; };
+  cap(errors.area, surface);
+  cap(errors.centroid, diameter);
+  cap(errors.vertices, diameter);
+  cap(errors.inertia, surface * diameter * diameter * diameter);
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    cap(errors.gradient[i][0], surface);
+    cap(errors.gradient[i][1], surface * (diameter + norm(middle - bodies[i].position)));
+  }
+  return errors;
+}
+
+}  // namespace overlapper

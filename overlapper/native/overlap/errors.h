@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "methods/dual/region.h"
+#include "overlap/boundary.h"
+#include "shapes/shape.h"
+
+namespace overlapper {
+
+/// How far what is stated of a common set may be off, in world coordinates and SI units.
+struct Errors {
+  double volume = 0;    ///< m³
+  double area = 0;      ///< m²
+  double centroid = 0;  ///< m: the true centroid is no farther away
+  double inertia = 0;   ///< m⁵, of each entry
+  double vertices = 0;  ///< m: Hausdorff distance between the common set and the hull of the vertices
+  std::vector<std::array<double, 2>> gradient;  ///< per body: m² of the force, m³ of the moment, each of its length
+};
+
+/// Measures whose errors are looked for.
+struct Stated {
+  double area = 0;
+  Vec3 centroid;
+  Mat3 inertia{{}, {}, {}};
+  std::vector<std::array<double, 6>> gradient;
+};
+
+struct StatedWithErrors {
+  Stated stated;
+  Errors errors;
+};
+
+/// The measures of a region, and how far they may be from those of the common set.
+///
+/// The polytope P has the origin of the region's frame inside, and its plane f, at the slack s_f from there, is moved
+/// by rounding by no more than d_f. So the common set lies between λP and μP, with μ = 1 + max d_f / s_f, and λ = 2 - μ
+/// less what vertices are pulled into smooth shapes. Volume and area of convex sets grow with the set, which bounds
+/// both; the two sets differ by no more than (μ³ - λ³) times the volume, all of it as near to the centroid as the
+/// farthest vertex, which bounds the centroid and the inertia.
+///
+/// The gradient needs to know which body owns what. Where no plane of another body is as near to a point of a facet as
+/// both planes may have moved, the owner is beyond doubt; the area where one is, a strip along the seam or a whole
+/// facet that two bodies share, may belong to either.
+StatedWithErrors measured_with_errors(const Region& region, std::span<const Placed> bodies);
+
+/// The error of the vertices of a region's boundary.
+double error_of_vertices(const Region& region, const Boundary& boundary, std::span<const Placed> bodies);
+
+/// The errors of what is stated, beside something else whose errors are known: those, and how far the two are apart.
+/// Those of the volume and of the vertices stay.
+Errors errors_beside(const StatedWithErrors& other, const Stated& stated);
+
+/// The errors of measures by a formula: its arguments, off by rounding, are what its volume is off by, and no measure
+/// is of a higher degree in them than four more.
+Errors errors_of_formula(const Measures& stated, std::span<const Placed> bodies);
+
+/// m: how far any of the points of one cloud is from the nearest of the other.
+double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b);
+
+/// The errors of whatever is stated of bodies whose common set is anything up to that volume.
+Errors errors_of_anything(double volume, std::span<const Placed> bodies);
+
+/// No error is larger than what the smallest body leaves open: of measures that are true of some part of it.
+Errors no_more_than_all(Errors errors, std::span<const Placed> bodies);
+
+}  // namespace overlapper

@@ -1,0 +1,109 @@
+"""Bounds of the errors of all measures. That they hold of polyhedra, the rules of the families say."""
+
+import numpy as np
+import pytest
+from families import make
+from numpy.testing import assert_allclose
+from rules import the_errors_hold_the_measures
+from strategies import quaternion
+
+from overlapper import Box, Capsule, Cylinder, Hull, Placed, RoundedHull, Sphere, overlap
+
+CUBE = Box([1, 1, 1])
+
+
+def random_shape(rng):
+    size = rng.uniform(0.3, 1.2)
+    shapes = (
+        lambda: Sphere(size),
+        lambda: Capsule(size / 2, size),
+        lambda: Cylinder(size / 2, size),
+        lambda: RoundedHull(rng.normal(size=(6, 3)) * size / 2, size / 3),
+        lambda: Box(rng.uniform(0.2, 1, 3) * size),
+        lambda: Hull(rng.normal(size=(12, 3)) * size),
+    )
+    return shapes[rng.integers(len(shapes))]()
+
+
+def overlapping_bodies(seed):
+    """A pair, or three, near enough to each other."""
+    rng = np.random.default_rng(seed)
+    return [Placed(random_shape(rng), rng.normal(size=3) * 0.1, quaternion(rng)) for _ in range(2 + seed % 2)]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_measures_of_round_bodies_at_two_tolerances_are_within_the_errors_of_both(seed):
+    bodies = overlapping_bodies(seed)
+    coarse, fine = overlap(*bodies, tolerance=1e-2), overlap(*bodies, tolerance=1e-3)
+    assert coarse and fine
+    size = float(np.linalg.norm(np.ptp(fine.bounds, axis=0)))
+    assert abs(coarse.area - fine.area) <= coarse.errors.area + fine.errors.area
+    assert np.linalg.norm(coarse.centroid - fine.centroid) <= coarse.errors.centroid + fine.errors.centroid
+    assert np.abs(coarse.inertia - fine.inertia).max() <= coarse.errors.inertia + fine.errors.inertia
+    slopes = coarse.errors.gradient + fine.errors.gradient
+    assert (np.abs(coarse.gradient - fine.gradient) <= slopes).all()
+    along = np.random.default_rng(seed).normal(size=(50, 3))
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    reach = np.abs((coarse.vertices @ along.T).max(0) - (fine.vertices @ along.T).max(0)).max()
+    assert reach <= coarse.errors.vertices + fine.errors.vertices
+    assert coarse.errors.vertices <= 0.05 * size
+
+
+@pytest.mark.parametrize("family", ["general", "slivers", "shared_planes", "touching", "tilted_slivers"])
+def test_the_errors_of_method_paper_hold_what_it_loses(family):
+    for seed in range(6):
+        case = make(family, seed)
+        found = overlap(*case.placed, method="paper")
+        assert not the_errors_hold_the_measures(case, found), case
+        if not found and case.truth.dimension == 3:
+            assert found.errors.area >= case.truth.area
+            assert found.errors.centroid is None
+
+
+def test_bodies_apart_have_no_errors_and_bodies_that_touch_may_share_what_rounding_hides():
+    apart = overlap(CUBE, Placed(CUBE, (3, 0, 0))).errors
+    assert (apart.volume, apart.area, apart.inertia, apart.centroid, apart.vertices) == (0, 0, 0, None, None)
+    assert not apart.gradient.any() and apart.gradient.shape == (2, 6)
+    found = overlap(CUBE, Placed(CUBE, (2, 0, 0)))
+    assert found.status == "touching" and found.errors.volume == found.volume_error > 0
+    assert 8 <= found.errors.area <= 24 and np.isfinite(found.errors.gradient).all()
+    assert 0 < found.errors.inertia < 1e-10
+
+
+def test_who_owns_a_facet_that_two_bodies_share_is_in_the_error_of_the_gradient():
+    flush = overlap(CUBE, Placed(CUBE, (1, 0, 0)))
+    assert_allclose(flush.errors.gradient[:, 0], 4 * 2, rtol=1e-6)  # four walls of 2 m² in common
+    beyond = overlap(CUBE, Placed(Box([2, 2, 2]), (2, 0, 0)))
+    assert (beyond.errors.gradient < 1e-10).all()
+
+
+def test_errors_are_finite_at_any_size():
+    for scale in (1e-24, 1e24):
+        errors = overlap(Box([scale] * 3), Placed(Box([scale] * 3), (scale, 0, scale / 3), (1, 2, 3, 4))).errors
+        assert 0 < errors.area <= 1e-12 * scale**2
+        assert 0 < errors.centroid <= 1e-12 * scale
+        assert 0 < errors.vertices <= 1e-12 * scale
+        assert 0 < errors.inertia <= 1e-12 * scale**5
+        assert np.isfinite(errors.gradient).all()
+
+
+def test_errors_say_what_they_are():
+    text = repr(overlap(CUBE, Placed(CUBE, (1, 0, 0))).errors)
+    assert text.startswith("Errors(volume=") and " m³, area=" in text and ", vertices=" in text
+    assert ", depth=" in text and ", distance=" in text
+    three = overlap(CUBE, Placed(CUBE, (1, 0, 0)), Placed(CUBE, (0, 1, 0))).errors
+    assert (three.depth, three.distance, three.witnesses) == (None, None, None) and "depth" not in repr(three)
+    assert "centroid" not in repr(overlap(CUBE, Placed(CUBE, (3, 0, 0))).errors)
+
+
+@pytest.mark.parametrize("tolerance", [0.9, 0.1, 1e-2, 1e-4])
+def test_a_tolerance_is_kept_by_all_shapes(tolerance):
+    for seed in range(30):
+        found = overlap(*overlapping_bodies(seed), tolerance=tolerance)
+        assert found.converged and found.volume_error <= tolerance * found.volume
+
+
+def test_a_tolerance_that_is_not_kept_is_said_by_name():
+    three = CUBE, Placed(CUBE, (1, 0, 0), (1, 2, 3, 4)), Placed(CUBE, (0, 1, 0))
+    assert overlap(*three).converged and not overlap(*three, tolerance=1e-16).converged
+    assert overlap(CUBE, Placed(CUBE, (2, 0, 0)), tolerance=1e-16).converged
