@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "geometry/predicates.h"
+#include "geometry/thresholds.h"
 
 namespace overlapper {
 namespace {
@@ -208,27 +209,86 @@ void ExpandingHull::link_cone(int p) {
   }
 }
 
-bool ExpandingHull::wait_with_any(std::span<const int> candidates, int p) {
-  for (int facet : candidates) {
-    if (!sees(facet, p)) continue;
-    Facet& f = facets[facet];
-    const double distance = height(facet, p);
-    next_conflict_[p] = f.first_conflict;
-    f.first_conflict = p;
-    if (f.farthest_conflict < 0 || distance > f.farthest_height) f.farthest_conflict = p, f.farthest_height = distance;
-    return true;
-  }
-  return false;
+void ExpandingHull::wait(int facet, int p) {
+  Facet& f = facets[facet];
+  const double distance = height(facet, p);
+  next_conflict_[p] = f.first_conflict;
+  f.first_conflict = p;
+  if (f.farthest_conflict < 0 || distance > f.farthest_height) f.farthest_conflict = p, f.farthest_height = distance;
 }
 
-void ExpandingHull::hand_on_conflicts(int facet, std::span<const int> candidates, int except) {
+int ExpandingHull::first_that_sees(std::span<const int> candidates, int p) const {
+  const auto seen = std::ranges::find_if(candidates, [&](int facet) { return sees(facet, p); });
+  return seen == candidates.end() ? -1 : *seen;
+}
+
+void ExpandingHull::order_cone() {
+  fan_.clear();
+  if (cone_.size() <= kMostConeScanned) return;
+  for (int facet = cone_[0]; fan_.empty() || facet != cone_[0]; facet = facets[facet].neighbour[1])
+    fan_.push_back(facet);
+}
+
+int ExpandingHull::fan_facet_that_sees(int p, size_t base) const {
+  const size_t size = fan_.size();
+  const auto facet = [&](size_t k) { return fan_[(base + k) % size]; };
+  if (sees(facet(0), p)) return facet(0);
+  if (sees(facet(size - 1), p)) return facet(size - 1);
+  // The planes through the apex, the first corner of the horizon and its k-th turn about the line of the two by less
+  // than half a turn from the first facet to the last, so that `p`, behind both, lies between two of them.
+  const std::array<int, 3>& corner = facets[facet(0)].vertex;
+  const Vec3 first = points[corner[0]], apex = points[corner[2]];
+  const auto side = [&](size_t k) { return orientation(first, points[facets[facet(k)].vertex[0]], apex, points[p]); };
+  const auto last_with = [&](auto holds) {
+    size_t low = 1, high = size - 1;
+    while (high - low > 1) {
+      const size_t middle = low + (high - low) / 2;
+      (holds(side(middle)) ? low : high) = middle;
+    }
+    return low;
+  };
+  const size_t between = last_with([](int s) { return s <= 0; });
+  if (sees(facet(between), p)) return facet(between);
+  if (side(between) < 0) return -1;
+  // On one of the planes, which several corners of the horizon may share.
+  const size_t before = last_with([](int s) { return s < 0; });
+  if (sees(facet(before), p)) return facet(before);
+  // On the line: before the first corner, or behind the apex.
+  const bool on_line = side(1) == 0 && side(size - 1) == 0;
+  return on_line && base == 0 ? fan_facet_that_sees(p, size / 2) : -1;
+}
+
+template <class Wait>
+void ExpandingHull::hand_on_conflicts(int facet, int except, Wait wait_elsewhere) {
   int p = facets[facet].first_conflict;
   facets[facet].first_conflict = facets[facet].farthest_conflict = -1;
   while (p >= 0) {
     const int next = next_conflict_[p];
-    if (p != except) wait_with_any(candidates, p);
+    if (p != except) wait_elsewhere(p);
     p = next;
   }
+}
+
+int ExpandingHull::cone_facet_that_sees(int p) const {
+  if (fan_.empty()) return first_that_sees(cone_, p);
+  const int facet = fan_facet_that_sees(p, 0);
+  assert(facet >= 0 || first_that_sees(cone_, p) < 0);
+  if (facet < 0) return -1;
+  // With which of several a point waits decides the numbers of facets: the first of all but very large cones, as above.
+  constexpr size_t kMostInOrder = 512;
+  const int first = first_that_sees(std::span(cone_).first(std::min(cone_.size(), kMostInOrder)), p);
+  return first < 0 ? facet : first;
+}
+
+void ExpandingHull::hand_on_to_cone(int apex) {
+  order_cone();
+  // A point that saw a removed facet and is still outside sees one of the cone: at the horizon, the plane of a cone
+  // facet lies between the planes of the two facets that met there.
+  for (int gone : removed_)
+    hand_on_conflicts(gone, apex, [&](int p) {
+      const int facet = cone_facet_that_sees(p);
+      if (facet >= 0) wait(facet, p);
+    });
 }
 
 bool ExpandingHull::rises_above_facet(int facet, int p, double fraction) const {
@@ -253,7 +313,10 @@ bool ExpandingHull::build(std::span<const double> negligible) {
   if (!start()) return false;
   next_conflict_.assign(points.size(), -1);
   const std::array<int, 4> first_facets{0, 1, 2, 3};
-  for (int p = 0; p < static_cast<int>(points.size()); ++p) wait_with_any(first_facets, p);
+  for (int p = 0; p < static_cast<int>(points.size()); ++p) {
+    const int facet = first_that_sees(first_facets, p);
+    if (facet >= 0) wait(facet, p);
+  }
 
   std::vector<int> pending(first_facets.begin(), first_facets.end());
   while (!pending.empty()) {
@@ -265,13 +328,11 @@ bool ExpandingHull::build(std::span<const double> negligible) {
     const int apex = facets[facet].farthest_conflict;
     if (!negligible.empty() && !rises_above(facet, apex, negligible[apex])) {
       // The hull only grows, so what is negligible now stays so.
-      hand_on_conflicts(facet, std::array{facet}, apex);
+      hand_on_conflicts(facet, apex, [&](int p) { wait(facet, p); });
       continue;
     }
     insert(apex, facet);
-    // A point that saw a removed facet and is still outside sees one of the cone: at the horizon, the plane of a cone
-    // facet lies between the planes of the two facets that met there.
-    for (int gone : removed_) hand_on_conflicts(gone, cone_, apex);
+    hand_on_to_cone(apex);
     pending.insert(pending.end(), cone_.begin(), cone_.end());
   }
   return true;

@@ -71,14 +71,23 @@ class ExpandingHull {
  private:
   int make_facet(int a, int b, int c);
   double height(int facet, int p) const;
-  bool wait_with_any(std::span<const int> candidates, int p);
-  void hand_on_conflicts(int facet, std::span<const int> candidates, int except);
+  void wait(int facet, int p);
+  /// Takes the conflicts of a facet but for `except`, and calls `wait_elsewhere` with each.
+  template <class Wait>
+  void hand_on_conflicts(int facet, int except, Wait wait_elsewhere);
+  void hand_on_to_cone(int apex);
+  int first_that_sees(std::span<const int> candidates, int p) const;
+  int cone_facet_that_sees(int p) const;
+  /// The cone in its order around the apex, if it is large.
+  void order_cone();
+  /// A facet of the cone so ordered that sees `p`, or -1: by bisection from facet number `base` on.
+  int fan_facet_that_sees(int p, size_t base) const;
   bool rises_above_facet(int facet, int p, double fraction) const;
   bool rises_above(int facet, int p, double fraction);
   void collect_visible(int p, int seen);
   void link_cone(int p);
 
-  std::vector<int> cone_, removed_, stack_, cone_start_, next_conflict_, visited_;
+  std::vector<int> cone_, fan_, removed_, stack_, cone_start_, next_conflict_, visited_;
   struct HorizonRidge {
     int from, to, outside;
   };

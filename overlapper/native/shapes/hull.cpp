@@ -261,10 +261,8 @@ std::array<int, 3> well_spread(std::span<const int> around, const std::vector<Pl
   return {around[0], second, most([&](int f) { return std::abs(dot(ab, planes[f].normal)); })};
 }
 
-/// How far corners of a facet rise above the plane of the one across its edge number `edge`, at most; 0 if none does.
-/// From either end of the edge, heights fall along the ring until they rise again towards the other end, as the ring is
-/// convex but for rounding: once they are below all that rounding may do, none beyond counts. So the ring of a large
-/// facet is not walked for each of the many around it.
+}  // namespace
+
 double rise_beside(const HullData& data, const Plane& across, std::span<const int> ring, size_t edge, double rounding) {
   const size_t corners = ring.size();
   double highest = 0;
@@ -278,6 +276,8 @@ double rise_beside(const HullData& data, const Plane& across, std::span<const in
   for (size_t back = 0; back < corners && !falls_away(edge + corners - back); ++back) continue;
   return highest;
 }
+
+namespace {
 
 /// The largest rise_beside() over all edges.
 double rise_over_edges(const HullData& data, double rounding) {

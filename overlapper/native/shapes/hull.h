@@ -66,6 +66,12 @@ Hull hull_of_surface(Vec3 origin, std::span<const Vec3> corners, std::span<const
 /// Fills in what follows from vertices, planes and rings.
 void complete(HullData& data);
 
+/// How far corners of a facet rise above the plane of the one across its edge number `edge`, at most; 0 if none does.
+/// From either end of the edge, heights fall along the ring until they rise again towards the other end, as the ring is
+/// convex but for rounding: once they are below all that rounding may do, none beyond counts. So the ring of a large
+/// facet is not walked for each of the many around it.
+double rise_beside(const HullData& data, const Plane& across, std::span<const int> ring, size_t edge, double rounding);
+
 struct HullMeasures {
   double volume = 0, area = 0;
   Vec3 centroid;

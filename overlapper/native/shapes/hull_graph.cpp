@@ -1,5 +1,6 @@
 #include "shapes/hull_graph.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "geometry/thresholds.h"
@@ -54,19 +55,55 @@ int above_plateau(int top, double height, double slack, int elements, Value valu
   return found;
 }
 
-template <class Value, class Neighbours>
-int climb(int start, double slack, int elements, Value value, Neighbours neighbours, double& height) {
+/// The place of the largest of values around a ring that rise to it from both sides, as a linear function does around a
+/// convex polygon: that among a few corners, then each time among it and those half as far to either side.
+template <class Value>
+int peak_of_ring(int size, Value value) {
+  int stride = 1;
+  while (8 * stride <= size) stride *= 2;
+  int peak = 0;
+  double highest = value(0);
+  const auto look_at = [&](int place) {
+    const double v = value(place);
+    if (v > highest) highest = v, peak = place;
+  };
+  for (int place = stride; place < size; place += stride) look_at(place);
+  while (stride > 1) {
+    stride /= 2;
+    const int middle = peak;
+    if (middle + stride < size) look_at(middle + stride);
+    look_at(middle > 0 ? middle - stride : (size - 1) / stride * stride);
+  }
+  return peak;
+}
+
+/// The neighbour of a fan towards which `slope(place)` says that the way is steepest; -1 without a fan.
+template <class Slope>
+int steepest(const std::vector<NeighbourFan>& fans, const std::vector<int>& fan_of, int element, Slope slope) {
+  if (fan_of.empty() || fan_of[element] < 0) return -1;
+  const NeighbourFan& fan = fans[fan_of[element]];
+  return fan.neighbour[peak_of_ring(static_cast<int>(fan.neighbour.size()),
+                                    [&](int place) { return slope(fan.neighbour[place]) * fan.inverse[place]; })];
+}
+
+/// `shortcut(top, height)` is the only neighbour to look at, or -1 if all are.
+template <class Value, class Neighbours, class Shortcut>
+int climb(int start, double slack, int elements, Value value, Neighbours neighbours, Shortcut shortcut,
+          double& height) {
   int top = start;
   height = value(top);
   while (true) {
     int higher = -1;
     bool level = false;
     const double here = height;
-    neighbours(top, [&](int other) {
+    const auto visit = [&](int other) {
       const double v = value(other);
       if (v > height) height = v, higher = other;
       level |= v >= here - slack;
-    });
+    };
+    const int only = shortcut(top, here);
+    if (only >= 0) visit(only);
+    else neighbours(top, visit);
     if (higher < 0 && level) {
       higher = above_plateau(top, height, slack, elements, value, neighbours);
       if (higher >= 0) height = value(higher);
@@ -99,6 +136,15 @@ auto facet_neighbours(const HullGraph& graph, const HullData& hull) {
   };
 }
 
+/// How much more than through facet `f` the ray leaves through another, for those around `f`: the origin is any point
+/// inside, and `rate` one over the length of the ray up to the plane of `f`.
+auto facet_slope(const HullData& hull, Vec3 origin, Vec3 direction, double rate) {
+  return [&hull, origin, direction, rate](int other) {
+    const Plane& plane = hull.planes[other];
+    return dot(plane.normal, direction) + rate * signed_distance(plane, origin);
+  };
+}
+
 /// Twins by matching what leaves a vertex with what arrives there; false unless each half-edge has exactly one.
 bool link(const HullData& hull, HullGraph& graph) {
   const int edges = static_cast<int>(hull.ring.size()), vertices = static_cast<int>(hull.vertices.size());
@@ -112,12 +158,15 @@ bool link(const HullData& hull, HullGraph& graph) {
       ++graph.around_start[hull.ring[h] + 1];
     }
   for (int v = 0; v < vertices; ++v) graph.around_start[v + 1] += graph.around_start[v];
-  std::vector<int> filled(graph.around_start.begin(), graph.around_start.end() - 1), leaving(edges);
+  // As many arrive at a vertex as leave it.
+  std::vector<int> filled(graph.around_start.begin(), graph.around_start.end() - 1), met = filled;
+  std::vector<int> leaving(edges), arriving(edges);
   graph.around.resize(edges);
   for (int h = 0; h < edges; ++h) {
     const int slot = filled[hull.ring[h]]++;
     graph.around[slot] = hull.ring[graph.next[h]];
     leaving[slot] = h;
+    arriving[met[graph.around[slot]]++] = h;
   }
   graph.twin.assign(edges, -1);
   graph.beside.resize(edges);
@@ -125,10 +174,16 @@ bool link(const HullData& hull, HullGraph& graph) {
   for (int h = 0; h < edges; ++h) {
     const int from = hull.ring[h], to = hull.ring[graph.next[h]];
     graph.leaving[from] = h;
-    for (int i = graph.around_start[to]; i < graph.around_start[to + 1]; ++i) {
-      if (graph.around[i] != from) continue;
+    // The smaller of the degrees at both ends of an edge, summed over those of a planar graph, is in proportion to
+    // their number (Chiba and Nishizeki 1985).
+    const int *start = graph.around_start.data(), degree = start[to + 1] - start[to];
+    const bool from_smaller = start[from + 1] - start[from] < degree;
+    const int end = from_smaller ? from : to;
+    for (int i = start[end]; i < start[end + 1]; ++i) {
+      const int other = from_smaller ? arriving[i] : leaving[i];
+      if (from_smaller ? hull.ring[other] != to : graph.around[i] != from) continue;
       if (graph.twin[h] >= 0) return false;
-      graph.twin[h] = leaving[i];
+      graph.twin[h] = other;
     }
     if (graph.twin[h] < 0) return false;
     graph.beside[h] = graph.facet[graph.twin[h]];
@@ -141,11 +196,45 @@ bool link(const HullData& hull, HullGraph& graph) {
 /// True if no facet rises above the one beside it by more than `rounding`.
 bool convex(const HullData& hull, const HullGraph& graph, double rounding) {
   for (int h = 0; h < static_cast<int>(hull.ring.size()); ++h) {
-    const Plane& plane = hull.planes[graph.facet[h]];
-    for (int v : hull.facet(graph.beside[h]))
-      if (signed_distance(plane, hull.vertices[v]) > rounding) return false;
+    const int other = graph.beside[h];
+    const size_t edge = graph.twin[h] - hull.ring_start[other];
+    if (rise_beside(hull, hull.planes[graph.facet[h]], hull.facet(other), edge, rounding) > rounding) return false;
   }
   return true;
+}
+
+/// Adds the fan of an element unless one of its neighbours is not on the way inside, but for rounding.
+void add_fan(std::vector<NeighbourFan>& fans, std::vector<int>& fan_of, size_t elements, NeighbourFan fan) {
+  if (!std::ranges::all_of(fan.inverse, [](double each) { return each > 0 && std::isfinite(each); })) return;
+  fan_of.resize(elements, -1);
+  fan_of[fan.element] = static_cast<int>(fans.size());
+  fans.push_back(std::move(fan));
+}
+
+void make_fans(const HullData& hull, HullGraph& graph) {
+  for (int v = 0; v < static_cast<int>(hull.vertices.size()); ++v) {
+    if (graph.around_start[v + 1] - graph.around_start[v] <= kMostScanned) continue;
+    NeighbourFan fan{v, {}, {}};
+    Vec3 outside;
+    int h = graph.leaving[v];
+    do {
+      fan.neighbour.push_back(hull.ring[graph.next[h]]);
+      outside += hull.planes[graph.facet[h]].normal;
+      h = graph.next[graph.twin[h]];
+    } while (h != graph.leaving[v]);
+    for (int u : fan.neighbour) fan.inverse.push_back(-1 / dot(outside, hull.vertices[u] - hull.vertices[v]));
+    add_fan(graph.vertex_fans, graph.fan_of_vertex, hull.vertices.size(), std::move(fan));
+  }
+  for (int f = 0; f < static_cast<int>(hull.planes.size()); ++f) {
+    const auto ring = hull.facet(f);
+    if (ring.size() <= kMostScanned) continue;
+    NeighbourFan fan{f, {graph.beside.begin() + hull.ring_start[f], graph.beside.begin() + hull.ring_start[f + 1]}, {}};
+    // Seen from a point on the facet, the polar dual of the others is the polygon.
+    Vec3 middle;
+    for (int v : ring) middle += hull.vertices[v] / static_cast<double>(ring.size());
+    for (int g : fan.neighbour) fan.inverse.push_back(-1 / signed_distance(hull.planes[g], middle));
+    add_fan(graph.facet_fans, graph.fan_of_facet, hull.planes.size(), std::move(fan));
+  }
 }
 
 void fill_maps(const HullData& hull, HullGraph& graph) {
@@ -207,7 +296,12 @@ int HullGraph::farthest_vertex(const HullData& hull, Vec3 direction, int start) 
   // About the centroid, where coordinates are as small as they get.
   return climb(
       start, rounding_of_dot(size), static_cast<int>(hull.vertices.size()),
-      [&](int v) { return dot(hull.vertices[v] - hull.centroid, direction); }, vertex_neighbours(*this), height);
+      [&](int v) { return dot(hull.vertices[v] - hull.centroid, direction); }, vertex_neighbours(*this),
+      [&](int top, double) {
+        return steepest(vertex_fans, fan_of_vertex, top,
+                        [&](int v) { return dot(hull.vertices[v] - hull.vertices[top], direction); });
+      },
+      height);
 }
 
 int HullGraph::facet_towards(const HullData& hull, Vec3 point, double& gauge) const {
@@ -222,7 +316,11 @@ int HullGraph::facet_towards(const HullData& hull, Vec3 point, double& gauge, in
   const double size = std::sqrt(norm2(from_centroid)) / inradius;
   return climb(
       start, rounding_of_dot(size), static_cast<int>(dual.size()), [&](int f) { return dot(dual[f], from_centroid); },
-      facet_neighbours(*this, hull), gauge);
+      facet_neighbours(*this, hull),
+      [&](int top, double here) {
+        return steepest(facet_fans, fan_of_facet, top, facet_slope(hull, hull.centroid, from_centroid, here));
+      },
+      gauge);
 }
 
 int HullGraph::ray_exit(const HullData& hull, Vec3 origin, Vec3 direction, double& rate) const {
@@ -242,12 +340,15 @@ int HullGraph::ray_exit(const HullData& hull, Vec3 origin, Vec3 direction, doubl
   };
   const int facets = static_cast<int>(dual.size());
   if (facets <= kMostScanned) return scan(facets, value, rate);
-  const int first = climb(start, 0, facets, value, facet_neighbours(*this, hull), rate);
+  const auto shortcut = [&](int top, double here) {
+    return steepest(facet_fans, fan_of_facet, top, facet_slope(hull, origin, direction, here));
+  };
+  const int first = climb(start, 0, facets, value, facet_neighbours(*this, hull), shortcut, rate);
   // Rates near that of the exit have slacks that are rounded alike.
   const double slack = -signed_distance(hull.planes[first], origin);
   const double rounding =
       rounding_of_dot(circumradius + norm(origin - hull.centroid)) / std::max(slack, inradius * 0x1p-40);
-  return climb(first, rate * rounding, facets, value, facet_neighbours(*this, hull), rate);
+  return climb(first, rate * rounding, facets, value, facet_neighbours(*this, hull), shortcut, rate);
 }
 
 std::shared_ptr<const HullGraph> graph_of(const HullData& hull) {
@@ -268,6 +369,7 @@ std::shared_ptr<const HullGraph> graph_of(const HullData& hull) {
     graph->inradius = std::min(graph->inradius, slack);
     graph->dual.push_back(plane.normal / slack);
   }
+  make_fans(hull, *graph);
   fill_maps(hull, *graph);
   return graph;
 }

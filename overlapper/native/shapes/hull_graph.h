@@ -28,6 +28,14 @@ class DirectionMap {
   std::vector<int> nearest_;
 };
 
+/// The neighbours of one element that has many, in their order around it. Divided by how far each is on the way inside,
+/// the steps to them end on a convex polygon, around which the step that climbs most is found by bisection.
+struct NeighbourFan {
+  int element;
+  std::vector<int> neighbour;
+  std::vector<double> inverse;  ///< per neighbour, one over its distance on the way inside
+};
+
 /// Who is next to whom on a hull, so that a query climbs from neighbour to neighbour instead of looking at everything
 /// (Dobkin and Kirkpatrick 1983; their hierarchy of ever smaller polytopes is here one map from directions to remote
 /// elements). A linear function over a polytope has no local maximum but the global one, which several elements may
@@ -44,6 +52,10 @@ struct HullGraph {
   double circumradius = 0;                ///< m, about the centroid
   bool triangular = false;               ///< no facet was merged from several triangles, and none is tilted by rounding
   DirectionMap vertex_near, facet_near;  ///< about the centroid; empty where a scan is faster
+  /// Of the elements with more neighbours than are looked at sooner than bisected, and per element which is its own, -1
+  /// for none; empty if there is none at all.
+  std::vector<NeighbourFan> vertex_fans, facet_fans;
+  std::vector<int> fan_of_vertex, fan_of_facet;
 
   /// Number of a farthest vertex along `direction`.
   int farthest_vertex(const HullData& hull, Vec3 direction) const;

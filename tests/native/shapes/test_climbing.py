@@ -24,6 +24,11 @@ def latitudes(bands):
     return np.vstack([*rings, [[0, 0, 1], [0, 0, -1]]])
 
 
+def cone(sides):
+    """A pole with as many neighbours as the base has corners, which are not evenly spread."""
+    return np.vstack([prism(sides, 0.0)[:sides] @ np.diag([1, 1e-2, 1]), [[0.3, 0, 1]]])
+
+
 def cloud(seed, count, stretch):
     points = np.random.default_rng(seed).normal(size=(count, 3))
     return points / np.linalg.norm(points, axis=1)[:, None] * stretch
@@ -38,6 +43,10 @@ MANY = {
     "plate": cloud(2, 500, (1, 1, 1e-4)),
     "ball of points": cloud(3, 700, (1, 1, 1)),
     "two sizes": np.vstack([cloud(4, 300, (1, 1, 1)), cloud(5, 300, (1e-3, 1e-3, 1e-3)) + [0, 0, 1.2]]),
+    "cone": cone(300),
+    "two cones": np.vstack([cone(300), [[0, 0, -1]]]),
+    "flat cone": cone(300) * [1, 1, 1e-9],
+    "moment curve": np.linspace(0, 1, 300)[:, None] ** [1, 2, 3],
     "grid on a cube": np.array(list(np.ndindex(7, 7, 7)), float) - 3,
 }
 

@@ -191,6 +191,25 @@ def test_hull_of_lattice_points_is_the_exact_one(points):
     assert_is_a_convex_polytope(hull, points)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_hull_of_fans_with_points_in_their_planes_is_the_exact_one(seed):
+    rng = np.random.default_rng(seed)
+    x = np.arange(-1000, 1001)
+    y = np.sqrt(1000**2 - x**2).astype(int)
+    disc = np.column_stack([np.r_[x, x], np.r_[y, -y], np.full(2 * len(x), -1)])
+    rim = disc[ConvexHull(disc[:, :2]).vertices]
+    m = int(rng.integers(1, 4))
+    top = np.array(list(np.ndindex(2 * m + 1, 2 * m + 1, 1))) - [m, m, 0]
+    along = rng.integers(0, 3, (200, 1)) * rng.choice(rim, 200)  # edges from the top's middle to the rim
+    below = rng.choice(top, 100) - [0, 0, 1]
+    points = rng.permutation(np.vstack([64 * rim, top, rng.choice(top, 200), along, below]))
+    hull = Hull(points)
+    corners = hull.corners.astype(np.int64)
+    a, b, c = (corners[hull.triangles[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    assert (normal @ points.T <= (normal * a).sum(1)[:, None]).all()
+
+
 def test_hull_far_from_the_origin_keeps_its_digits():
     points = np.random.default_rng(2).integers(-1000, 1000, size=(30, 3)) / 1024
     far = np.array([2.0**20, -(2.0**21), 2.0**22])
