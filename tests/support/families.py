@@ -18,11 +18,12 @@ from zlib import crc32
 
 import exact
 import numpy as np
+from mpmath import mp
 from published import PUBLISHED
 from scipy.spatial import ConvexHull, cKDTree
 from strategies import directions, hull_points, overlapping_points, quaternion, reach, rotation, turn
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere
 
 CORNERS = np.array(list(product((-1, 1), repeat=3)), float)
 OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
@@ -714,6 +715,38 @@ def round_contacts(rng):
     return Case(f"{kind} on {met}", depth, (Placed(shape, at), mapped(CORNERS * extents, matrix) + away))
 
 
+def rounded_hulls(rng):
+    """A rounded box sunk by `parameter` of its radius or of its height into a half-space or into a rounded box of its
+    own size, turned about the common axis by whole quarters; or all inside of a box."""
+    depth = float(rng.choice([0.5, 0.1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10]))
+    sides, r = rng.integers(4, 17, 3) / 8, float(rng.choice([2.0**-10, 0.125, 1.0]))
+    where = str(rng.choice(["in a half-space", "in another", "inside"]))
+    body = RoundedHull(CORNERS * sides / 2, r)
+    h = depth * r
+    if where == "inside":
+        volume = np.prod(sides) + 2 * r * sum(sides[i] * sides[i - 1] for i in range(3)) + pi * r**2 * sides.sum()
+        room = Placed(Box([8, 8, 8]), (0.5, 0.25, 0), quaternion(rng))
+        return Case(where, 1.0, (Placed(body), room), float(volume) + 4 / 3 * pi * r**3)
+    if where == "in a half-space":
+        level = -sides[2] / 2 - r + h
+        h = float(Fraction(level) + Fraction(sides[2]) / 2 + Fraction(r))
+        return Case(where, depth, (Placed(body), Placed(HalfSpace((0, 0, 1), level))), rounded_slab(sides, r, h))
+    step = sides[2] + 2 * r - h
+    h = float(Fraction(sides[2]) + 2 * Fraction(r) - Fraction(step))
+    lower = Placed(body, (0, 0, -step), [(0, 0, 0, 1), (0, 0, 1, 0)][int(rng.integers(2))])
+    return Case(where, depth, (Placed(body), lower), 2 * rounded_slab(sides, r, h / 2))
+
+
+def rounded_slab(sides, r, h):
+    """The volume of what a rounded box has below the height h <= r above its lowest plane: a slab of cuboid, and its
+    rims, over quarters of a disc."""
+    x = mp.mpf(h) / r
+    half_segment = (mp.acos(1 - x) - (1 - x) * mp.sqrt(x * (2 - x))) / 2 * mp.mpf(r) ** 2
+    cap = mp.pi * mp.mpf(h) ** 2 * (3 * r - mp.mpf(h)) / 3
+    a, b = map(mp.mpf, sides[:2].tolist())
+    return float(a * b * h + 2 * (a + b) * half_segment + cap)
+
+
 def lens(r, s, d):
     """The volume of two balls' common part, their centres d apart, each outside of the other."""
     return float(lens_over_pi(r, s, d)) * pi
@@ -731,7 +764,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
-        round_contacts,
+        round_contacts, rounded_hulls,
     )
 }  # fmt: skip
 

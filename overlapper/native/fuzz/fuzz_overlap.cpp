@@ -114,6 +114,13 @@ class Decoder {
       const Vec3 away = power_of_two(0, 26) * direction();
       for (Placed& body : bodies) body = make_placed(body.shape, body.position + away, body.orientation);
     }
+    if (integer(0, 7) == 0) {
+      const double length = power_of_two(-500, 500);
+      for (Placed& body : bodies) {
+        const auto [x, y, z, w] = body.orientation;
+        body = make_placed(body.shape, body.position, {length * x, length * y, length * z, length * w});
+      }
+    }
     return bodies;
   }
 
@@ -265,8 +272,18 @@ void check_gradient(const Overlap& overlap) {
     require(norm(sum) <= 0x1p-40 * overlap.measures().area, "the area vectors sum to zero");
 }
 
+void check_errors(const Overlap& overlap) {
+  const Errors& e = overlap.errors();
+  for (double error : {e.volume, e.area, e.centroid, e.inertia, e.vertices})
+    require(sound(error), "errors are finite and not negative");
+  for (const auto& [force, moment] : e.gradient)
+    require(sound(force) && sound(moment), "the errors of the gradient are finite and not negative");
+  require(e.volume == overlap.volume_error(), "the error of the volume is that of the volume");
+}
+
 void check(const Overlap& overlap) {
   check_volume(overlap);
+  if (any_bounded(overlap.bodies())) check_errors(overlap);
   if (overlap.status() == Status::kOverlapping) {
     check_region(overlap.region(), overlap.method() == Method::kAuto);
     check_measures(overlap.measures(), overlap.inertia());
