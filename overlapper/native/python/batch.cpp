@@ -135,9 +135,15 @@ void define_columns(nb::class_<Overlaps>& cls) {
                "(p,) True where the volume was computed again in wider arithmetic.");
 }
 
-std::shared_ptr<Overlap> overlap_of_row(const Overlaps& overlaps, size_t row) {
-  const nb::gil_scoped_release release;
-  return overlaps.overlap(row);
+/// One that nobody else has is moved into its Python object: nanobind ends the process if it has no memory to share
+/// one.
+nb::object overlap_of_row(const Overlaps& overlaps, size_t row) {
+  std::shared_ptr<Overlap> found;
+  {
+    const nb::gil_scoped_release release;
+    found = overlaps.overlap(row);
+  }
+  return found.use_count() == 1 ? nb::cast(std::move(*found)) : nb::cast(found);
 }
 
 void define_overlaps_class(nb::module_& m) {
@@ -169,8 +175,7 @@ as an answer to where a ray leaves it or which of its planes is tightest about a
       "__getitem__",
       [](const Overlaps& self, nb::handle key) -> nb::object {
         const nb::object rows = nb::module_::import_("numpy").attr("arange")(self.size())[key];
-        if (nb::cast<int>(rows.attr("ndim")) == 0)
-          return nb::cast(overlap_of_row(self, nb::cast<size_t>(nb::int_(rows))));
+        if (nb::cast<int>(rows.attr("ndim")) == 0) return overlap_of_row(self, nb::cast<size_t>(nb::int_(rows)));
         const auto chosen = nb::cast<nb::ndarray<const std::int64_t, nb::ndim<1>, nb::device::cpu>>(rows);
         std::vector<std::int64_t> indices;
         for (size_t i = 0; i < chosen.shape(0); ++i) indices.push_back(chosen(i));
