@@ -10,6 +10,7 @@ from overlapper.scenes.scene import Scene, SceneError, Step, broken
 from overlapper.scenes.still import Still
 from overlapper.simulation import Among, Bodies, Concave, Recorder, Surface
 from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.extraction.saved_scene import NotSaved
 
 import pybullet  # isort: skip  # after the simulation, which says what to install
 
@@ -69,6 +70,8 @@ def run(
             if only is None or i + 1 in only:
                 bodies.update()
                 yield Frame(i + 1, (i + 1) * seconds, bodies, bodies.overlaps(tolerance, method, pairs=among))
+    except NotSaved as error:
+        raise SceneError(f"the scene {scene.path} cannot be read: {error}") from error
     finally:
         recorder.close()
         pybullet.disconnect(client)

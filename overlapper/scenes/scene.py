@@ -137,4 +137,5 @@ def broken(path: Path, what: str, error: Exception) -> SceneError:
     if isinstance(error, SyntaxError):
         lines, reason = [error.lineno], error.msg
     where = f" at line {lines[-1]}" if lines else ""
-    return SceneError(f"the scene {path} {what}{where}: {type(error).__name__}: {reason}")
+    said = f": {reason}" if str(reason) else ""
+    return SceneError(f"the scene {path} {what}{where}: {type(error).__name__}{said}")

@@ -94,6 +94,8 @@ def inventory(path: Path, self_collision: bool = False, **settings: Any) -> Inve
     except Ended as ended:
         if ended.code is not None and ended.code < 0:
             raise NotRead(f"pybullet dies of {path} with signal {signal.Signals(-ended.code).name}") from None
+        if not ended.words:
+            raise NotRead(f"{path} cannot be read: the process that reads it {ended}") from None
         raise RuntimeError(f"the process that reads {path} {ended}:\n{ended.words}") from None
     if isinstance(found, str):
         raise NotRead(f"{path} cannot be read: {found}")

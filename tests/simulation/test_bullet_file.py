@@ -307,6 +307,19 @@ def test_a_compound_that_contains_itself_is_refused(whole, tmp_path):
         read_all(file)
 
 
+def test_a_file_for_which_there_is_no_memory_is_refused_as_one_that_is_damaged_or_too_large(saved, client, monkeypatch):
+    body(client, p.GEOM_SPHERE, radius=1)
+
+    def fail(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(bullet_file, "_blocks", fail)
+    with pytest.raises(
+        ValueError, match=r"^path is a \.bullet file that is damaged, or describes more than fits into m"
+    ):
+        saved()
+
+
 def test_shapes_made_of_each_other_without_end_are_refused(whole, tmp_path, monkeypatch):
     monkeypatch.setattr(bullet_file, "MOST_READ", 0)
     (tmp_path / "x.bullet").write_bytes(whole)

@@ -976,6 +976,26 @@ def test_a_server_that_cannot_write_is_an_error_of_one_sentence(client, monkeypa
     assert isinstance(caught.value.__cause__, p.error)
 
 
+def test_a_file_that_is_cut_as_on_a_full_disk_is_an_error_of_one_sentence(client, monkeypatch):
+    box(client)
+    save = p.saveBullet
+
+    def cut(name, **options):
+        save(name, **options)
+        os.truncate(name, os.path.getsize(name) // 2)
+
+    monkeypatch.setattr(p, "saveBullet", cut)
+    with pytest.raises(RuntimeError, match=r"and have room for them \(path is a [^\n]*\)$"):
+        Bodies(client)
+
+
+def test_without_a_temporary_folder_the_error_is_one_sentence(client, monkeypatch):
+    box(client)
+    monkeypatch.setattr("tempfile.tempdir", "/no/such/folder")
+    with pytest.raises(RuntimeError, match=r"cannot hand over its shapes, as there can be no temporary file: No such"):
+        Bodies(client)
+
+
 def test_no_file_is_left_behind(client, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     box(client)

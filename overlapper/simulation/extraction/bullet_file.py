@@ -265,10 +265,12 @@ class BulletFile:
 @contextmanager
 def _damage() -> Iterator[None]:
     """What bytes that no simulator has written lead to, wherever it is noticed, as one ValueError."""
-    causes = (KeyError, IndexError, StopIteration, struct.error, RecursionError, OverflowError, TypeError, MemoryError)
+    causes = (KeyError, IndexError, StopIteration, struct.error, RecursionError, OverflowError, TypeError)
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             yield
+    except MemoryError as error:
+        raise ValueError("path is a .bullet file that is damaged, or describes more than fits into memory") from error
     except (ValueError, *causes) as error:
         if str(error).startswith("path "):
             raise
