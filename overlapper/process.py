@@ -20,6 +20,8 @@ from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from typing import IO, Any
 
+from overlapper.printable import first_line
+
 START_LIMIT = 60.0  # s, for a new Python to import a module on a machine that is busy
 
 # What C++ and Python say of an exception that nothing catches.
@@ -40,26 +42,38 @@ class Ended(Exception):
         self.code, self.words, self.limit = code, words, limit
 
 
+class NotStarted(RuntimeError):
+    """A process that something depends on cannot be had; the text is one sentence."""
+
+
 class Worker:
     """A process that serves requests by `answers`, a generator function of a module: a request, then its replies.
 
-    `cause` is a pattern of what the process may write to stderr, whose groups are the cause of its end. Ended if the
-    module cannot be imported there. A thread reads the replies: waiting with a limit works so on every system.
+    `cause` is a pattern of what the process may write to stderr, whose groups are the cause of its end. Ended if there
+    can be no such process, or the module cannot be imported there. A thread reads the replies: waiting with a limit
+    works so on every system.
     """
 
     def __init__(self, answers: Callable[[Any], Iterator[Any]], cause: str = UNCAUGHT) -> None:
         where = f"{answers.__module__!r}, {answers.__name__!r}"
         program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.process import serve; serve({where})"
         self._cause = cause
-        self._words = tempfile.TemporaryFile()  # noqa: SIM115, closed with the process
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._words
-        )
-        assert self.process.stdin and self.process.stdout
-        self._requests, replies = self.process.stdin, self.process.stdout
         self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        reader = threading.Thread(target=_forward, args=(replies, self._arrived), daemon=True)
-        reader.start()
+        with contextlib.ExitStack() as started:
+            try:
+                self._words = started.enter_context(tempfile.TemporaryFile())
+                self.process = subprocess.Popen(
+                    [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._words
+                )
+                started.enter_context(self.process)
+                started.callback(self.process.kill)
+                assert self.process.stdin and self.process.stdout
+                self._requests, replies = self.process.stdin, self.process.stdout
+                reader = threading.Thread(target=_forward, args=(replies, self._arrived), daemon=True)
+                reader.start()
+            except (OSError, RuntimeError) as error:  # RuntimeError: no thread can be had
+                raise Ended(f"could not be started ({first_line(error)})", None) from error
+            started.pop_all()
         # Also when the worker is forgotten and when Python exits, so that nothing is left behind.
         self.close = weakref.finalize(self, _end, self.process, reader, (self._requests, replies, self._words))
         try:

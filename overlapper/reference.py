@@ -16,7 +16,7 @@ import numpy as np
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, RoundedHull, Shape, Sphere
 from overlapper.install import hint
-from overlapper.process import Ended, Worker
+from overlapper.process import Ended, NotStarted, Worker
 from overlapper.proof.signed_distance import signed_distance_bounds
 
 try:
@@ -136,7 +136,7 @@ class Fcl:
         try:
             return Worker(_answers, CAUSE)
         except Ended as ended:
-            raise RuntimeError(f"overlapper.reference cannot start FCL: its process {ended}") from None
+            raise NotStarted(f"overlapper.reference cannot start FCL: its process {ended}") from None
 
     def _answer(self, worker: Worker) -> tuple[Figures | None, str | None]:
         figures = None

@@ -1,16 +1,23 @@
 """A worker process: its replies come in order, and however it ends there is a reason."""
 
+import errno
 import os
 import signal
+import subprocess
 import sys
+import tempfile
+import threading
 import time
 
+import numpy as np
 import pytest
 
 from overlapper import Placed, Sphere, overlap, process
-from overlapper.process import Ended, Worker
+from overlapper.polytopes import decomposition
+from overlapper.process import Ended, NotStarted, Worker
 from overlapper.reference import Fcl
-from overlapper.simulation.inventory import inventory
+from overlapper.simulation.inventory import NotRead, inventory
+from overlapper.viewer import Viewer
 
 
 def answers(request):
@@ -89,6 +96,63 @@ def test_a_module_that_cannot_be_imported_there_ends_the_process_at_once(monkeyp
     monkeypatch.setattr(answers, "__module__", "no_such_module")
     with pytest.raises(Ended, match=r"exit code 1 \(ModuleNotFoundError: No module named 'no_such_module'\)"):
         Worker(answers)
+
+
+class Failing:
+    """Calls that start a process or what it needs, of which one fails, as on a system that has no more of them."""
+
+    def __init__(self, monkeypatch, owner, name, error):
+        self.started = []
+        popen = subprocess.Popen
+        monkeypatch.setattr(
+            subprocess, "Popen", lambda *a, **k: self.started.append(popen(*a, **k)) or self.started[-1]
+        )
+        monkeypatch.setattr(owner, name, self.fail)
+        self.error = error
+
+    def fail(self, *_, **__):
+        raise self.error
+
+
+NO_MORE = OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+FAILURES = {
+    "fork": (subprocess, "Popen", NO_MORE),
+    "file": (tempfile, "TemporaryFile", OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))),
+    "thread": (threading.Thread, "start", RuntimeError("can't start new thread")),
+}
+
+
+@pytest.fixture(params=FAILURES)
+def failing(request, monkeypatch):
+    return Failing(monkeypatch, *FAILURES[request.param])
+
+
+def test_a_process_that_cannot_be_started_leaves_nothing_behind(failing):
+    with pytest.raises(Ended, match=r"^could not be started \(.*(unavailable|No space|new thread).*\)$") as ended:
+        Worker(answers)
+    assert (ended.value.code, ended.value.limit, ended.value.words) == (None, None, "")
+    for started in failing.started:
+        assert started.poll() is not None and started.stdin.closed and started.stdout.closed
+
+
+def test_whoever_needs_a_process_says_in_one_sentence_that_there_is_none(failing, tmp_path):
+    (tmp_path / "box.bullet").write_text("")
+    cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    asked = {
+        "overlapper.reference cannot start FCL: its process": lambda: Fcl().compare(
+            overlap(Sphere(1.0), Placed(Sphere(1.0), (1.5, 0, 0)))
+        ),
+        "box.bullet cannot be read: the process that reads it": lambda: inventory(tmp_path / "box.bullet"),
+        "CoACD failed on the concave mesh: its process": lambda: decomposition._coacd(
+            cube, np.array([[0, 1, 2]]), 0.05, 9.0
+        ),
+        "the live view has no server: its process": Viewer,
+    }
+    for sentence, ask in asked.items():
+        with pytest.raises(Exception, match=rf"{sentence} could not be started \([^\n]*\)$") as refused:
+            ask()
+        assert isinstance(refused.value, (NotStarted, NotRead, decomposition.NotDecomposed))
 
 
 def test_fcl_that_cannot_be_started_is_an_error_of_one_sentence(monkeypatch):

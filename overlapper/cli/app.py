@@ -31,6 +31,8 @@ def main() -> NoReturn:
         sys.exit(130)
     except Refused as error:
         give_up(str(error))
+    except MemoryError:
+        give_up("there is not enough memory for this")
     except usage_error as error:
         give_up(error.format_message())
 

@@ -59,4 +59,7 @@ def _run_benchmark(name: str, *options: str) -> int:
     script = Path(__file__).parents[2] / "benchmarks" / f"{name}.py"
     if not script.is_file():
         raise Refused(f"{name} needs a checkout of overlapper, as its cases and peers are not installed")
-    return subprocess.run([sys.executable, str(script), *options]).returncode
+    try:
+        return subprocess.run([sys.executable, str(script), *options]).returncode
+    except OSError as error:
+        raise Refused(f"{name} could not be started ({error.strerror})") from error

@@ -12,6 +12,7 @@ from contextlib import contextmanager, redirect_stdout
 from typing import BinaryIO, NoReturn, TextIO
 
 from overlapper.printable import first_line, printable
+from overlapper.process import NotStarted
 from overlapper.scenes.scene import SceneError
 
 LIBC = ctypes.CDLL(None)
@@ -42,7 +43,7 @@ def input_refusals() -> Iterator[None]:
         yield
     except OSError as error:
         raise Refused(f"{error.filename}: {error.strerror}" if error.filename else first_line(error)) from error
-    except (ImportError, ValueError) as error:
+    except (ImportError, ValueError, NotStarted) as error:
         raise Refused(str(error)) from error
     except Exception as error:
         # SQLAlchemy may not be there to name the class; its message goes on for lines about itself.
@@ -58,7 +59,7 @@ def scene_refusals(noise: BinaryIO) -> Iterator[None]:
         yield
     except KeyboardInterrupt as error:
         raise Interrupted from error
-    except ImportError as error:
+    except (ImportError, NotStarted) as error:
         raise Refused(str(error)) from error
     except OSError as error:
         raise Refused(f"cannot write {error.filename or 'the results'}: {error.strerror or error}") from error

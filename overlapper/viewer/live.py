@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from overlapper import Overlap
-from overlapper.process import START_LIMIT, Worker
+from overlapper.process import START_LIMIT, Ended, NotStarted, Worker
 from overlapper.viewer.labels import Bodies, Contact, body_paths, pairs
 from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, boxes, volume_text
 from overlapper.viewer.recording import Recording
@@ -51,9 +51,12 @@ class Viewer:
 
     def _serve(self, host: str) -> None:
         must_be_here(host)
-        self._server = Worker(serve)
-        self._server.send(host)
-        self.visualizer = meshcat.Visualizer(window=Window(*self._server.receive(START_LIMIT)))
+        try:
+            self._server = Worker(serve)
+            self._server.send(host)
+            self.visualizer = meshcat.Visualizer(window=Window(*self._server.receive(START_LIMIT)))
+        except Ended as ended:
+            raise NotStarted(f"the live view has no server: its process {ended}") from None
 
     @property
     def url(self) -> str:

@@ -1,5 +1,6 @@
 """The stability benchmark: what counts as a failure, and that a peer which ends its process costs no other case."""
 
+import errno
 import os
 import re
 import subprocess
@@ -292,6 +293,15 @@ def test_the_command_writes_results_page_and_pictures(tmp_path):
 def test_without_a_checkout_the_command_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr(bench, "__file__", str(tmp_path / "overlapper" / "cli" / "bench.py"))
     with pytest.raises(bench.Refused, match="needs a checkout"):
+        bench.stability()
+
+
+def test_without_another_process_the_command_says_so(monkeypatch):
+    def fail(*_, **__):
+        raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+    monkeypatch.setattr(subprocess, "run", fail)
+    with pytest.raises(bench.Refused, match=r"^stability could not be started \(.*unavailable\)$"):
         bench.stability()
 
 

@@ -418,6 +418,35 @@ def test_a_disk_that_is_full_costs_no_earlier_file(tmp_path, ending, room):
         assert steps == list(range(1, len(steps) + 1))
 
 
+LACKING = {
+    "room": (
+        "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2500, 2500))",
+        "overlapper: the scene lacking.py cannot be read: the physics server of physicsClientId 0 could not hand over",
+    ),
+    "memory": (
+        "import overlapper.simulation as s; s.Bodies.overlaps = lambda *_, **__: bytes(1 << 62)",
+        "overlapper: there is not enough memory for this",
+    ),
+    "processes": (
+        "import subprocess; subprocess.Popen = lambda *_, **__: open('/no/such/place')",
+        "overlapper: overlapper.reference cannot start FCL: its process could not be started (",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", LACKING)
+def test_a_run_that_lacks_something_costs_no_earlier_file_and_says_what_it_lacks(tmp_path, what):
+    line, sentence = LACKING[what]
+    (tmp_path / "old.csv").write_text("of yesterday")
+    built = TWO_CUBES.replace("def build(client):", f"def build(client):\n    {line}")
+    assert built != TWO_CUBES
+    (tmp_path / "lacking.py").write_text(built)
+    said = refusal("run", "lacking.py", "--out", "old.csv", "--check", "fcl")
+    assert said.startswith(sentence) and said.count("\n") == 1
+    assert (tmp_path / "old.csv").read_text() == "of yesterday"
+    assert not (tmp_path / "old.unfinished.csv").exists()
+
+
 def test_names_reach_no_terminal_with_their_escapes(tmp_path):
     link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
     link += '<collision><geometry><box size="1 1 1"/></geometry></collision>'
