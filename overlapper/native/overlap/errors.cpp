@@ -29,6 +29,9 @@ struct Seen {
   double slack_at(Vec3 y) const { return slack * (1 - dot(dual, y)); }
 };
 
+/// Relative to their distance from within, surfaces nearer to each other than that are taken for one.
+constexpr double kShared = 1e-10;
+
 /// How far the surface of a polytope may be from that between its planes, as a fraction of the way from the origin.
 ///
 /// Corners lie on their planes, and inside the planes next to those, but for so much; then the closed surface that they
@@ -84,14 +87,21 @@ class Sandwich {
   double doubtful_area() const {
     const std::vector<double> of_facets = polyhedral_ ? doubtful_among_planes() : doubtful_beside_smooth();
     double sum = 0;
-    for (size_t f = 0; f < of_facets.size(); ++f) {
-      const auto ring = region_.polytope.facet(static_cast<int>(f));
-      double size = 0;
-      for (size_t i = 1; i + 1 < ring.size(); ++i) {
-        const Vec3 from = corners_[ring[0]];
-        size += norm(cross(corners_[ring[i]] - from, corners_[ring[i + 1]] - from)) / 2;
+    for (size_t f = 0; f < of_facets.size(); ++f) sum += std::min(area(f), of_facets[f]);
+    return sum;
+  }
+
+  /// m²: how much of the surface two bodies share: there, rays from the origin leave both at once.
+  double shared_area() const {
+    double sum = 0;
+    for (size_t f = 0; f < facets_.size(); ++f) {
+      const Vec3 direction = region_.frame.axes * middle(polygon(f));
+      const double own = way_out(facets_[f].owner, direction);
+      for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
+        if (i == facets_[f].owner || std::abs(way_out(i, direction) - own) > kShared * own) continue;
+        sum += area(f);
+        break;
       }
-      sum += std::min(size, of_facets[f]);
     }
     return sum;
   }
@@ -101,6 +111,27 @@ class Sandwich {
     std::vector<Vec3> corners;
     for (int v : region_.polytope.facet(static_cast<int>(facet))) corners.push_back(region_.polytope.vertices[v]);
     return corners;
+  }
+
+  static Vec3 middle(const std::vector<Vec3>& corners) {
+    Vec3 sum;
+    for (Vec3 y : corners) sum += y;
+    return sum / static_cast<double>(corners.size());
+  }
+
+  double area(size_t facet) const {
+    const auto ring = region_.polytope.facet(static_cast<int>(facet));
+    const Vec3 from = corners_[ring[0]];
+    double sum = 0;
+    for (size_t i = 1; i + 1 < ring.size(); ++i)
+      sum += norm(cross(corners_[ring[i]] - from, corners_[ring[i + 1]] - from)) / 2;
+    return sum;
+  }
+
+  /// How many times `direction` the way from the origin out of a body is.
+  double way_out(int body, Vec3 direction) const {
+    const Plane plane = relative_[body].ray_exit(region_.frame.origin, direction);
+    return -signed_distance(plane, region_.frame.origin) / dot(plane.normal, direction);
   }
 
   /// m², per facet: where a plane of another body, in the surface or just behind it, may be the outer one.
@@ -182,12 +213,9 @@ class Sandwich {
 
   /// True if another, smooth body is as near behind the middle of a facet as the facet may have moved.
   bool beside_smooth(const std::vector<Vec3>& polygon, const Seen& facet) const {
-    Vec3 middle;
-    for (Vec3 y : polygon) middle += y;
-    middle = middle / static_cast<double>(polygon.size());
+    const Vec3 direction = region_.frame.axes * middle(polygon);
     for (size_t i = 0; i < bodies_.size(); ++i) {
       if (static_cast<int>(i) == facet.owner || !smooth(bodies_[i].shape)) continue;
-      const Vec3 direction = region_.frame.axes * middle;
       const Plane plane = relative_[i].ray_exit(region_.frame.origin, direction);
       if (signed_distance(plane, region_.frame.origin + direction) > -4 * facet.moved) return true;
     }
@@ -287,7 +315,7 @@ Errors errors_beside(const StatedWithErrors& other, const Stated& stated) {
   return errors;
 }
 
-Errors errors_of_formula(const Measures& stated, std::span<const Placed> bodies) {
+Errors errors_of_formula(const Measures& stated, const Region& drawn, std::span<const Placed> bodies) {
   const double relative = 4 * stated.volume_error / stated.volume;
   const double diameter = room(bodies).diameter;
   Errors errors;
@@ -295,8 +323,9 @@ Errors errors_of_formula(const Measures& stated, std::span<const Placed> bodies)
   errors.area = relative * stated.area;
   errors.centroid = relative * diameter + 4 * DBL_EPSILON * norm(stated.centroid);
   errors.inertia = relative * stated.volume * diameter * diameter;
+  const double force = errors.area + Sandwich(drawn, bodies).shared_area();
   for (const Placed& body : bodies)
-    errors.gradient.push_back({errors.area, errors.area * (norm(stated.centroid - body.position) + diameter)});
+    errors.gradient.push_back({force, force * (norm(stated.centroid - body.position) + diameter)});
   return errors;
 }
 

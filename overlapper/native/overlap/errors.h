@@ -54,8 +54,9 @@ double error_of_vertices(const Region& region, const Boundary& boundary, std::sp
 Errors errors_beside(const StatedWithErrors& other, const Stated& stated);
 
 /// The errors of measures by a formula: its arguments, off by rounding, are what its volume is off by, and no measure
-/// is of a higher degree in them than four more.
-Errors errors_of_formula(const Measures& stated, std::span<const Placed> bodies);
+/// is of a higher degree in them than four more. Of the gradient, as much more as the bodies' surfaces have in common,
+/// which the facets of the region tell.
+Errors errors_of_formula(const Measures& stated, const Region& drawn, std::span<const Placed> bodies);
 
 /// m: how far any of the points of one cloud is from the nearest of the other.
 double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b);

@@ -171,7 +171,7 @@ Errors Overlap::errors_of_measures() const {
   Errors errors = errors_beside(of_region, stated());
   if (way() == Way::kClosedForm) {
     const double of_inertia = errors.inertia;
-    errors = errors_of_formula(measures(), bodies());
+    errors = errors_of_formula(measures(), drawn(), bodies());
     if (!in_full().inertia) errors.inertia = of_inertia;
   }
   errors.volume = volume_error();

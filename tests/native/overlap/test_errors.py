@@ -73,6 +73,10 @@ def test_bodies_apart_have_no_errors_and_bodies_that_touch_may_share_what_roundi
 def test_who_owns_a_facet_that_two_bodies_share_is_in_the_error_of_the_gradient():
     flush = overlap(CUBE, Placed(CUBE, (1, 0, 0)))
     assert_allclose(flush.errors.gradient[:, 0], 4 * 2, rtol=1e-6)  # four walls of 2 m² in common
+    drum = overlap(Cylinder(1, 2), Placed(Box([2, 2, 0.75]), (0, 0, 0.25)))  # the lid, in the plane of a facet
+    assert_allclose(drum.errors.gradient[:, 0], np.pi, rtol=1e-2)
+    twins = overlap(Sphere(1), Sphere(1))
+    assert_allclose(twins.errors.gradient[:, 0], 4 * np.pi, rtol=1e-2)
     beyond = overlap(CUBE, Placed(Box([2, 2, 2]), (2, 0, 0)))
     assert (beyond.errors.gradient < 1e-10).all()
 
