@@ -12,7 +12,7 @@ from ways import TYPICAL, Typical
 def page(monkeypatch, tmp_path):
     copy = tmp_path / "how.md"
     copy.write_text(ways.PAGE.read_text(encoding="utf-8"), encoding="utf-8")
-    few = {name: TYPICAL[name] for name in ("two boxes", "a rounded hull and a box", "two boxes, apart")}
+    few = {name: TYPICAL[name] for name in ("two boxes", "a rounded hull of 80 facets and a box", "two boxes, apart")}
     monkeypatch.setattr(ways, "PAGE", copy)
     monkeypatch.setattr(ways, "TYPICAL", few)
     monkeypatch.setattr(sys, "argv", ["ways.py", "--rounds", "1"])
@@ -28,7 +28,7 @@ def test_the_table_is_measured_anew_and_the_rest_of_the_page_stays(page):
     assert after.endswith(rows[rows.index("\n\n") :])
     number = r"[\d.,]+"
     assert re.search(rf"\n\| two boxes \| clipping \| {number} \| {number} \| {number} \|\n", after)
-    assert re.search(rf"\n\| a rounded hull and a box \| dual hull \| {number} \|  \|  \|\n", after)
+    assert re.search(rf"\n\| a rounded hull of 80 facets and a box \| dual hull \| {number} \|  \|  \|\n", after)
     assert re.search(rf"\n\| two boxes, apart \| separation \| {number} \|  \| {number} \|\n\n", after)
 
 

@@ -15,6 +15,7 @@ enum class Way {
   kClipping,        ///< corners of each body held against the planes of the other
   kTracing,         ///< the seam of two surfaces followed from facet to facet
   kClosedForm,      ///< a formula
+  kSlicing,         ///< slices of round bodies, integrated
   kDual,            ///< the convex hull of dual points
   kWideSeparation,  ///< double-doubles prove a gap where doubles do not
   kWideClipping,    ///< as kClipping, with corners placed in double-doubles
@@ -22,8 +23,8 @@ enum class Way {
   kDoubt,           ///< neither doubles nor double-doubles tell whether there is an inside: the bodies touch
   kPaper,           ///< the article's method, as asked for
 };
-inline constexpr std::array<const char*, 10> kWayNames{
-    "separation",      "clipping",      "tracing",        "closed form", "dual hull",
+inline constexpr std::array<const char*, 11> kWayNames{
+    "separation",      "clipping",      "tracing",        "closed form", "slicing", "dual hull",
     "wide separation", "wide clipping", "wide dual hull", "doubt",       "paper"};
 inline const char* name(Way way) { return kWayNames[static_cast<size_t>(way)]; }
 

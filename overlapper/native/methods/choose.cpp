@@ -11,6 +11,7 @@
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
 #include "methods/closed_forms.h"
+#include "methods/round/round.h"
 #include "methods/tracing/trace.h"
 #include "shapes/canonical_order.h"
 #include "shapes/mesh.h"
@@ -279,6 +280,30 @@ std::optional<Measures> by_formula(const OverlappingBodies& overlapping, double 
   return measures;
 }
 
+/// Of the round shapes themselves, whatever the tolerance.
+std::optional<MeasuresAndInertia> by_slices(const OverlappingBodies& overlapping) {
+  const Arrangement& at = overlapping.at;
+  const Inside& found = overlapping.inside();
+  const WideVector inside = found.wide_ball ? found.wide_ball->centre : wide(found.ball.centre);
+  const auto sliced = measure_round(at.relative[0], at.relative[1], at.reference, inside);
+  if (!sliced) return std::nullopt;
+  MeasuresAndInertia answer;
+  Measures& m = answer.measures;
+  m.status = Status::kOverlapping;
+  m.way = Way::kSlicing;
+  m.facets_touched = sliced->facets_touched;
+  m.volume = sliced->volume, m.volume_error = sliced->volume_error, m.area = sliced->area;
+  m.centroid = at.reference + sliced->centroid;
+  for (int i = 0; i < 2; ++i) {
+    const double side = i == 0 ? 1 : -1;
+    const int body = at.order[i];
+    m.pulls[body] =
+        about({side * sliced->pull.force, side * sliced->pull.moment}, at.reference, overlapping.bodies[body].position);
+  }
+  answer.inertia = sliced->inertia;
+  return answer;
+}
+
 MeasuresAndInertia by_region(const Region& region, std::span<const Placed> bodies, Way way) {
   MeasuresAndInertia answer = measure(region, bodies);
   answer.measures.way = way;
@@ -308,13 +333,15 @@ double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 
 MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
   const Arrangement& at = overlapping.at;
   const auto in_wide_arithmetic = [&] { return !overlapping.traced && overlapping.inside().wide_ball; };
-  if (!overlapping.traced && overlapping.search().inside && in_wide_arithmetic())
-    return by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);
+  const bool in_doubt = !overlapping.traced && overlapping.search().inside && in_wide_arithmetic();
   const Choice& choice = choose(traits(overlapping.bodies));
   const double finest = std::max(overlapping.tolerance, kFinest);
   MeasuresAndInertia kept;
-  if (auto formula = choice.tries(Way::kClosedForm) ? by_formula(overlapping, finest) : std::nullopt)
-    kept.measures = std::move(*formula);
+  auto formula = choice.tries(Way::kClosedForm) && !in_doubt ? by_formula(overlapping, finest) : std::nullopt;
+  if (choice.tries(Way::kSlicing) && !(formula && formula->volume_error <= kEnough * formula->volume))
+    if (auto sliced = by_slices(overlapping)) return std::move(*sliced);
+  if (in_doubt) return by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);
+  if (formula) kept.measures = std::move(*formula);
   else kept = by_region(overlapping.region(), overlapping.bodies, overlapping.traced ? Way::kTracing : Way::kDual);
   const auto keep_better = [&](const Region& region) {
     MeasuresAndInertia again = by_region(region, overlapping.bodies, Way::kWideDual);

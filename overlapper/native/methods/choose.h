@@ -40,7 +40,7 @@ struct Choice {
 
 /// How bodies are measured. The first line that fits counts, for single calls, batches and groups alike. Numbers of
 /// facets and errors that count are in geometry/thresholds.h.
-inline constexpr std::array<Choice, 5> kChoices{{
+inline constexpr std::array<Choice, 6> kChoices{{
     {"two boxes or hulls of many facets",
      [](const Traits& t) { return t.many_facet_pairs && t.clippable; },
      {Way::kTracing, Way::kClipping, Way::kWideClipping, Way::kDual}},
@@ -52,7 +52,10 @@ inline constexpr std::array<Choice, 5> kChoices{{
      {Way::kClipping, Way::kWideClipping, Way::kDual}},
     {"two, one of them a ball, a capsule or a cylinder, and no rounded hull",
      [](const Traits& t) { return t.bodies == 2 && t.round && !t.rounded; },
-     {Way::kClosedForm, Way::kDual}},
+     {Way::kClosedForm, Way::kSlicing, Way::kDual}},
+    {"two, one of them a rounded hull",
+     [](const Traits& t) { return t.bodies == 2 && t.rounded; },
+     {Way::kSlicing, Way::kDual}},
     {"all others", [](const Traits&) { return true; }, {Way::kDual}},
 }};
 const Choice& choose(const Traits& traits);

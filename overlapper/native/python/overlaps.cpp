@@ -305,14 +305,16 @@ smooth shape is given, leave more in doubt. True of bodies that do not overlap.)
       nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
   cls.def_prop_ro(
       "way", [](const Overlap& o) { return name(measured(o).way()); },
-      nb::sig("def way(self) -> typing.Literal['separation', 'clipping', 'tracing', 'closed form', 'dual hull', 'wide "
-              "separation', 'wide clipping', 'wide dual hull', 'doubt', 'paper']"),
+      nb::sig(
+          "def way(self) -> typing.Literal['separation', 'clipping', 'tracing', 'closed form', 'slicing', 'dual hull', "
+          "'wide separation', 'wide clipping', 'wide dual hull', 'doubt', 'paper']"),
       R"(How the answer came: by which way the volume was measured, or the status found of bodies that do not overlap.
 
 'separation': doubles prove a gap. 'clipping': corners of each body held against the planes of the other. 'tracing': the
-seam of two surfaces followed from facet to facet. 'closed form': a formula. 'dual hull': the convex hull of dual points.
-'wide ...': the same in double-doubles, where doubles are not enough. 'doubt': not even these tell whether there is an
-inside, so that the bodies are said to touch. 'paper': the method asked for.)");
+seam of two surfaces followed from facet to facet. 'closed form': a formula. 'slicing': slices of
+round bodies, integrated. 'dual hull': the convex hull of dual points. 'wide ...': the same in double-doubles, where doubles are not
+enough. 'doubt': not even these tell whether there is an inside, so that the bodies are said to touch. 'paper': the
+method asked for.)");
   cls.def_prop_ro(
       "facets_touched", [](const Overlap& o) { return o.facets_touched(); },
       "How many planes of the shapes took part in the measures.");

@@ -105,7 +105,7 @@ IN_A_BOX = {
     "two meshes of 1,280 facets": "dual hull",
     "a ball in the floor": "dual hull",
     "two cylinders": "dual hull",
-    "a rounded hull and a box": "dual hull",
+    "a rounded hull of 80 facets and a box": "dual hull",
     "a box resting on another, 1 µm deep": "wide dual hull",
     "two boxes that touch": "doubt",
 }

@@ -146,8 +146,10 @@ def test_smooth_closed_forms_lie_within_the_error_bound(shapes, volume, toleranc
 def test_smooth_closed_forms_hold_wherever_the_scene_stands(shapes, volume):
     bodies = [body if isinstance(body, Placed) else Placed(body) for body in shapes]
     turned = [moved(body, (100, -200, 50), turn([1.0, -2.0, 0.5])) for body in bodies]
-    assert_holds(overlap(*turned), volume)
-    assert_holds(overlap(*turned[::-1]), volume)
+    for found in (overlap(*turned), overlap(*turned[::-1])):
+        # Where bodies are moved to is rounded.
+        moving = 4 * EPS * 200 * found.area
+        assert abs(found.volume - volume) <= found.volume_error + moving
 
 
 def test_error_narrows_with_the_tolerance_where_there_is_no_closed_form():
@@ -770,7 +772,7 @@ def test_corners_of_facets_at_small_angles_lie_in_their_planes():
         ([Box([1, 1, 1]), Box([1, 0.5, 1])], "clipping"),
         ([Box([1, 1, 1]), Box([1, 0.5, 1]), Box([0.5, 1, 1])], "clipping"),
         ([Sphere(1), Sphere(0.75)], "closed form"),
-        ([Box([1, 1, 1]), Cylinder(0.75, 1)], "dual hull"),
+        ([Box([1, 1, 1]), Cylinder(0.75, 1)], "slicing"),
     ],
 )
 def test_gradients_are_as_good_far_from_the_origin_as_near(shapes, way, far):

@@ -454,14 +454,15 @@ class Overlap:
     def method(self) -> Literal['auto', 'paper']: ...
 
     @property
-    def way(self) -> Literal['separation', 'clipping', 'tracing', 'closed form', 'dual hull', 'wide separation', 'wide clipping', 'wide dual hull', 'doubt', 'paper']:
+    def way(self) -> Literal['separation', 'clipping', 'tracing', 'closed form', 'slicing', 'dual hull', 'wide separation', 'wide clipping', 'wide dual hull', 'doubt', 'paper']:
         """
         How the answer came: by which way the volume was measured, or the status found of bodies that do not overlap.
 
         'separation': doubles prove a gap. 'clipping': corners of each body held against the planes of the other. 'tracing': the
-        seam of two surfaces followed from facet to facet. 'closed form': a formula. 'dual hull': the convex hull of dual points.
-        'wide ...': the same in double-doubles, where doubles are not enough. 'doubt': not even these tell whether there is an
-        inside, so that the bodies are said to touch. 'paper': the method asked for.
+        seam of two surfaces followed from facet to facet. 'closed form': a formula. 'slicing': slices of
+        round bodies, integrated. 'dual hull': the convex hull of dual points. 'wide ...': the same in double-doubles, where doubles are not
+        enough. 'doubt': not even these tell whether there is an inside, so that the bodies are said to touch. 'paper': the
+        method asked for.
         """
 
     @property

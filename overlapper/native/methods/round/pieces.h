@@ -1,0 +1,54 @@
+#pragma once
+
+#include <vector>
+
+#include "geometry/wide_pose.h"
+#include "methods/round/slice.h"
+#include "shapes/shape.h"
+
+namespace overlapper::slicing {
+
+/// A ball, or a cylinder without ends, about a point of the common set.
+struct Round {
+  bool ball;
+  WideVector centre;  ///< any point of a cylinder's axis
+  WideVector axis;    ///< unit
+  double radius;
+  double half_length;  ///< of a cylinder: how far from its centre the piece reaches along the axis
+  int owner;
+};
+
+/// { X : dot(normal, X) <= slack }, about the same point.
+struct Wall {
+  WideVector normal;  ///< unit
+  DoubleDouble slack;
+  int owner;  ///< the body that it is a face of; kCut of a cut between two pieces of one body
+};
+
+/// What planes leave of at most one round.
+struct Piece {
+  int round = -1;
+  int first_wall = 0, walls = 0;
+};
+
+/// A body as pieces with nothing in common but their borders.
+struct Pieces {
+  std::vector<Piece> pieces;
+  std::vector<Round> rounds;
+  std::vector<Wall> walls;
+  double flatness = 0;  ///< m: by how much facets miss the corners that they are spanned by
+
+  void clear() { pieces.clear(), rounds.clear(), walls.clear(), flatness = 0; }
+};
+
+/// How far from a point a body reaches at most.
+double extent(const Placed& body, Vec3 point);
+
+/// Cuts a body; pieces and walls that `other` does not reach are left out. Bodies about a reference, which lies at
+/// `reference` in the world; what is cut is about the point `inside`, of the same coordinates as the bodies.
+///
+/// A capsule is a cylinder and two half balls; a rounded hull is its core, a prism on every facet, a wedge of a
+/// cylinder along every edge, and a wedge of a ball at every vertex.
+void cut(const Placed& body, const Placed& other, int owner, Vec3 reference, const WideVector& inside, Pieces& result);
+
+}  // namespace overlapper::slicing

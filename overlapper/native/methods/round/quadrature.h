@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "methods/round/breakpoints.h"
+
+namespace overlapper::slicing {
+
+/// The area of a slice.
+struct Sample {
+  double t, area;
+};
+
+struct Sum {
+  Integrals integrals;
+  double error = 0;             ///< of the volume, beside rounding
+  int rules = 0;                ///< how many were applied
+  std::vector<Sample> samples;  ///< in the order of t
+};
+
+/// Integrates over one interval. At its ends a slice is a series in the square root of what t is away from them, so
+/// that with t = m − h cos θ it is analytic in θ, and rules of Gauss and Legendre converge geometrically; where the
+/// last terms of the Legendre series that the nodes give are not small, the interval is halved. `volume` is about that
+/// of the whole stack, to which errors are small; false if they do not become so. `strictness` is what to divide the
+/// usual limits of these terms by.
+bool integrate(const Stack& stack, const Interval& interval, double volume, double strictness, Sum& sum);
+
+/// Whether the volume agrees with the samples. The root of the area of slices of a convex set is concave (Brunn and
+/// Minkowski), so that chords between samples bound the volume from below, and chords drawn out beyond them from above:
+/// no wrong outline and no value of t missed passes unless what it makes is smaller than the gap, about a hundredth.
+/// Thins the samples out.
+bool within_chords(Sum& sum);
+
+}  // namespace overlapper::slicing

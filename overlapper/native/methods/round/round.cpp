@@ -1,0 +1,322 @@
+#include "methods/round/round.h"
+
+#include <algorithm>
+#include <cfloat>
+#include <numbers>
+#include <vector>
+
+#include "methods/round/quadrature.h"
+#include "methods/round/stack.h"
+
+namespace overlapper {
+namespace {
+
+using slicing::Round;
+using slicing::Wall;
+
+/// The fraction of a volume that may stay open before rules are made finer.
+constexpr double kClosed = 1e-12;
+/// Sums of area vectors are right to this fraction of the area.
+constexpr double kSummation = 16 * DBL_EPSILON;
+
+/// Integrals in the axes of the world, about the point inside.
+struct Totals {
+  double volume = 0, error = 0, area = 0;
+  double border = 0;  ///< m²: the area of all that area vectors are the sums of
+  double open = 0;    ///< m³: what may be missing of pieces whose area vectors do not sum to zero
+  Vec3 first, pull, moment;
+  Vec3 squares, products;  ///< as in slicing::Integrals
+  Vec3 unbalanced;         ///< the sum of both bodies' area vectors: zero if no piece is missing
+};
+
+/// ∫ X Xᵀ dV of coordinates (x, y, t) and of their integral `first`, in the world, about a point `offset` before them.
+void add_second(const slicing::Stack& stack, const slicing::Integrals& sum, Vec3 first, Vec3 offset, Totals& totals) {
+  const Vec3 axis[3] = {stack.l, stack.m, stack.t};
+  const Vec3 s = sum.squares, p = sum.products;
+  const double second[3][3] = {{s.x, p.z, p.y}, {p.z, s.y, p.x}, {p.y, p.x, s.z}};
+  Vec3 squares, products;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const double w = second[i][j];
+      const Vec3 a = axis[i], b = axis[j];
+      squares += w * Vec3{a.x * b.x, a.y * b.y, a.z * b.z};
+      products += w * Vec3{a.y * b.z, a.z * b.x, a.x * b.y};
+    }
+  const Vec3 f = first, o = offset, g = 2.0 * f + sum.volume * o;
+  squares += {o.x * g.x, o.y * g.y, o.z * g.z};
+  products += {f.y * o.z + f.z * o.y + sum.volume * o.y * o.z, f.z * o.x + f.x * o.z + sum.volume * o.z * o.x,
+               f.x * o.y + f.y * o.x + sum.volume * o.x * o.y};
+  totals.squares += squares;
+  totals.products += products;
+}
+
+class Measuring {
+ public:
+  /// False if it gives up.
+  bool add(std::span<const Round> rounds, std::span<const Wall> walls) {
+    if (rounds.size() == 2 && rounds[0].ball && rounds[1].ball) return add_balls(rounds, walls);
+    rounds_.assign(rounds.begin(), rounds.end());
+    walls_.clear();
+    for (const Wall& wall : walls) {
+      const int cuts = side_of(wall);
+      if (cuts > 0) return true;
+      if (cuts == 0) walls_.push_back(wall);
+    }
+    if (flat()) return true;
+    prefer_faces();
+    drop_around();
+    return add_stack();
+  }
+
+  Totals totals;
+  double extent = 0;  ///< m: no point of the common set is farther from the one inside
+
+ private:
+  /// 1 if a wall leaves nothing of one of the rounds, -1 if it leaves all of one, beyond rounding.
+  int side_of(const Wall& wall) const {
+    int side = 0;
+    for (const Round& r : rounds_) {
+      const Vec3 n = rounded(wall.normal);
+      const double at = dot(n, rounded(r.centre)) - wall.slack.head;
+      double reach = r.radius;
+      if (!r.ball) {
+        const double along = dot(n, rounded(r.axis));
+        // The borders of a piece are walls as well, and orthogonal to the axis: these must stay.
+        if (1 - along * along < 1e-20) continue;
+        reach = r.radius * std::sqrt(1 - along * along) + std::abs(along) * r.half_length;
+      }
+      const double margin = 1e-13 * (std::abs(at) + reach);
+      if (at - reach > margin) return 1;
+      if (at + reach < -margin) side = -1;
+    }
+    return side;
+  }
+
+  /// m: nearer than that, walls of the same direction lie in one plane.
+  double coincident() const { return 1e-24 * extent; }
+
+  /// Whether two walls face each other in one plane, so that there is nothing between them.
+  bool flat() const {
+    for (size_t i = 0; i < walls_.size(); ++i)
+      for (size_t j = i + 1; j < walls_.size(); ++j)
+        if (norm2(rounded(walls_[i].normal + walls_[j].normal)) < 1e-48 &&
+            (walls_[i].slack + walls_[j].slack).head < coincident())
+          return true;
+    return false;
+  }
+
+  /// A face in the plane of a cut is all that lies there: beyond the cut, the next piece is flat.
+  void prefer_faces() {
+    std::erase_if(walls_, [&](const Wall& cut) {
+      return cut.owner == slicing::kCut && std::ranges::any_of(walls_, [&](const Wall& face) {
+               return face.owner != slicing::kCut && norm2(rounded(face.normal - cut.normal)) < 1e-48 &&
+                      std::abs((face.slack - cut.slack).head) < coincident();
+             });
+    });
+  }
+
+  /// A cylinder that holds the other round leaves all of it, and where it touches that from outside along a line,
+  /// slices would show nothing but rounding. What sticks out counts as an error.
+  void drop_around() {
+    if (rounds_.size() < 2) return;
+    for (int i = 0; i < 2; ++i) {
+      const Round &outer = rounds_[i], &inner = rounds_[1 - i];
+      if (outer.ball) continue;
+      WideVector between = inner.centre - outer.centre;
+      between = between - dot(between, outer.axis) * outer.axis;
+      const double tilt = inner.ball ? 0 : norm(rounded(cross(outer.axis, inner.axis)));
+      if (tilt > 1e-24) continue;
+      const double beyond = (norm(between) + DoubleDouble{inner.radius} - DoubleDouble{outer.radius}).head;
+      if (beyond > 1e-14 * inner.radius) continue;
+      const double length = inner.ball ? 2 * inner.radius : 2 * inner.half_length;
+      totals.error += std::max(0.0, beyond) * 2 * std::numbers::pi * inner.radius * length;
+      rounds_.erase(rounds_.begin() + i);
+      return;
+    }
+  }
+
+  /// Where the radical plane parts two balls, the common set is the part of either ball beyond it.
+  bool add_balls(std::span<const Round> rounds, std::span<const Wall> walls) {
+    const Round &a = rounds[0], &b = rounds[1];
+    const WideVector between = a.centre - b.centre;
+    const DoubleDouble distance = norm(between);
+    const auto power = [](const Round& r) {
+      const DoubleDouble d = norm(r.centre), radius{r.radius};
+      return (d - radius) * (d + radius);
+    };
+    std::vector<Wall>& with = with_radical_;
+    if (!(distance.head > std::abs(a.radius - b.radius))) {
+      with.assign(walls.begin(), walls.end());
+      return add(std::span(a.radius < b.radius ? &a : &b, 1), with);
+    }
+    const DoubleDouble slack = (power(a) - power(b)) / (DoubleDouble{2} * distance);
+    const WideVector normal = unit(between);
+    with.assign(walls.begin(), walls.end());
+    with.push_back({normal, slack, slicing::kCut});
+    if (!add(std::span(&a, 1), with)) return false;
+    with.back() = {-normal, -slack, slicing::kCut};
+    return add(std::span(&b, 1), with);
+  }
+
+  bool add_stack() {
+    const std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent);
+    if (!stack || !slicing::find_intervals(*stack, false, intervals_)) return false;
+    if (intervals_.empty()) return true;
+    best_.integrals.volume = 0;
+    double about = 0;
+    for (const slicing::Interval& interval : intervals_) {
+      const double middle = interval.low + (interval.high - interval.low) / 2;
+      about += (interval.high - interval.low) / 2 *
+               slicing::measure(slicing::Slice(*stack, middle), interval.outline).volume;
+    }
+    double open = integrate(*stack, about, 1);
+    std::swap(best_, sum_);
+    if (open > kClosed * best_.integrals.volume && move_near(*stack)) return true;
+    // The rules end where the volume is exact. Where areas are not yet, the surface does not close.
+    if (open > kClosed * best_.integrals.volume && !slicing::find_intervals(*stack, true, intervals_)) return false;
+    for (double strictness = 1; strictness < 1e9 && open > kClosed * best_.integrals.volume; strictness *= 1e3) {
+      const double less = integrate(*stack, about, strictness);
+      if (!(less < open / 2) && strictness > 1) break;
+      if (!(less < open)) continue;
+      open = less;
+      std::swap(best_, sum_);
+    }
+    totals.open += open;
+    add_sum(*stack, best_);
+    return true;
+  }
+
+  /// Coordinates count from a point inside of both bodies. A piece that is small beside its way from there is measured
+  /// again from a point of its own; true if so.
+  bool move_near(const slicing::Stack& stack) {
+    const slicing::Integrals& s = best_.integrals;
+    const Vec3 mean = s.first / s.volume;
+    const double spread = (s.squares.x + s.squares.y + s.squares.z) / s.volume - norm2(mean);
+    if (moved_ || !(norm2(mean) > 25 * spread)) return false;
+    offset_ = mean.x * stack.l + mean.y * stack.m + mean.z * stack.t;
+    for (Round& r : rounds_) r.centre = r.centre - wide(offset_);
+    for (Wall& wall : walls_) wall.slack = wall.slack - dot(wall.normal, wide(offset_));
+    const double usual = extent;
+    extent += norm(offset_);
+    moved_ = true;
+    const bool done = add_stack();
+    moved_ = false;
+    extent = usual;
+    offset_ = {};
+    return done;
+  }
+
+  /// Fills sum_ of a stack that holds about so much, and returns how much may be missing.
+  double integrate(const slicing::Stack& stack, double about, double strictness) {
+    slicing::Sum& sum = sum_;
+    sum.integrals = {}, sum.error = 0, sum.rules = 0, sum.samples.clear();
+    const double whole = std::max(about, totals.volume);
+    bool sound = true;
+    for (const slicing::Interval& interval : intervals_)
+      sound = sound && slicing::integrate(stack, interval, whole, strictness, sum);
+    const slicing::Interval &lowest = intervals_.front(), &highest = intervals_.back();
+    if (stack.low_plane && lowest.low == stack.low)
+      slicing::add_face(*stack.low_plane, slicing::Slice(stack, lowest.low), lowest.outline, sum.integrals);
+    if (stack.high_plane && highest.high == stack.high)
+      slicing::add_face(*stack.high_plane, slicing::Slice(stack, highest.high), highest.outline, sum.integrals);
+    // A piece for which that does not hold is worth its size as an error. It may be rounding alone.
+    if (!sound || !(sum.integrals.volume > 0) || !slicing::within_chords(sum))
+      return 8 * std::abs(about) + std::abs(sum.integrals.volume);
+    return open_part(stack, sum.integrals);
+  }
+
+  /// What may be missing: by how much the volume differs from ∫ t N dA, and what area vectors, which sum to zero over
+  /// a closed surface, leave times the size, beyond rounding. Those of lines and of arcs are other integrals over the
+  /// same slices, less smooth than the volume.
+  static double open_part(const slicing::Stack& stack, const slicing::Integrals& s) {
+    const Vec3 left = s.pull[0] + s.pull[1] + s.pull[2];
+    const auto part = [&](double sum, double square) {
+      return std::max(0.0, std::abs(sum) - kSummation * s.border) * std::sqrt(std::max(0.0, square / s.volume));
+    };
+    return std::max(0.0, std::abs(s.across - s.volume) - kSummation * s.terms) + part(left.x, s.squares.x) +
+           part(left.y, s.squares.y) + part(left.z + stack.shear.x * left.x + stack.shear.y * left.y, s.squares.z);
+  }
+
+  void add_sum(const slicing::Stack& stack, const slicing::Sum& sum) {
+    const slicing::Integrals& s = sum.integrals;
+    const auto in_world = [&](Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.n; };
+    totals.volume += s.volume + s.correction;
+    totals.error += sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
+    totals.area += s.area;
+    totals.border += s.border;
+    const Vec3 first = s.first.x * stack.l + s.first.y * stack.m + s.first.z * stack.t, pull = in_world(s.pull[0]);
+    totals.first += first + s.volume * offset_;
+    totals.pull += pull;
+    totals.moment += in_world(s.moment[0]) + cross(offset_, pull);
+    totals.unbalanced += in_world(s.pull[0] + s.pull[1]);
+    add_second(stack, s, first, offset_, totals);
+  }
+
+  std::vector<Round> rounds_;
+  std::vector<Wall> walls_, with_radical_;
+  std::vector<slicing::Interval> intervals_;
+  slicing::Sum sum_, best_;
+  Vec3 offset_;         ///< of the point that the pieces are about, from the point inside
+  bool moved_ = false;  ///< whether that is another
+};
+
+/// Beyond that fraction of a volume, something is wrong. Polytopes of tangent planes take seconds to be as good.
+constexpr double kMostError = 1e-8;
+
+/// What may be missing if the area vectors of the whole surface do not sum to zero: they, times the size along them.
+double missing(const Totals& totals) {
+  const Vec3 u = totals.unbalanced, s = totals.squares, p = totals.products;
+  const double square =
+      u.x * u.x * s.x + u.y * u.y * s.y + u.z * u.z * s.z + 2 * (u.y * u.z * p.x + u.z * u.x * p.y + u.x * u.y * p.z);
+  const double rounding = kSummation * totals.border * std::sqrt((s.x + s.y + s.z) / totals.volume);
+  return std::max(0.0, std::sqrt(std::max(0.0, square / totals.volume)) - rounding);
+}
+
+Mat3 inertia_about(Vec3 centroid, const Totals& totals) {
+  const Vec3 c = centroid, s = totals.squares, p = totals.products;
+  const double v = totals.volume;
+  const double xx = s.x - v * c.x * c.x, yy = s.y - v * c.y * c.y, zz = s.z - v * c.z * c.z;
+  const double yz = p.x - v * c.y * c.z, zx = p.y - v * c.z * c.x, xy = p.z - v * c.x * c.y;
+  return {{yy + zz, -xy, -zx}, {-xy, xx + zz, -yz}, {-zx, -yz, xx + yy}};
+}
+
+}  // namespace
+
+std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside) {
+  thread_local slicing::Pieces of_a, of_b;
+  thread_local Measuring measuring;
+  of_a.clear(), of_b.clear();
+  measuring.totals = {};
+  measuring.extent = std::min(slicing::extent(a, rounded(inside)), slicing::extent(b, rounded(inside)));
+  slicing::cut(a, b, 0, reference, inside, of_a);
+  slicing::cut(b, a, 1, reference, inside, of_b);
+  thread_local std::vector<Round> rounds;
+  thread_local std::vector<Wall> walls;
+  for (const slicing::Piece& p : of_a.pieces)
+    for (const slicing::Piece& q : of_b.pieces) {
+      rounds.clear(), walls.clear();
+      if (p.round >= 0) rounds.push_back(of_a.rounds[p.round]);
+      if (q.round >= 0) rounds.push_back(of_b.rounds[q.round]);
+      walls.insert(walls.end(), &of_a.walls[0] + p.first_wall, &of_a.walls[0] + p.first_wall + p.walls);
+      walls.insert(walls.end(), &of_b.walls[0] + q.first_wall, &of_b.walls[0] + q.first_wall + q.walls);
+      if (!measuring.add(rounds, walls)) return std::nullopt;
+    }
+  const Totals& totals = measuring.totals;
+  if (!(totals.volume > 0)) return std::nullopt;
+  RoundMeasures result;
+  result.volume = totals.volume;
+  result.volume_error =
+      totals.error + std::max(totals.open, missing(totals)) + (of_a.flatness + of_b.flatness) * totals.area;
+  if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
+  result.area = totals.area;
+  const Vec3 centroid = totals.first / totals.volume;
+  result.centroid = rounded(inside) + centroid;
+  result.inertia = inertia_about(centroid, totals);
+  result.pull = about(Pull{totals.pull, totals.moment}, rounded(inside), {});
+  for (const slicing::Pieces* pieces : {&of_a, &of_b})
+    result.facets_touched += static_cast<int>(
+        std::ranges::count_if(pieces->walls, [](const Wall& wall) { return wall.owner != slicing::kCut; }));
+  return result;
+}
+
+}  // namespace overlapper

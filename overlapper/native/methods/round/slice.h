@@ -1,0 +1,142 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "geometry/vec.h"
+
+namespace overlapper::slicing {
+
+/// A point of a slice.
+struct Point {
+  double x = 0, y = 0;
+};
+inline Point operator+(Point a, Point b) { return {a.x + b.x, a.y + b.y}; }
+inline Point operator-(Point a, Point b) { return {a.x - b.x, a.y - b.y}; }
+inline Point operator*(double s, Point a) { return {s * a.x, s * a.y}; }
+inline double dot(Point a, Point b) { return a.x * b.x + a.y * b.y; }
+inline double cross(Point a, Point b) { return a.x * b.y - a.y * b.x; }
+
+/// How many lines may bound a slice; bodies with more planes than that near their common set have another way.
+inline constexpr int kMostLines = 32;
+
+/// The owner of planes that cut a body in two.
+inline constexpr int kCut = 2;
+
+/// A quadric in coordinates (x, y, t) about a point of the common set, X = x l + y m + t T, where T · n = 1, so that
+/// slices are t apart, and T may be oblique: a ball, or a cylinder whose axis lies in the slices. Seen along
+/// that axis, a cylinder is a disc with the one coordinate `across` · (x, y).
+struct Quadric {
+  bool ball = false;
+  int owner = 0;
+  double radius = 0;
+  Point across;              ///< of a cylinder: the unit vector orthogonal to the axis
+  Point shear;               ///< what T has along l and m; of a cylinder in x alone, along `across`
+  Point centre;              ///< of a ball at t = 0; of a cylinder in x alone, along `across`
+  double along = 0;          ///< dot(T, centre), in the plane orthogonal to the axis
+  double slack = 0;          ///< |centre|² − radius²: not positive where the origin is inside
+  double low = 0, high = 0;  ///< the values of t between which there are slices
+  double level = 0;          ///< that of its centre
+
+  double half_chord2(double t) const { return (t - low) * (high - t); }
+  /// The part of value() that does not depend on x and y, and the size of its terms.
+  double constant(double t) const { return (1 + dot(shear, shear)) * t * t - 2 * along * t + slack; }
+  double terms(double t) const { return (1 + dot(shear, shear)) * t * t + std::abs(2 * along * t) + std::abs(slack); }
+  /// The value of |X − centre|² − radius² at a point of the slice's coordinates.
+  double value(Point p, double t) const {
+    const Point q = ball ? p : Point{dot(across, p), 0};
+    return dot(q, q) - 2 * dot(q, centre) + 2 * dot(shear, q) * t + constant(t);
+  }
+};
+
+/// A line of the slices: dot(normal, x) <= side(t). Of a plane, side(t) = offset − rate t.
+struct Line {
+  Point normal;
+  double length = 1;  ///< of the normal
+  double offset = 0, rate = 0;
+  int quadric = -1;   ///< the cylinder that it is a side of
+  bool upper = true;  ///< along `across` of that, or against it
+  int owner = kCut;   ///< the body
+  Vec3 face;          ///< the plane's unit normal in the world
+  Point normal_tail;  ///< what rounding to doubles has taken from the plane
+  double offset_tail = 0, rate_tail = 0;
+};
+
+/// The common set of a polytope, at most two cylinders and at most one ball, as a stack of slices.
+struct Stack {
+  std::array<Line, kMostLines + 8> line;
+  int lines = 0;
+  std::array<Quadric, 2> quadric;
+  int quadrics = 0;
+  int ball = -1;                              ///< which of the quadrics is one
+  double low = 0, high = 0;                   ///< slices lie between, if there are any
+  std::optional<Line> low_plane, high_plane;  ///< planes parallel to the slices, if such end the stack
+  Vec3 l, m, n, t;                            ///< the axes, in the world
+  Point shear;                                ///< what t has along l and m
+};
+
+/// The lines and the disc of one slice.
+struct Slice {
+  explicit Slice(const Stack& stack_, double t_);
+
+  const Stack& stack;
+  double t;
+  std::array<double, 2> half_chord{}, upper{}, lower{};  ///< per quadric; the sides only of cylinders
+  Point centre;                                          ///< of the disc
+  double slack = 0, radius = 0;                          ///< |centre|² − radius²
+
+  double side(int line) const {
+    const Line& l = stack.line[line];
+    if (l.quadric < 0) return l.offset - l.rate * t;
+    return l.upper ? upper[l.quadric] : -lower[l.quadric];
+  }
+  Point corner(int first, int second) const;
+};
+
+/// What bounds a slice, counter-clockwise: pieces of lines, and arcs wherever one of these ends on the circle.
+struct Outline {
+  struct Edge {
+    int line;
+    bool from_circle, to_circle;
+    friend bool operator==(const Edge&, const Edge&) = default;
+  };
+  std::array<Edge, kMostLines + 8> edge;
+  int edges = 0;
+  bool whole_disc = false;
+  /// Of an empty slice: the line that left nothing, and by how much it did; the later the line, the nearer the slice is
+  /// to having something.
+  int failed = 0;
+  double missed = 0;
+
+  bool empty() const { return edges == 0 && !whole_disc; }
+  friend bool operator==(const Outline& a, const Outline& b) {
+    return a.edges == b.edges && a.whole_disc == b.whole_disc &&
+           std::equal(a.edge.begin(), a.edge.begin() + a.edges, b.edge.begin());
+  }
+};
+Outline outline(const Slice& slice);
+
+/// Integrals over a slice, or over slices: the volume's, and those of the surfaces.
+struct Integrals {
+  double volume = 0;
+  Vec3 first;              ///< of x, y and t
+  Vec3 squares, products;  ///< of x², y², t² and of yt, tx, xy
+  double area = 0;         ///< of what the bodies own of the surface
+  /// ∫ N dA and ∫ X × N dA along l, m and n: per body of its surface, and of the cuts through bodies.
+  std::array<Vec3, 3> pull{}, moment{};
+  double across = 0;      ///< ∫ t N dA along n, over all of the surface: the volume, by other integrals
+  double terms = 0;       ///< the size of the terms of that
+  double border = 0;      ///< ∫ dA over all of the surface
+  double correction = 0;  ///< of the volume: what the tails of planes add to first order
+  double blur = 0;        ///< of the volume: the size of terms that lines are the sums of
+
+  void add(double weight, const Integrals& other);
+};
+/// What a slice gives per unit of t, if that is its outline.
+Integrals measure(const Slice& slice, const Outline& outline);
+
+/// The face in a plane parallel to the slices, which the slice beside it fills.
+void add_face(const Line& plane, const Slice& slice, const Outline& outline, Integrals& sum);
+
+}  // namespace overlapper::slicing

@@ -1,0 +1,227 @@
+#include "methods/round/stack.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace overlapper::slicing {
+namespace {
+
+/// A plane this nearly parallel to the slices ends the stack, and what it is tilted counts to first order.
+constexpr double kParallel = 1e-11;
+/// Planes between that and this would make slices whose border rushes across.
+constexpr double kRushing = 1e-3;
+/// A ridge that rises less than that from slice to slice lies in them rather than across.
+constexpr double kSteep = 0.05;
+
+/// Axes of the slices: l, m and n orthonormal, t = n + x l + y m for the shear (x, y).
+struct Axes {
+  WideVector l, m, n, t;
+  DoubleDouble x{}, y{};
+};
+
+WideVector across(const WideVector& v, const WideVector& unit_axis) { return v - dot(v, unit_axis) * unit_axis; }
+
+/// A surface where it is nearest to the origin: the way out there, {0, 0, 0} if that may be any, and how far.
+struct WayOut {
+  WideVector normal;
+  double slack;
+};
+
+WayOut way_out(const Round& r) {
+  const WideVector from = r.ball ? -r.centre : across(-r.centre, r.axis);
+  const double length = rounded(norm(from));
+  if (length > 1e-3 * r.radius) return {unit(from), r.radius - length};
+  return {{}, r.radius - length};
+}
+
+/// The nearest surface, and the nearest other one that is not parallel to it there.
+std::array<WayOut, 2> nearest(std::span<const Round> rounds, std::span<const Wall> walls) {
+  std::array<WayOut, 2> ways{
+      {{{}, std::numeric_limits<double>::infinity()}, {{}, std::numeric_limits<double>::infinity()}}};
+  const auto each = [&](auto use) {
+    for (const Round& r : rounds) use(way_out(r));
+    for (const Wall& wall : walls)
+      if (wall.owner != kCut) use(WayOut{wall.normal, wall.slack.head});
+  };
+  each([&](const WayOut& way) {
+    if (way.slack < ways[0].slack) ways[0] = way;
+  });
+  const Vec3 normal = rounded(ways[0].normal);
+  each([&](const WayOut& way) {
+    if (way.slack < ways[1].slack && norm2(cross(normal, rounded(way.normal))) > 1e-2) ways[1] = way;
+  });
+  return ways;
+}
+
+/// A unit vector orthogonal to `axis`: along the edge in which the nearest wall that is no plane across it meets a
+/// plane across it, if there is one.
+WideVector along_an_edge(const WideVector& axis, std::span<const Wall> walls) {
+  WideVector best = wide(any_orthogonal(rounded(axis)));
+  double least = std::numeric_limits<double>::infinity();
+  for (const Wall& wall : walls) {
+    const WideVector edge = cross(axis, wall.normal);
+    if (norm2(rounded(edge)) < 0.01 || wall.slack.head >= least) continue;
+    best = edge, least = wall.slack.head;
+  }
+  return unit(across(best, axis));
+}
+
+/// From slice to slice along a direction.
+Axes sheared(const WideVector& l, const WideVector& m, const WideVector& n, const WideVector& along) {
+  const DoubleDouble rise = dot(along, n), x = dot(along, l) / rise, y = dot(along, m) / rise;
+  return {l, m, n, n + x * l + y * m, x, y};
+}
+
+/// About m0 orthogonal to l, turned by an angle about l; the direction from slice to slice stays orthogonal to m0.
+Axes turned(const WideVector& l, const WideVector& m0, double angle, std::span<const Round> rounds,
+            std::span<const Wall> walls) {
+  const WideVector n0 = cross(l, m0);
+  const DoubleDouble tangent{angle}, cosine = DoubleDouble{1} / sqrt(DoubleDouble{1} + tangent * tangent);
+  const WideVector m = cosine * (m0 - tangent * n0), n = cosine * (n0 + tangent * m0);
+  const std::array<WayOut, 2> ways = nearest(rounds, walls);
+  const WideVector ridge = cross(ways[0].normal, ways[1].normal);
+  return sheared(l, m, n, std::abs(rounded(dot(ridge, n))) > kSteep ? ridge : n0);
+}
+
+/// Slices are to hold the way out and, of a body that lies along a line, that line.
+Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double angle) {
+  const Round *one = nullptr, *two = nullptr;
+  for (const Round& r : rounds)
+    if (!r.ball) (one ? two : one) = &r;
+  if (two) {
+    const WideVector both = cross(one->axis, two->axis);
+    const DoubleDouble sine = norm(both);
+    if (sine.head > 1e-24) {
+      const WideVector n = unit(both);
+      const std::array<WayOut, 2> ways = nearest(rounds, walls);
+      const WideVector out = ways[0].normal, flat = across(out, n);
+      const double width = rounded(norm(flat)), radius = std::min(one->radius, two->radius);
+      if (!(width > 1e-3)) return {cross(unit(cross(one->axis, n)), n), unit(cross(one->axis, n)), n, n, {}, {}};
+      const WideVector m = unit(flat), l = cross(m, n);
+      WideVector along = n;
+      const WideVector ridge = cross(out, ways[1].normal);
+      // Nearer to orthogonal, the slices are as wide as the common set.
+      if (std::abs(rounded(dot(ridge, n))) > kSteep) along = ridge;
+      else if (width > 8 * std::sqrt(std::max(0.0, 2 * ways[0].slack / radius))) along = across(n, out);
+      return sheared(l, m, n, along);
+    }
+  }
+  if (one) {
+    WideVector out = way_out(*one).normal;
+    if (!(norm2(rounded(out)) > 0)) out = along_an_edge(one->axis, walls);
+    return turned(one->axis, unit(across(out, one->axis)), angle, rounds, walls);
+  }
+  WideVector out = nearest(rounds, walls)[0].normal;
+  if (!rounds.empty() && norm2(rounded(way_out(rounds[0]).normal)) > 0) out = way_out(rounds[0]).normal;
+  if (!(norm2(rounded(out)) > 0)) out = wide(Vec3{0, 0, 1});
+  out = unit(out);
+  const WideVector n = along_an_edge(out, walls);
+  return turned(cross(out, n), out, angle, rounds, walls);
+}
+
+/// False if a wall is nearly parallel to the slices but not quite.
+bool even(const Axes& axes, std::span<const Wall> walls) {
+  const Vec3 l = rounded(axes.l), m = rounded(axes.m);
+  return std::ranges::none_of(walls, [&](const Wall& wall) {
+    const Vec3 n = rounded(wall.normal);
+    const double size = std::max(std::abs(dot(n, l)), std::abs(dot(n, m)));
+    return size > kParallel && size < kRushing;
+  });
+}
+
+Axes axes_of(std::span<const Round> rounds, std::span<const Wall> walls) {
+  const Axes first = choose(rounds, walls, 0);
+  if (even(first, walls)) return first;
+  for (const double angle : {0.3, -0.3, 0.7, -0.7}) {
+    const Axes other = choose(rounds, walls, angle);
+    if (even(other, walls)) return other;
+  }
+  return first;
+}
+
+Line line_of(const Wall& wall, const Axes& axes) {
+  const DoubleDouble x = dot(wall.normal, axes.l), y = dot(wall.normal, axes.m), rate = dot(wall.normal, axes.t);
+  Line line;
+  line.normal = {x.head, y.head};
+  line.normal_tail = {x.tail, y.tail};
+  line.length = std::hypot(x.head, y.head);
+  line.offset = wall.slack.head, line.offset_tail = wall.slack.tail;
+  line.rate = rate.head, line.rate_tail = rate.tail;
+  line.owner = wall.owner;
+  return line;
+}
+
+/// A plane parallel to the slices bounds t.
+void end_stack(Stack& stack, const Line& line) {
+  const double end = line.offset / line.rate;
+  if (line.rate > 0 && end < stack.high) stack.high = end, stack.high_plane = line;
+  if (line.rate < 0 && end > stack.low) stack.low = end, stack.low_plane = line;
+}
+
+void add_round(Stack& stack, const Round& r, const Axes& axes) {
+  Quadric& q = stack.quadric[stack.quadrics];
+  q.ball = r.ball;
+  q.owner = r.owner;
+  q.radius = r.radius;
+  const DoubleDouble level = dot(r.centre, axes.n), radius{r.radius};
+  q.level = level.head;
+  q.low = (level - radius).head, q.high = (level + radius).head;
+  stack.low = std::max(stack.low, q.low), stack.high = std::min(stack.high, q.high);
+  if (r.ball) {
+    stack.ball = stack.quadrics++;
+    q.shear = stack.shear;
+    q.centre = {dot(r.centre, axes.l).head, dot(r.centre, axes.m).head};
+    q.along = dot(r.centre, axes.t).head;
+    const DoubleDouble distance = norm(r.centre);
+    q.slack = ((distance - radius) * (distance + radius)).head;
+    return;
+  }
+  const WideVector side = unit(cross(r.axis, axes.n));
+  const DoubleDouble x = dot(side, axes.l), y = dot(side, axes.m), centre = dot(side, r.centre),
+                     shear = axes.x * x + axes.y * y;
+  q.across = {x.head, y.head};
+  q.shear = {shear.head, 0};
+  q.centre = {centre.head, 0};
+  q.along = (level + shear * centre).head;
+  const DoubleDouble distance = sqrt(centre * centre + level * level);
+  q.slack = ((distance - radius) * (distance + radius)).head;
+  for (const bool upper : {true, false}) {
+    Line line;
+    const double sign = upper ? 1 : -1;
+    line.normal = sign * q.across;
+    line.normal_tail = {sign * x.tail, sign * y.tail};
+    line.length = 1;
+    line.quadric = stack.quadrics;
+    line.upper = upper;
+    line.owner = r.owner;
+    stack.line[stack.lines++] = line;
+  }
+  ++stack.quadrics;
+}
+
+}  // namespace
+
+std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent) {
+  if (walls.size() > static_cast<size_t>(kMostLines - 4)) return std::nullopt;
+  const Axes axes = axes_of(rounds, walls);
+  Stack stack;
+  stack.l = rounded(axes.l), stack.m = rounded(axes.m), stack.n = rounded(axes.n), stack.t = rounded(axes.t);
+  stack.shear = {axes.x.head, axes.y.head};
+  stack.low = -extent, stack.high = extent;
+  for (const Round& r : rounds) add_round(stack, r, axes);
+  for (const Wall& wall : walls) {
+    const Line line = line_of(wall, axes);
+    if (line.length < kParallel) end_stack(stack, line);
+    else stack.line[stack.lines++] = line;
+  }
+  const double size = 4 * extent * (1 + std::abs(stack.shear.x) + std::abs(stack.shear.y));
+  for (const Point normal : {Point{1, 0}, Point{0, 1}, Point{-1, 0}, Point{0, -1}}) {
+    Line line;
+    line.normal = normal;
+    line.offset = size;
+    stack.line[stack.lines++] = line;
+  }
+  return stack;
+}
+
+}  // namespace overlapper::slicing

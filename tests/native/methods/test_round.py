@@ -1,0 +1,262 @@
+"""Round bodies are measured to a trillionth at any depth: closed forms, rays, cuts that add up, differences."""
+
+import numpy as np
+import pytest
+from flint import arb
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from round_exact import exactly
+from round_truth import dot, number, truth, vector
+from strategies import quaternion
+
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
+
+EXACT = 1e-12
+DEPTHS = [10.0**-k for k in range(1, 11)]
+SHAPES = {
+    "sphere": lambda rng: Sphere(rng.uniform(0.2, 0.8)),
+    "capsule": lambda rng: Capsule(rng.uniform(0.2, 0.6), rng.uniform(0.2, 1.5)),
+    "cylinder": lambda rng: Cylinder(rng.uniform(0.2, 0.6), rng.uniform(0.2, 1.5)),
+    "rounded": lambda rng: RoundedHull(rng.normal(size=(6, 3)) * 0.4, rng.uniform(0.05, 0.3)),
+    "box": lambda rng: Box(rng.uniform(0.2, 0.8, 3)),
+    "hull": lambda rng: Hull(rng.normal(size=(8, 3)) * 0.5),
+    "half-space": lambda rng: HalfSpace(rng.normal(size=3), rng.normal() * 0.3),
+}
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+ROUND = ["sphere", "capsule", "cylinder", "rounded"]
+
+
+def somewhere(rng, name):
+    return Placed(SHAPES[name](rng), rng.normal(size=3) * 0.3, quaternion(rng))
+
+
+def moved(body, shift):
+    return Placed(body.shape, np.array(body.position) + shift, body.orientation)
+
+
+def sunk(rng, first, second, depth):
+    """Two bodies of these kinds, `depth` deep in one another but for rounding."""
+    a, b = somewhere(rng, first), somewhere(rng, second)
+    found = overlap(a, b)
+    return moved(a, (found.depth - depth if found else -found.distance - depth) * np.array(found.normal)), b
+
+
+def lens(a, b):
+    """The volume that two balls share, to sixty digits."""
+    (ra, rb), between = (
+        (number(body.shape.radius) for body in (a, b)),
+        [p - q for p, q in zip(vector(a.position), vector(b.position))],
+    )
+    d = dot(tuple(between), tuple(between)).sqrt()
+    return arb.pi() * (ra + rb - d) ** 2 * (d * d + 2 * d * (ra + rb) - 3 * (ra - rb) ** 2) / (12 * d)
+
+
+def assert_is(found, volume, error=EXACT):
+    off = float(abs(number(found.volume) - volume))
+    assert off <= error * float(volume)
+    assert off <= found.volume_error <= 1e-11 * float(volume)
+
+
+def assert_all_is_exact(a, b, found, far=0.0):
+    """Every measure, where the round body is the first and where it lies is known to the digits that `far` has."""
+    true = exactly(a, b)
+    assert abs(found.volume - true.volume) <= found.volume_error <= 1e-8 * true.volume
+    assert found.volume == pytest.approx(true.volume, rel=EXACT)
+    assert found.area == pytest.approx(true.area, rel=1e-10)
+    size = np.sqrt(np.trace(true.inertia) / true.volume)
+    assert_allclose(found.centroid, true.centroid, rtol=0, atol=1e-10 * size + 4e-16 * (1 + far))
+    if found.way == "slicing":
+        assert_allclose(found.inertia, true.inertia, rtol=0, atol=1e-10 * np.trace(true.inertia))
+    force = np.linalg.norm(true.gradient[:3])
+    arm = size + np.linalg.norm(true.centroid - a.position) + far
+    assert_allclose(found.gradient[0, :3], true.gradient[:3], rtol=0, atol=1e-10 * force)
+    assert_allclose(found.gradient[0, 3:], true.gradient[3:], rtol=0, atol=1e-10 * force * arm)
+    assert_allclose(found.gradient[1, :3], -true.gradient[:3], rtol=0, atol=1e-10 * force)
+
+
+@pytest.mark.parametrize("first", ["sphere", "capsule", "cylinder"])
+@pytest.mark.parametrize("second", ["box", "hull", "half-space"])
+def test_all_measures_of_a_round_body_and_a_polyhedron_are_exact_at_any_depth(first, second):
+    rng = np.random.default_rng(1)
+    for depth in DEPTHS:
+        a, b = sunk(rng, first, second, depth)
+        found = overlap(a, b)
+        if not found:
+            continue
+        assert found.way in ("slicing", "closed form")
+        assert_all_is_exact(a, b, found)
+
+
+# Which way a round body turns, in its own coordinates, and which way a box does.
+TURNED = {"cap": (0, 0, 1), "side": (1, 0, 0), "rim": (1, 0, 1), "nearly the side": (1, 0, 1e-9), "seam": (1, 0, 1e-4)}
+FEATURES = {"face": (0, 0, 1), "edge": (0, 1, 1), "corner": (1, 1, 1), "nearly a face": (1e-9, 0, 1)}
+
+
+def turning(u, v):
+    """A quaternion that turns one unit vector into another, not its opposite."""
+    turn = np.append(np.cross(u, v), 1 + u @ v)
+    return turn / np.linalg.norm(turn)
+
+
+def set_on(shape, turned, half, feature, depth, at):
+    """A round body whose point in one direction is so deep below the point of a box in another."""
+    out = np.array(feature) / np.linalg.norm(feature)
+    turn = turning(np.array(turned) / np.linalg.norm(turned), -out + 1e-12)
+    axis = 2 * np.array([turn[0] * turn[2] + turn[1] * turn[3], turn[1] * turn[2] - turn[0] * turn[3], 0.5])
+    axis[2] -= 2 * (turn[0] ** 2 + turn[1] ** 2)
+    along = axis @ out
+    lowest = -np.sign(along) * getattr(shape, "length", 0) / 2 * axis if abs(along) > 1e-8 else np.zeros(3)
+    side = out - along * axis if isinstance(shape, Cylinder) else out
+    lowest = lowest - shape.radius * side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-8 else lowest
+    corner = half * np.where(np.abs(feature) > np.array(1e-3), np.sign(feature), 0)
+    return Placed(shape, at + corner - lowest - depth * out, turn), Placed(Box(half), at)
+
+
+@pytest.mark.parametrize("turned", TURNED)
+@pytest.mark.parametrize("feature", FEATURES)
+@pytest.mark.parametrize(("size", "ratio", "far"), [(1, 1, 0), (1e-3, 1e3, 0), (1e3, 1, 1e3)])
+def test_all_measures_are_exact_on_a_face_an_edge_and_a_corner(turned, feature, size, ratio, far):
+    for shape in (Sphere(0.5 * size), Capsule(0.4 * size, 0.9 * size), Cylinder(0.4 * size, 0.9 * size)):
+        for places in (1, 7):
+            half = np.array([0.5, 0.6, 0.7]) * size * ratio
+            at = np.array([0.3, -0.9, 0.4]) * far
+            a, b = set_on(shape, TURNED[turned], half, FEATURES[feature], size * 10.0**-places, at)
+            found = overlap(a, b)
+            assert found.way in ("slicing", "closed form")
+            assert_all_is_exact(a, b, found, far + size * ratio)
+
+
+@pytest.mark.parametrize("depth", DEPTHS)
+@pytest.mark.parametrize("far", [0, 1e3])
+def test_two_balls_share_a_lens(depth, far):
+    a, b = Placed(Sphere(0.5), (far, 0.1, 0)), Placed(Capsule(0.25, 0), np.array([far, 0.1, 0]) + [0.45, 0.6, 0])
+    b = moved(b, (0.75 - depth) * np.array([0.6, 0.8, 0]) - np.array([0.45, 0.6, 0]))
+    assert_is(overlap(a, b), lens(a, b))
+
+
+@pytest.mark.parametrize("depth", DEPTHS[:-1])
+def test_a_cylinder_lying_on_the_ground_shares_a_segment(depth):
+    ground = HalfSpace([0, 0, 1], 0)
+    turn = (0, np.sin(np.pi / 4), 0, np.sin(np.pi / 4))
+    cylinder = Placed(Cylinder(0.5, 2), (0, 0, 0.5 - depth), turn)
+    half_angle = (number(float(cylinder.position[2])) / number(0.5)).acos()
+    segment = (half_angle - half_angle.sin() * half_angle.cos()) / 4
+    assert_is(overlap(cylinder, ground), 2 * segment)
+
+
+@pytest.mark.parametrize("radius", [1e-3, 0.5, 1e3])
+def test_crossing_cylinders_share_the_bicylinder(radius):
+    turn = (np.sin(np.pi / 4), 0, 0, np.sin(np.pi / 4))
+    found = overlap(Cylinder(radius, 4 * radius), Placed(Cylinder(radius, 5 * radius), orientation=turn))
+    assert found.way == "slicing"
+    assert_is(found, 16 * number(radius) ** 3 / 3)
+    assert found.area == pytest.approx(16 * radius**2, rel=1e-12)
+
+
+def test_a_ball_over_the_corner_of_a_box_is_an_eighth_of_it():
+    found = overlap(Placed(Sphere(0.5), (1, 1, 1)), Box([1, 1, 1]))
+    assert_is(found, arb.pi() / 48)
+    assert_allclose(found.gradient[0, :3], -np.pi / 16, rtol=1e-12)
+
+
+def test_a_rounded_hull_inside_a_box_has_the_volume_of_steiner():
+    rounded = RoundedHull(np.random.default_rng(3).normal(size=(9, 3)), 0.3)
+    found = overlap(rounded, Box([9, 9, 9]))
+    assert found.way == "slicing"
+    assert found.volume == pytest.approx(rounded.volume, rel=EXACT)
+    assert_allclose(found.centroid, rounded.centroid, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "seed"),
+    [("sphere", "box", 1), ("capsule", "cylinder", 2)],
+)
+def test_measures_are_those_that_rays_find(first, second, seed):
+    a, b = sunk(np.random.default_rng(seed), first, second, 1e-2)
+    found = overlap(a, b)
+    true = truth(a, b, found)
+    assert found.way == "slicing"
+    assert found.volume == pytest.approx(true.volume, rel=max(EXACT, 4 * true.error))
+    size = np.sqrt(np.trace(true.inertia) / true.volume)
+    assert_allclose(found.centroid, true.centroid, atol=1e-10 * size)
+    assert_allclose(found.inertia, true.inertia, atol=1e-10 * np.abs(true.inertia).max())
+    # Where the surface changes, what rays miss is of first order for areas.
+    assert found.area == pytest.approx(true.area, rel=1e-5)
+    assert_allclose(found.gradient, true.pull, atol=1e-5 * np.abs(true.pull).max())
+
+
+def measured_as_round(found):
+    return found.way in ("slicing", "closed form") and found.volume_error <= 1e-11 * found.volume
+
+
+@pytest.mark.parametrize("first", ROUND)
+@pytest.mark.parametrize("second", sorted(SHAPES))
+def test_nearly_all_contacts_of_round_bodies_are_measured_exactly(first, second):
+    rng = np.random.default_rng(8)
+    contacts = [overlap(*sunk(rng, first, second, 10.0 ** -(1 + k % 9))) for k in range(27)]
+    assert sum(measured_as_round(found) for found in contacts if found.volume) >= 24
+
+
+@settings(deadline=None)
+@given(st.sampled_from(ROUND), st.integers(0, 2**32 - 1), st.integers(1, 10))
+def test_parts_of_a_box_add_up(kind, seed, places):
+    rng = np.random.default_rng(seed)
+    a, box = sunk(rng, kind, "box", 10.0**-places)
+    half = np.array(box.shape.half_extents)
+    whole = overlap(a, box)
+    assume(whole)
+    # In coordinates of the box, whose planes are then the same for all parts.
+    cut = 0.5
+    lower, upper = (Hull(CORNERS * half * [1, 1, cut] + [0, 0, s * half[2] * cut]) for s in (-1, 1))
+    parts = [overlap(a, Placed(part, box.position, box.orientation)) for part in (lower, upper)]
+    total, error = sum(p.volume for p in parts), sum(p.volume_error for p in (whole, *parts))
+    assert abs(total - whole.volume) <= error + EXACT * whole.volume
+
+
+@settings(deadline=None)
+@given(st.sampled_from(ROUND), st.sampled_from(sorted(SHAPES)), st.integers(0, 2**32 - 1), st.integers(1, 10))
+def test_bits_do_not_depend_on_the_order(first, second, seed, places):
+    a, b = sunk(np.random.default_rng(seed), first, second, 10.0**-places)
+    one, other = overlap(a, b), overlap(b, a)
+    assert (one.volume, one.volume_error, one.area) == (other.volume, other.volume_error, other.area)
+    assert one.way == other.way
+    if one:
+        assert np.array_equal(one.centroid, other.centroid)
+        assert np.array_equal(one.gradient, other.gradient[::-1])
+        assert one.volume > 0
+
+
+@pytest.mark.parametrize("first", ROUND)
+@pytest.mark.parametrize("second", sorted(SHAPES))
+def test_the_gradient_is_that_of_the_volume(first, second):
+    rng = np.random.default_rng(5)
+    a, b = sunk(rng, first, second, 0.1)
+    found = overlap(a, b)
+    step = 1e-4
+    for k in range(3):
+        shifted = [overlap(moved(a, n * step * np.eye(3)[k]), b) for n in (-2, -1, 1, 2)]
+        if not all(measured_as_round(o) for o in (found, *shifted)):
+            continue
+        low, less, more, high = (o.volume for o in shifted)
+        slope = (8 * (more - less) - (high - low)) / (12 * step)
+        # A volume is smooth but where features appear.
+        assert found.gradient[0, k] == pytest.approx(slope, abs=1e-6 * max(found.area, 1e-3))
+
+
+def test_shapes_that_coincide_are_measured_truly():
+    s = np.sqrt(0.5)
+    crossing = (0, s, 0, s)
+    pairs = [
+        (Placed(Capsule(1, 1)), Placed(Capsule(1, 1), orientation=crossing)),
+        (Placed(Capsule(1, 1)), Placed(Capsule(1, 1), (0, 0, 1), crossing)),
+        (Placed(Capsule(1, 1)), Placed(Cylinder(1, 1), orientation=crossing)),
+        (Placed(Cylinder(1, 1)), Placed(Cylinder(1, 1), orientation=crossing)),
+        (Placed(Capsule(1, 1)), Placed(Sphere(1), (0.5, 0, 0.5))),
+        (Placed(Capsule(1, 1)), Placed(Cylinder(1, 3))),
+        (Placed(Capsule(1, 1)), Placed(Capsule(1, 1))),
+    ]
+    for a, b in pairs:
+        exactly, nearly = overlap(a, b), overlap(a, moved(b, (1e-9, 2e-9, -1e-9)))
+        error = exactly.volume_error + nearly.volume_error + 3e-9 * (exactly.area + nearly.area)
+        assert abs(exactly.volume - nearly.volume) <= error
