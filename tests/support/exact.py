@@ -119,13 +119,14 @@ class Polytope:
     def inertia(self) -> list[list[Fraction]]:
         """The inertia tensor about the centroid at unit density."""
         arm = subtract(self.centroid, coordinates(self.vertices[0]))
-        second = [[-self.volume * arm[i] * arm[j] for j in range(3)] for i in range(3)]
-        for six, edges in self.tetrahedra:
-            total = [edges[0][i] + edges[1][i] + edges[2][i] for i in range(3)]
-            for i in range(3):
-                for j in range(3):
-                    products = total[i] * total[j] + sum((e[i] * e[j] for e in edges), Fraction(0))
-                    second[i][j] += six * products / 120
+        parts = [(six, edges, add(add(edges[0], edges[1]), edges[2])) for six, edges in self.tetrahedra]
+
+        def moment(i: int, j: int) -> Fraction:
+            products = (six * (s[i] * s[j] + sum((e[i] * e[j] for e in edges), Fraction(0))) for six, edges, s in parts)
+            return total(products) / 120 - self.volume * arm[i] * arm[j]
+
+        upper = {(i, j): moment(i, j) for i in range(3) for j in range(i, 3)}
+        second = [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]
         trace = second[0][0] + second[1][1] + second[2][2]
         return [[(trace if i == j else 0) - second[i][j] for j in range(3)] for i in range(3)]
 
@@ -136,19 +137,11 @@ class Polytope:
 
     def pull(self, body: int) -> Vector:
         """Sum of the area vectors of the facets of one body: d volume / d translation of that body."""
-        total = (Fraction(0), Fraction(0), Fraction(0))
-        for facet in self.facets:
-            if body in facet.owners:
-                total = add(total, area_vector(facet))
-        return total
+        return total_vector(area_vector(facet) for facet in self.facets if body in facet.owners)
 
     def moment(self, body: int, about: Vector) -> Vector:
         """Sum over the facets of one body of ∫ (x - about) × n dA: d volume / d rotation vector of it about there."""
-        total = (Fraction(0), Fraction(0), Fraction(0))
-        for facet in self.facets:
-            if body in facet.owners:
-                total = add(total, moment_of(facet, about))
-        return total
+        return total_vector(moment_of(facet, about) for facet in self.facets if body in facet.owners)
 
     def contains(self, xyz: Iterable[float | Fraction]) -> bool:
         p = point(xyz)
@@ -167,6 +160,11 @@ def total(terms: Iterable[Fraction]) -> Fraction:
     while len(row) > 1:
         row = [u + v for u, v in zip(row[::2], row[1::2])] + row[len(row) & ~1 :]
     return row[0]
+
+
+def total_vector(terms: Iterable[Vector]) -> Vector:
+    x, y, z = zip(*terms, strict=True) if (terms := list(terms)) else ((), (), ())
+    return total(x), total(y), total(z)
 
 
 def add(u: Vector, v: Vector) -> Vector:
