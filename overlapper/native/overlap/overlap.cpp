@@ -167,12 +167,14 @@ Stated Overlap::stated() const {
 
 Errors Overlap::errors_of_measures() const {
   if (!(volume_error() < volume())) return errors_of_anything(volume_error(), bodies());
-  const StatedWithErrors of_region = measured_with_errors(finest_region(), bodies());
-  Errors errors = errors_beside(of_region, stated());
-  if (way() == Way::kClosedForm) {
-    const double of_inertia = errors.inertia;
+  const bool integrated = way() == Way::kClosedForm || way() == Way::kSlicing;
+  Errors errors;
+  if (!integrated || !in_full().inertia)
+    errors = errors_beside(measured_with_errors(finest_region(), bodies()), stated());
+  if (integrated) {
+    const double of_polytope = errors.inertia;
     errors = errors_of_formula(measures(), drawn(), bodies());
-    if (!in_full().inertia) errors.inertia = of_inertia;
+    if (!in_full().inertia) errors.inertia = of_polytope;
   }
   errors.volume = volume_error();
   errors.vertices = error_of_vertices(drawn(), boundary(), bodies());
