@@ -73,6 +73,13 @@ def assert_all_is_exact(a, b, found, far=0.0):
     assert_allclose(found.gradient[0, :3], true.gradient[:3], rtol=0, atol=1e-10 * force)
     assert_allclose(found.gradient[0, 3:], true.gradient[3:], rtol=0, atol=1e-10 * force * arm)
     assert_allclose(found.gradient[1, :3], -true.gradient[:3], rtol=0, atol=1e-10 * force)
+    # What is stated holds; the truth is in doubles, too.
+    errors, last = found.errors, 4e-16
+    assert abs(found.area - true.area) <= errors.area + last * true.area
+    assert np.linalg.norm(found.centroid - true.centroid) <= errors.centroid
+    assert np.abs(found.inertia - true.inertia).max() <= errors.inertia + last * np.trace(true.inertia)
+    off = np.abs(found.gradient[0] - true.gradient)
+    assert (off <= errors.gradient[0] + last * force * np.array([1, 1, 1, arm, arm, arm])).all()
 
 
 @pytest.mark.parametrize("first", ["sphere", "capsule", "cylinder"])
