@@ -3,6 +3,7 @@
     python benchmarks/stress.py --count 20000                   the families in turn, from seed 0 on
     python benchmarks/stress.py --first 500 --family slivers    other seeds, one family
     python benchmarks/stress.py --soak 1000000                  only asked for everything, memory watched
+    python benchmarks/stress.py --rounded 1000000               pairs of rounded hulls, by status
 
 Cases are judged in processes that are watched, so that a crash or a hang of the core is a result. Rows are written as
 they come; a case again: `families.make(FAMILY, SEED)`. The table is printed at the end, and --record keeps it in
@@ -32,6 +33,7 @@ try:
     import exact
     import families
     import numpy as np
+    import rounded_pairs
     import rules
     from watched import Watched
 except ImportError as error:
@@ -207,9 +209,14 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2, help="processes at a time")
     parser.add_argument("--out", type=Path, default=ROWS, help="file of the rows")
     parser.add_argument("--record", action="store_true", help=f"keep the table as {TABLE.relative_to(ROOT)}")
+    parser.add_argument("--rounded", type=int, metavar="COUNT", help="so many pairs of rounded hulls, only by status")
     parser.add_argument("--soak", type=int, metavar="COUNT", help="so many cases in one process, only memory watched")
     chosen = parser.parse_args()
     np.seterr(all="ignore")
+    if chosen.rounded:
+        false = list(rounded_pairs.false_statuses(chosen.first, chosen.rounded))
+        print(f"{chosen.rounded} pairs, {len(false)} of a false status", *false, sep="\n")
+        sys.exit(bool(false))
     if chosen.soak:
         sys.exit(not soak(chosen.first, chosen.soak))
     chosen.out.parent.mkdir(parents=True, exist_ok=True)
