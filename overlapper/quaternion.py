@@ -1,4 +1,4 @@
-"""Unit quaternions (x, y, z, w), many at once."""
+"""Quaternions (x, y, z, w), many at once, of which those that turn vectors are unit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def rotated(quaternions: Array, vectors: Array) -> Array:
 
 
 def composed(first: Array, second: Array) -> Array:
-    """The products first * second of quaternions (..., 4) xyzw: turn by the second, then by the first."""
+    """The products first * second of quaternions (..., 4) xyzw of any length: turn by the second, then by the first."""
     a, b, v, w = first[..., :3], second[..., :3], first[..., 3:], second[..., 3:]
     vector = v * b + w * a + np.cross(a, b)
     return np.concatenate([vector, v * w - (a * b).sum(axis=-1, keepdims=True)], axis=-1)

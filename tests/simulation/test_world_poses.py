@@ -32,9 +32,34 @@ def test_poses_are_those_of_the_frame_then_of_what_is_fixed_to_it():
         ([AT_REST[:1]], [0], ValueError, "frames must have a position and a quaternion each"),
         ([(AT_REST[1], AT_REST[1])], [0], ValueError, "frames must have positions of 3 numbers and quaternions of 4"),
         ([(1.0, 2.0)], [0], TypeError, "frames must be pairs of sequences of numbers"),
+        ([(AT_REST[0], [0.0] * 4)], [0], ValueError, "frames must not have the zero quaternion"),
         ([AT_REST], [0, 0], ValueError, r"positions must have the shape \(k, 3\)"),
     ],
 )
 def test_what_is_no_frame_is_named(frames, which, error, message):
     with pytest.raises(error, match=message):
         _core.world_poses(frames, np.array(which), [AT_REST[0]], [AT_REST[1]])
+
+
+def test_a_thing_fixed_by_the_zero_quaternion_is_refused():
+    with pytest.raises(ValueError, match="^orientations must not have the zero quaternion"):
+        _core.world_poses([AT_REST], np.array([0]), [AT_REST[0]], [[0.0] * 4])
+
+
+@pytest.mark.parametrize("length", [1e-320, 1e-200, 0.1, 3.0, 1e200, 1e308])
+def test_quaternions_of_any_length_turn_by_the_same(length):
+    """A rounding apart, and more where the length has lost its digits."""
+    turn = np.array([0.5, -0.5, 0.5, 0.5])
+    position, orientation = _core.world_poses([([1, 2, 3], turn * length)], np.array([0]), [[1, 2, 3]], [turn])
+    same = _core.world_poses([([1, 2, 3], turn)], np.array([0]), [[1, 2, 3]], [turn])
+    assert_allclose(position, same[0], atol=1e-15 if length > 1e-300 else 1e-3)
+    assert_allclose(orientation, same[1], atol=1e-15 if length > 1e-300 else 1e-3)
+    as_long = _core.world_poses([AT_REST], np.array([0]), [[0, 0, 0]], [turn * length])[1]
+    assert_allclose(as_long, [turn * length], rtol=1e-15)
+
+
+def test_a_frame_that_is_not_a_number_is_passed_on():
+    nowhere = ([0.0, 0.0, 0.0], [np.nan] * 4)
+    positions, orientations = _core.world_poses([nowhere, AT_REST], np.array([0, 1]), np.ones((2, 3)), [AT_REST[1]] * 2)
+    assert np.isnan(positions[0]).all() and np.isnan(orientations[0]).all()
+    assert np.isfinite(positions[1]).all()

@@ -34,7 +34,11 @@ Frame to_frame(nb::handle given) {
 
 Vec3 vector_part(Quaternion q) { return {q.x, q.y, q.z}; }
 
-Quaternion unit(Quaternion q) {
+bool zero(Quaternion q) { return unturned(q) && q.w == 0; }
+
+Quaternion unit(Quaternion given) {
+  const bool known = finite(vector_part(given)) && std::isfinite(given.w);
+  const Quaternion q = known ? in_range(given) : given;
   const double length = std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
   return {q.x / length, q.y / length, q.z / length, q.w / length};
 }
@@ -55,6 +59,7 @@ nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handl
   std::vector<Frame> frames;
   for (nb::handle each : frames_given) {
     frames.push_back(to_frame(each));
+    if (zero(frames.back().orientation)) fail("frames", "must not have the zero quaternion");
     frames.back().orientation = unit(frames.back().orientation);
   }
   const std::vector<std::int64_t> which = to_indices(which_given, "which");
@@ -71,7 +76,9 @@ nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handl
     const Frame& frame = frames[which[i]];
     const double *p = local_positions.data() + 3 * i, *q = local_orientations.data() + 4 * i;
     const Vec3 x = frame.position + rotated(frame.orientation, {p[0], p[1], p[2]});
-    const Quaternion r = frame.orientation * Quaternion{q[0], q[1], q[2], q[3]};
+    const Quaternion local{q[0], q[1], q[2], q[3]};
+    if (zero(local)) fail("orientations", "must not have the zero quaternion");
+    const Quaternion r = frame.orientation * local;
     double *position = &positions[3 * i], *orientation = &orientations[4 * i];
     position[0] = x.x, position[1] = x.y, position[2] = x.z;
     orientation[0] = r.x, orientation[1] = r.y, orientation[2] = r.z, orientation[3] = r.w;
@@ -88,10 +95,11 @@ void define_poses(nb::module_& m) {
                 "numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: "
                 "numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], "
                 "numpy.typing.NDArray[numpy.float64]]"),
-        R"((k, 3) positions in m and (k, 4) unit quaternions xyzw in the world of what is fixed to moving frames.
+        R"((k, 3) positions in m and (k, 4) quaternions xyzw in the world of what is fixed to moving frames.
 
-`frames` begin with position and quaternion (of any length but 0), as pybullet's answers do; thing i is fixed to frame
-`which[i]` at `positions[i]` and `orientations[i]` of it.)");
+`frames` begin with position and quaternion, as pybullet's answers do; thing i is fixed to frame `which[i]` at
+`positions[i]` and `orientations[i]` of it. Quaternions are of any length but 0; those in the world are as long as
+`orientations`. Of a frame that is not a number, neither are they.)");
 }
 
 }  // namespace overlapper::python

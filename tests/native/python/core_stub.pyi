@@ -805,8 +805,9 @@ def candidate_pairs(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | 
 
 def world_poses(frames: Sequence[Any], which: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
-    (k, 3) positions in m and (k, 4) unit quaternions xyzw in the world of what is fixed to moving frames.
+    (k, 3) positions in m and (k, 4) quaternions xyzw in the world of what is fixed to moving frames.
 
-    `frames` begin with position and quaternion (of any length but 0), as pybullet's answers do; thing i is fixed to frame
-    `which[i]` at `positions[i]` and `orientations[i]` of it.
+    `frames` begin with position and quaternion, as pybullet's answers do; thing i is fixed to frame `which[i]` at
+    `positions[i]` and `orientations[i]` of it. Quaternions are of any length but 0; those in the world are as long as
+    `orientations`. Of a frame that is not a number, neither are they.
     """
