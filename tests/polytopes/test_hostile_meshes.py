@@ -1,0 +1,129 @@
+"""Meshes of which bytes are changed, or that count more than they have, are read or refused in a sentence, and soon."""
+
+import json
+import struct
+import zipfile
+from datetime import timedelta
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mutation import mutated, said_by
+
+from overlapper import Hull, read_hull
+from overlapper.polytopes import mesh_file
+
+CORNERS = np.random.default_rng(0).normal(size=(12, 3))
+FORMATS = ("stl", "stl_ascii", "ply", "ply_ascii", "obj", "off", "glb")
+
+
+@pytest.fixture(scope="module")
+def written():
+    """The bytes of a hull in each format."""
+    hull = Hull(CORNERS)
+    mesh = trimesh.Trimesh(hull.vertices, [ring.tolist()[:3] for ring in hull.facets], process=False)
+    texts = {name: mesh.export(file_type=name) for name in FORMATS if name != "ply_ascii"}
+    texts["ply_ascii"] = mesh.export(file_type="ply", encoding="ascii")
+    return {name: text.encode() if isinstance(text, str) else text for name, text in texts.items()}
+
+
+def refusal(path):
+    """What is said of a mesh that is refused."""
+    with pytest.raises(ValueError, match="is not a mesh with a hull: ") as refused:
+        read_hull(path)
+    said = str(refused.value)
+    assert said.startswith(str(path)) and "\n" not in said
+    return said.partition("hull: ")[2]
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.filterwarnings("ignore::overlapper.polytopes.mesh_file.NotConvexWarning")
+@given(data=st.data())
+@settings(max_examples=150, deadline=timedelta(seconds=20))
+def test_a_mutated_mesh_is_read_or_refused_in_one_sentence(written, tmp_path_factory, name, data):
+    path = tmp_path_factory.getbasetemp() / f"mutated.{name.partition('_')[0]}"
+    path.write_bytes(mutated(data, written[name]))
+    said = said_by(lambda: read_hull(path))
+    assert said == "" or (said.startswith(f"{path} is not a mesh with a hull: ") and "\n" not in said)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_mesh_that_nobody_changed_is_read(written, tmp_path, name):
+    path = tmp_path / f"whole.{name.partition('_')[0]}"
+    path.write_bytes(written[name])
+    assert read_hull(path).volume == pytest.approx(Hull(CORNERS).volume, rel=1e-5)
+
+
+def test_a_count_of_triangles_that_are_not_there_is_refused(written, tmp_path):
+    path = tmp_path / "x.stl"
+    path.write_bytes(written["stl"][:80] + struct.pack("<I", 2**32 - 1) + written["stl"][84:])
+    count = (len(written["stl"]) - 84) // 50
+    assert refusal(path) == f"it counts 4,294,967,295 triangles, and has room for {count}"
+
+
+@pytest.mark.parametrize("heading", ["format binary_little_endian 1.0", "format ascii 1.0"])
+def test_counts_of_ply_that_are_not_there_are_refused(tmp_path, heading):
+    path = tmp_path / "x.ply"
+    axes = "".join(f"property float {axis}\n" for axis in "xyz")
+    faces = "element face 4000000000\nproperty list uchar int vertex_indices\nend_header\n"
+    path.write_text(f"ply\n{heading}\nelement vertex 4000000000\n{axes}{faces}" + "0 0 0\n" * 9)
+    assert refusal(path)
+
+
+def test_counts_of_off_and_indices_of_obj_that_are_not_there_are_refused(tmp_path):
+    (tmp_path / "x.off").write_text("OFF\n4000000000 4000000000 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    (tmp_path / "x.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 2000000000\nf 1 2 3\n")
+    assert refusal(tmp_path / "x.off") and refusal(tmp_path / "x.obj")
+
+
+def scene(count=4, nodes=1, **buffer):
+    """A glTF scene of one mesh, of which a buffer has the four corners and the indices say `count`."""
+    corners = {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}
+    return {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": list(range(nodes))}],
+        "nodes": [{"mesh": 0}] * nodes,
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": 48, **buffer}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}],
+        "accessors": [corners, {"componentType": 5125, "count": count, "type": "SCALAR"}],
+    }
+
+
+def test_a_scene_that_counts_numbers_that_are_nowhere_is_refused(tmp_path):
+    text = json.dumps(scene(400_000_000)).encode()
+    (tmp_path / "x.gltf").write_bytes(text)
+    assert refusal(tmp_path / "x.gltf") == f"it counts 400,000,000 numbers in {len(text)} bytes"
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", 48, 0x004E4942) + bytes(48)
+    (tmp_path / "x.glb").write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    assert refusal(tmp_path / "x.glb").startswith("it counts 400,000,000 numbers in ")
+
+
+def test_numbers_in_a_file_beside_the_scene_are_there(tmp_path):
+    (tmp_path / "x.bin").write_bytes(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32).tobytes())
+    (tmp_path / "x.gltf").write_text(json.dumps(scene(3, uri="x.bin")))
+    with open(tmp_path / "x.bin", "ab") as file:
+        file.write(bytes(5000))
+    assert "it counts" not in refusal(tmp_path / "x.gltf")  # three indices, which are all 0: no hull
+    (tmp_path / "x.gltf").write_text(json.dumps(scene(4000, uri="x.bin")))
+    assert "it counts" not in refusal(tmp_path / "x.gltf")
+
+
+def test_a_mesh_that_a_scene_shows_too_often_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(mesh_file, "MOST_SHOWN", 1000)
+    (tmp_path / "x.gltf").write_text(json.dumps(scene(nodes=126)))
+    assert refusal(tmp_path / "x.gltf") == "it shows 1,008 corners and indices, which is more than 1,000"
+
+
+def test_what_is_packed_is_refused_or_must_not_be_too_much(tmp_path):
+    for name in ("x.zip", "x.tar.gz", "x.stl.bz2"):
+        (tmp_path / name).write_bytes(b"")
+        assert refusal(tmp_path / name) == "it is packed, and must be unpacked first"
+    with zipfile.ZipFile(tmp_path / "x.3mf", "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("3D/3dmodel.model", bytes(10_000_000))
+    assert refusal(tmp_path / "x.3mf") == "it unpacks to more than 100 times its size"
+    (tmp_path / "y.3mf").write_bytes(b"no zip")
+    assert refusal(tmp_path / "y.3mf") == "File is not a zip file"
