@@ -60,7 +60,8 @@ def read_polytopes(
     `url` is SQLAlchemy's, such as "sqlite:///parts.db" or "postgresql+psycopg://user@host/parts". `query` returns four
     columns, the id (of any type) and x, y, z of a point in m, with the points of a polytope one after the other, as by
     ORDER BY id; without it, the tables that `write_polytopes` makes are read. Inner points are welcome. A query that
-    writes is refused: by SQLite, PostgreSQL, MySQL and MariaDB; any other database takes back what it wrote.
+    writes is refused by SQLite and PostgreSQL; sessions of MySQL and MariaDB are told to refuse it, which no test has
+    seen them do; any other database takes back what it wrote.
 
     A polytope that is none (a coordinate missing, fewer than four points, all in one plane) raises ValueError with its
     id; or `on_bad(id, reason)` is called, if given, and reading goes on. Raises FileNotFoundError if there is no such

@@ -4,6 +4,7 @@ import sqlite3
 import subprocess
 import sys
 from itertools import islice
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import sqlalchemy
 from numpy.testing import assert_array_equal
 
 from overlapper import Box, Hull, overlap, random_polytope, read_polytopes, write_polytopes
+from overlapper.polytopes import database
 
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
 FLAT = TETRAHEDRON * [1, 1, 0]
@@ -189,6 +191,24 @@ def test_polytopes_are_streamed(file, url):
     first = list(islice(read_polytopes(url, endless), 10_000))
     assert [id for id, _ in first] == list(range(10_000))
     assert {hull.volume for _, hull in first} == {Hull(TETRAHEDRON).volume}
+
+
+@pytest.mark.parametrize(
+    ("driver", "words"),
+    [
+        ("pymysql.connections", "SET SESSION TRANSACTION READ ONLY"),
+        ("mariadb.connections", "SET SESSION TRANSACTION READ ONLY"),
+        ("psycopg", "SET SESSION CHARACTERISTICS AS TRANSACTION READ ONLY"),
+        ("cx_Oracle", None),
+    ],
+)
+def test_a_session_is_told_to_read_only_as_its_database_has_it(driver, words):
+    told = []
+    cursor = SimpleNamespace(execute=told.append, close=lambda: told.append("close"))
+    connection = type("Connection", (), {"__module__": driver, "cursor": lambda self: cursor})()
+    connection.commit = lambda: told.append("commit")
+    database._read_only(connection, None)
+    assert told == ([words, "close", "commit"] if words else [])
 
 
 def test_the_package_needs_sqlalchemy_only_for_databases():
