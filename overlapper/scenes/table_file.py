@@ -35,8 +35,9 @@ NEEDED += [f"{word}{side}" for side in "AB" for word in ("body", "link", "shape"
 NEEDED += [part.format(side) for side in "AB" for part in POSE]
 
 # Rows of a Parquet file for each of its bytes, beyond which its count of rows is not believed: a small file must not
-# make a reader ask for the memory of millions of rows.
-DENSEST = 64
+# make a reader ask for the memory of millions of rows. Tables of scenes have 0.006 of them, and one of a million rows
+# that are all the same and have nothing but a step has 3.8.
+DENSEST = 4
 
 
 def origin() -> dict[str, str]:
