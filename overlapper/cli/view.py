@@ -34,7 +34,9 @@ def view(
     scene: Annotated[
         str | None, typer.Option(help="The scene of a table that has no shapes, by name or path: it is run again.")
     ] = None,
-    steps: Annotated[int | None, typer.Option(min=1, help="Steps of a scene; by default as many as it says.")] = None,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Steps of a scene at most; by default as many as it says.")
+    ] = None,
     step: Annotated[
         int | None, typer.Option(min=1, help="Of the picture; by default the one in which most is shared.")
     ] = None,

@@ -45,7 +45,8 @@ class Playback:
 def play(source: str, steps: int | None = None, scene: str | None = None) -> Playback:
     """The playback of a scene, by name or path, or of a table; of a scene, `steps` of it.
 
-    A table without shapes is of the `scene` given: what a table names is not run, as tables come from anywhere.
+    A table without shapes is of the `scene` given: what a table names is not run, as tables come from anywhere. Nor is
+    a scene run for longer than it says, or than `steps`, because a table goes on.
 
     SceneError if a scene cannot be found or run, ValueError or OSError if a table cannot be read.
     """
@@ -64,10 +65,13 @@ def play(source: str, steps: int | None = None, scene: str | None = None) -> Pla
         said = metadata.get("scene")
         named = f" (it says {printable(said)!r})" if said else ""
         raise ValueError(f"{path} has no shapes to show: give the scene that it is of with --scene{named}")
-    recorded = read_table(path)
-    total = max((int(row["step"] or 0) for row in recorded), default=1)
-    playback = Playback(path.stem, total, _nothing())
-    playback.views = _held_against(path, load_scene(scene), metadata, recorded, playback)
+    recorded, chosen = read_table(path), load_scene(scene)
+    last = max((int(row["step"] or 0) for row in recorded), default=1)
+    playback = Playback(path.stem, min(last, steps or chosen.steps), _nothing())
+    if playback.total < last:
+        playback.remarks.append(f"{path} goes on to step {last:,}: --steps {last} shows all of it")
+        recorded = [row for row in recorded if int(row["step"] or 0) <= playback.total]
+    playback.views = _held_against(path, chosen, metadata, recorded, playback)
     return playback
 
 

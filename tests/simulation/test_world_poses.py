@@ -42,7 +42,7 @@ def test_what_is_no_frame_is_named(frames, which, error, message):
 
 
 def test_a_thing_fixed_by_the_zero_quaternion_is_refused():
-    with pytest.raises(ValueError, match="^orientations must not have the zero quaternion"):
+    with pytest.raises(ValueError, match=r"^orientations must not have the zero quaternion"):
         _core.world_poses([AT_REST], np.array([0]), [AT_REST[0]], [[0.0] * 4])
 
 

@@ -96,6 +96,21 @@ def test_what_a_table_has_is_told_from_what_its_scene_has_become(scene_file):
     assert re.match(r"what is seen is not what press\.csv has, as the simulation has changed: step \d, ", remark)
 
 
+def test_a_scene_is_run_no_longer_than_it_says_because_a_table_goes_on(scene_file):
+    overlapper("run", "press.py", "--out", "press.csv")
+    text = Path("press.csv").read_text()
+    last = next(line for line in text.splitlines() if line.startswith("9,"))
+    unsealed = re.sub("^# rows.*\n", "", text, flags=re.MULTILINE)
+    Path("endless.csv").write_text(unsealed + last.replace("9,", "2000000000,", 1) + "\n")
+    playback = play("endless.csv", scene="press.py")
+    assert len(list(playback.views)) == playback.total == 12
+    assert playback.remarks == ["endless.csv goes on to step 2,000,000,000: --steps 2000000000 shows all of it"]
+    scene_file.write_text(PRESS.replace("STEPS = 12", "STEPS = 5"))
+    assert len(list(play("press.csv", scene="press.py").views)) == 5
+    playback = play("press.csv", 20, "press.py")
+    assert (len(list(playback.views)), playback.remarks) == (9, [])
+
+
 def test_a_table_of_bodies_with_margins_is_played_with_margins(scene_file):
     points = "vertices=[[x, y, z] for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (-0.05, 0.05)]"
     scene_file.write_text(PRESS.replace("GEOM_BOX, halfExtents=[0.05] * 3", f"GEOM_MESH, {points}"))
