@@ -9,7 +9,7 @@ is one square root, to as many digits as are asked for.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
 from math import isqrt, lcm
@@ -17,7 +17,7 @@ from math import isqrt, lcm
 import exact
 import numpy as np
 
-from overlapper import Capsule, Cylinder, Placed
+from overlapper import Capsule, Cylinder, Placed, RoundedHull
 
 DIGITS = 50
 
@@ -38,7 +38,7 @@ class Core:
 
 
 def core(body: exact.Polytope | Placed) -> Core:
-    """Of a solid, and of a ball or a capsule at a pose."""
+    """Of a solid, and of a ball, a capsule or a rounded hull at a pose."""
     if isinstance(body, exact.Polytope):
         around = {frozenset(edge) for facet in body.facets for edge in exact.edges_of(facet.ring)}
         return Core(
@@ -46,6 +46,9 @@ def core(body: exact.Polytope | Placed) -> Core:
             tuple(exact.vector(plane[:3]) for plane in body.planes),
             tuple(exact.subtract(*map(exact.coordinates, edge)) for edge in around),
         )
+    if isinstance(body.shape, RoundedHull):
+        grown = exact.hull(exact.placed(body.shape.core.vertices, body.position, body.given_orientation))
+        return replace(core(grown), radius=Fraction(body.shape.radius))
     half = Fraction(body.shape.length) / 2 if isinstance(body.shape, Capsule) else Fraction(0)
     ends = exact.placed([(0, 0, z) for z in {half, -half}], body.position, body.given_orientation)
     edges = (exact.subtract(ends[0], ends[1]),) if half else ()
@@ -202,6 +205,18 @@ def of_cylinder(cylinder: Placed, other: exact.Polytope) -> Fraction | None:
     inner = exact.hull(on_rim(radius * x, radius * y, z) for x, y in ring for z in (-half, half))
     within = of_cores(core(inner), body)
     return outer if abs(within - outer) <= abs(outer) / 10**20 else None
+
+
+def outside(body: exact.Polytope | Placed, point: exact.Vector) -> Fraction:
+    """How far a point is outside of a body."""
+    if not (isinstance(body, Placed) and isinstance(body.shape, Cylinder)):
+        return max(root(distance_squared(core(body).points, [point])) - core(body).radius, Fraction(0))
+    (axis,) = exact.placed([(0, 0, 1)], (0, 0, 0), body.given_orientation)
+    arm = exact.subtract(point, exact.vector(body.position))
+    height = exact.dot(axis, arm)
+    across = root(exact.dot(arm, arm) - height * height) - Fraction(body.shape.radius)
+    along = abs(height) - Fraction(body.shape.length) / 2
+    return root(max(across, Fraction(0)) ** 2 + max(along, Fraction(0)) ** 2)
 
 
 # Numbers

@@ -9,11 +9,12 @@ from fractions import Fraction
 from math import isqrt
 
 import exact
+import exact_distance
 import numpy as np
-from families import CORNERS, Below, Case, mapped
+from families import CORNERS, Below, Case, mapped, points_of, solid
 from strategies import quaternion, rotation
 
-from overlapper import Overlap, RoundedHull, overlap
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Overlap, Placed, RoundedHull, Sphere, overlap
 from overlapper.proof.certificate import certificate
 
 HALF_ULP = 2.0**-53
@@ -169,27 +170,81 @@ def centroid_is_as_right_as_its_conditioning(case: Case, found: Overlap) -> str:
     return "" if beyond <= allowed else f"the centroid is off by {beyond:.2g} of the size, not {allowed:.2g}"
 
 
-def depth_and_distance_are_right_to_nine_digits(case: Case, found: Overlap) -> str:
-    if not has_exact_way_out(case):
+def the_errors_hold_depth_and_distance(case: Case, found: Overlap) -> str:
+    truth = way_out(case, found)
+    if truth is None:
         return ""
-    if found and not nearly(found.depth, exact.depth_squared(*case.solids)):
-        return f"the depth is {found.depth}, exactly {float(exact.depth_squared(*case.solids)) ** 0.5}"
-    if found.status == "separated" and not nearly(found.distance, exact.distance_squared(*case.solids)):
-        return f"the distance is {found.distance}, exactly {float(exact.distance_squared(*case.solids)) ** 0.5}"
-    return ""
-
-
-def has_exact_way_out(case: Case) -> bool:
-    """Of two solids that are not too large for all facets of their difference."""
-    return (
-        not case.round
-        and len(case.solids) == len(case.bodies) == 2
-        and np.prod([len(solid.vertices) for solid in case.solids]) < 400
+    off = {
+        "depth": (found.depth, max(-truth, Fraction(0)), found.errors.depth),
+        "distance": (found.distance, max(truth, Fraction(0)), found.errors.distance),
+    }
+    beyond = (
+        f"the {name} is off by {float(abs(Fraction(stated) - exactly)):.3g}, not {error:.3g}"
+        for name, (stated, exactly, error) in off.items()
+        if not abs(Fraction(stated) - exactly) <= error
     )
+    return "; ".join(beyond)
 
 
-def nearly(length: float, square: Fraction) -> bool:
-    return abs(Fraction(length) ** 2 - square) <= 2e-9 * square
+def the_error_of_witnesses_holds_them(case: Case, found: Overlap) -> str:
+    truth = None if found else way_out(case, found)
+    if truth is None:
+        return ""
+    witnesses = [exact.vector(found.witness_a), exact.vector(found.witness_b)]
+    between = exact_distance.root(exact_distance.distance_squared(witnesses[:1], witnesses[1:]))
+    beside = max(exact_distance.outside(body, w) for body, w in zip(way_bodies(case, found), witnesses, strict=True))
+    off = beside + max(between - max(truth, Fraction(0)), Fraction(0))
+    error = Fraction(found.errors.witnesses)
+    return "" if off <= error else f"the witnesses are off by {float(off):.3g}, not {float(error):.3g}"
+
+
+def errors_of_depth_and_distance_are_small(case: Case, found: Overlap) -> str:
+    """As small as numbers so large, of the bodies and of their distance, leave them; without rims, to nine digits or
+    to a last bit of such numbers."""
+    if len(case.bodies) != 2:
+        return ""
+    boxes = [shape.bounds for shape in found.shapes if np.isfinite(shape.bounds).all()]
+    world = max(float(np.abs(box).max()) for box in boxes) if boxes else 1.0
+    relative = [shape.bounds - found.shapes[0].position for shape in found.shapes]
+    extent = sum(float(np.abs(box[np.isfinite(box)]).max(initial=0)) for box in relative)
+    far = float(np.linalg.norm(np.subtract(*(shape.position for shape in found.shapes))))
+    errors, rims = found.errors, any(isinstance(shape.shape, Cylinder) for shape in found.shapes)
+    numbers = extent + far + found.depth + found.distance
+    complaints = [
+        f"the error of {name} is {error:.3g}"
+        for name, error, size, share in (
+            ("depth", errors.depth, found.depth, 1e-14),
+            ("distance", errors.distance, found.distance, 1e-14),
+            ("witnesses", errors.witnesses - 8 * HALF_ULP * world, 0.0, 1e-12),
+        )
+        if error > max(share, 1e-11 if rims else 0.0) * numbers
+        or (size > 0 and not rims and error > max(1e-9 * size, 1e-16 * numbers))
+    ]
+    return "; ".join(complaints)
+
+
+def way_bodies(case: Case, found: Overlap) -> list[exact.Polytope | Placed]:
+    """What exact_distance knows how to measure."""
+    return [
+        placed if isinstance(placed.shape, (Sphere, Capsule, Cylinder, RoundedHull)) else body_of(case, i, placed)
+        for i, placed in enumerate(found.shapes)
+    ]
+
+
+def body_of(case: Case, i: int, placed: Placed) -> exact.Polytope:
+    if isinstance(placed.shape, Box):
+        corners = CORNERS * placed.shape.half_extents
+        return exact.hull(exact.placed(corners, placed.position, placed.given_orientation))
+    return solid(points_of(case.bodies[i]))
+
+
+def way_out(case: Case, found: Overlap) -> Fraction | None:
+    """How far a pair is apart, or less than nothing by how deep; None of what is too large, or not known."""
+    if len(case.bodies) != 2 or any(isinstance(shape.shape, HalfSpace) for shape in found.shapes):
+        return None
+    if not case.round and np.prod([len(solid.vertices) for solid in case.solids]) >= 400:
+        return None
+    return exact_distance.signed_distance(*way_bodies(case, found))
 
 
 def the_errors_hold_the_measures(case: Case, found: Overlap) -> str:
@@ -368,7 +423,9 @@ UNPROVED: tuple[Rule, ...] = (
     volume_is_as_right_as_its_conditioning,
     volume_of_hulls_is_right_to_twelve_digits,
     centroid_is_as_right_as_its_conditioning,
-    depth_and_distance_are_right_to_nine_digits,
+    the_errors_hold_depth_and_distance,
+    the_error_of_witnesses_holds_them,
+    errors_of_depth_and_distance_are_small,
     the_errors_hold_the_measures,
     errors_of_measures_are_as_small_as_that_of_the_volume,
     the_order_of_bodies_keeps_the_status,

@@ -1,5 +1,9 @@
 #include "distance/gjk.h"
 
+#include <vector>
+
+#include "geometry/rounding.h"
+
 namespace overlapper {
 namespace {
 
@@ -18,6 +22,120 @@ DifferencePoint core_support(const Placed& a, const Placed& b, Vec3 direction) {
   return {a.core_support(direction), b.core_support(-direction)};
 }
 
+/// The sine of an angle between an axis and a direction: GJK knows that of a rim to half of the digits.
+constexpr double kAboutUpright = 0x1p-20;
+
+/// What one body adds to the nearest points: a point that it keeps, or one of a rim that goes with the direction, and
+/// flats along which the point is free.
+struct Contactor {
+  Vec3 point;  ///< of the body; of a rim its centre
+  std::vector<Vec3> flats;
+  const Cylinder* rim = nullptr;
+  Vec3 axis;
+
+  Contactor(const Placed& body, const Simplex& simplex, Vec3 DifferencePoint::* on, Vec3 witness) : point(witness) {
+    rim = std::get_if<Cylinder>(&body.shape);
+    if (!rim) {
+      for (int i = 1; i < simplex.size; ++i) add_flat(simplex.corner[i].*on - simplex.corner[0].*on);
+      return;
+    }
+    axis = body.pose.rotation * Vec3{0, 0, 1};
+    const auto height = [&](Vec3 p) { return dot(axis, p - body.pose.translation); };
+    point = body.pose.translation + height(witness) * axis;
+    for (int i = 1; i < simplex.size; ++i)
+      if (height(simplex.corner[i].*on) * height(simplex.corner[0].*on) < 0) flats = {axis};
+  }
+
+  void add_flat(Vec3 along) {
+    const double length = norm(along);
+    for (Vec3 flat : flats) along -= dot(flat, along) * flat;
+    if (norm(along) > 0x1p-40 * length) flats.push_back(unit(along));
+  }
+
+  /// The point farthest along a direction, flats aside.
+  Vec3 farthest(Vec3 direction) const {
+    return rim ? point + rim->radius * unit(direction - dot(axis, direction) * axis) : point;
+  }
+};
+
+/// Takes the points for the nearest ones if rounding alone leaves them farther apart than the planes across `x`.
+bool accept(Separation& cores, const Placed& a, const Placed& b, Vec3 witness_a, Vec3 witness_b, Vec3 x) {
+  const double length = norm(x), gap = dot(x / length, core_support(a, b, -x).difference());
+  const double lost = rounding(norm(witness_a) + norm(witness_b));
+  if (!(gap >= cores.gap - lost && length - gap <= lost && norm(x - (witness_a - witness_b)) <= lost)) return false;
+  cores.simplex.corner[0] = {witness_a, witness_b};
+  cores.simplex.weight[0] = 1;
+  cores.simplex.size = 1;
+  cores.simplex.nearest = x;
+  cores.distance = length, cores.gap = gap, cores.normal = x / length;
+  return true;
+}
+
+/// Above a cap, the nearest points are a lowest one of the other body and its foot, if that is on the cap.
+bool above_cap(const Placed& a, const Placed& b, Separation& cores) {
+  for (const Placed* body : {&a, &b}) {
+    const Cylinder* cylinder = std::get_if<Cylinder>(&body->shape);
+    if (!cylinder) continue;
+    const Vec3 axis = body->pose.rotation * Vec3{0, 0, 1}, x = cores.simplex.nearest;
+    if (norm(cross(axis, x)) > kAboutUpright * norm(x)) continue;
+    const Placed& other = body == &a ? b : a;
+    // From the cap to the other body.
+    const Vec3 up = dot(axis, x) * (body == &a ? -1 : 1) > 0 ? axis : -axis;
+    const Vec3 lowest = other.core_support(-up),
+               found = body == &a ? cores.simplex.witness_b() : cores.simplex.witness_a();
+    // An edge or a cap that lies level has points that are as low, of which one has been found.
+    for (Vec3 point : {lowest, found - dot(up, found - lowest) * up}) {
+      const Vec3 arm = point - body->pose.translation;
+      const double height = dot(up, arm) - cylinder->length / 2;
+      if (norm(arm - dot(up, arm) * up) > cylinder->radius || !(height > 0)) continue;
+      const Vec3 foot = point - height * up;
+      if (body == &a ? accept(cores, a, b, foot, point, -height * up) : accept(cores, a, b, point, foot, height * up))
+        return true;
+    }
+  }
+  return false;
+}
+
+/// The nearest points of cores of which one has a rim: GJK knows a point of that, and with it the direction, to half
+/// of the digits only. At the nearest points x = a - b is across every flat, and the points of rims are those farthest
+/// along x: Newton's method on these equations, whose matrix is the identity and more. False where they do not hold.
+bool sharpen(const Placed& a, const Placed& b, Separation& cores) {
+  const Contactor on_a(a, cores.simplex, &DifferencePoint::on_a, cores.simplex.witness_a()),
+      on_b(b, cores.simplex, &DifferencePoint::on_b, cores.simplex.witness_b());
+  Contactor all = on_a;
+  for (Vec3 flat : on_b.flats) all.add_flat(flat);
+  const auto across_flats = [&](Vec3 v) {
+    for (Vec3 flat : all.flats) v -= dot(flat, v) * flat;
+    return v;
+  };
+  Vec3 x = across_flats(cores.simplex.nearest);
+  for (int round = 0; round < 20; ++round) {
+    Mat3 slope;
+    for (const Contactor* on : {&on_a, &on_b}) {
+      if (!on->rim) continue;
+      const Vec3 tangent = cross(on->axis, x);
+      const double across = norm(tangent);
+      if (!(across > kAboutUpright * norm(x))) return false;
+      const Vec3 t = across_flats(tangent / across);
+      const double curved = on->rim->radius / across;
+      slope = {slope.row0 + curved * t.x * t, slope.row1 + curved * t.y * t, slope.row2 + curved * t.z * t};
+    }
+    const Vec3 rest = across_flats(on_a.farthest(-x) - on_b.farthest(x)) - x;
+    const double determinant_of_slope = determinant(slope);
+    const auto part = [&](Vec3 u, Vec3 v) { return dot(rest, cross(u, v)) / determinant_of_slope; };
+    const Vec3 step{part(slope.row1, slope.row2), part(slope.row2, slope.row0), part(slope.row0, slope.row1)};
+    x += step;
+    if (norm(step) <= 0x1p-51 * norm(x)) break;
+  }
+  Vec3 witness_a = on_a.farthest(-x), witness_b = on_b.farthest(x);
+  // What is left lies along the flats; those of two bodies may be nearly parallel.
+  for (int round = 0; round < 30; ++round) {
+    for (Vec3 flat : on_a.flats) witness_a += dot(flat, x - (witness_a - witness_b)) * flat;
+    for (Vec3 flat : on_b.flats) witness_b -= dot(flat, x - (witness_a - witness_b)) * flat;
+  }
+  return accept(cores, a, b, witness_a, witness_b, x);
+}
+
 }  // namespace
 
 Separation separate_cores(const Placed& a, const Placed& b) {
@@ -26,7 +144,10 @@ Separation separate_cores(const Placed& a, const Placed& b) {
   const auto support = [&](Vec3 direction) { return core_support(a, b, direction); };
   // The best gap of all rounds: on a rim, those of single rounds scatter by more than this.
   const auto settled = [](double length, double, double best) { return length - best <= 4 * 0x1p-53 * length; };
-  return separate(support(-towards), support, settled);
+  Separation cores = separate(support(-towards), support, settled);
+  const bool rims = std::holds_alternative<Cylinder>(a.shape) || std::holds_alternative<Cylinder>(b.shape);
+  if (rims && !cores.origin_inside && cores.gap > 0 && !above_cap(a, b, cores)) sharpen(a, b, cores);
+  return cores;
 }
 
 Distance distance(const Placed& a, const Placed& b) {

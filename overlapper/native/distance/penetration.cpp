@@ -48,7 +48,7 @@ class DepthSearch {
       if (reached - before <= rounding(extent_) || !hull_.sees(facet, p)) {
         final_.resize(hull_.facets.size(), false);
         final_[facet] = true;
-        if (best_.depth <= before + 1e-12 * extent_) break;
+        if (best_.depth <= before + kSettled * extent_) break;
         continue;
       }
       hull_.insert(p, facet);
@@ -56,8 +56,19 @@ class DepthSearch {
     return best_;
   }
 
+  /// No more than the depth of the polytope, and so of what holds it but for the rounding of its points.
+  double lower() {
+    if (hull_.facets.empty()) return -std::numeric_limits<double>::infinity();
+    least_facet();
+    double least = std::numeric_limits<double>::infinity();
+    for (size_t f = 0; f < offset_.size(); ++f)
+      if (!hull_.facets[f].removed()) least = std::min(least, offset_[f]);
+    return least - 4 * rounding(extent_);
+  }
+
  private:
   static constexpr int kMaxRounds = 2000;
+  static constexpr double kSettled = 1e-12;
 
   Vec3 corner(int facet, int i) const { return hull_.points[hull_.facets[facet].vertex[i]]; }
 
@@ -139,6 +150,12 @@ Penetration penetration(const Placed& a, const Placed& b) {
   Penetration result = DepthSearch(a, b).run();
   result.depth += radius;
   return result;
+}
+
+EnclosedDepth enclosed_depth(const Placed& a, const Placed& b) {
+  DepthSearch search(a, b);
+  const Penetration depth = search.run();
+  return {depth, search.lower()};
 }
 
 }  // namespace overlapper

@@ -12,4 +12,12 @@ namespace overlapper {
 /// facet.
 Penetration penetration(const Placed& a, const Placed& b);
 
+/// The depth of the cores of two bodies by EPA, and how much of it the polytope has inside: no less than that is the
+/// least way out, whatever the shapes.
+struct EnclosedDepth {
+  Penetration depth;
+  double lower;
+};
+EnclosedDepth enclosed_depth(const Placed& a, const Placed& b);
+
 }  // namespace overlapper

@@ -58,8 +58,9 @@ using Separation = SeparationOf<Vec3>;
 
 /// The square orders points as their distance does and takes no root.
 inline double rank(Vec3 nearest) { return norm2(nearest); }
-/// The square of what double-doubles tell from nothing may underflow.
-inline double rank(const WideVector& nearest) { return norm(nearest).head; }
+/// The square of what double-doubles tell from nothing may underflow. A point that is nearer by a share of 1e-16 has a
+/// direction that is off by the root of that, and more digits count.
+inline DoubleDouble rank(const WideVector& nearest) { return norm(nearest); }
 
 /// A needle's normal is found with about twice as many digits as its corners have.
 inline Vec3 plane_normal(Vec3 a, Vec3 b, Vec3 c) { return accurate_normal(a, b, c); }
@@ -134,9 +135,9 @@ bool weigh(const Vector& a, const Vector& b, const Vector& c, SimplexOf<Vector>&
 /// one wins, which needs no case analysis of Voronoi regions that rounding could contradict. Returns the rank() of
 /// that point: 0 if the origin is inside.
 template <class Vector>
-double reduce(SimplexOf<Vector>& s) {
+auto reduce(SimplexOf<Vector>& s) {
   SimplexOf<Vector> best;
-  double least = std::numeric_limits<double>::infinity();
+  decltype(rank(s.nearest)) least{std::numeric_limits<double>::infinity()};
   for (int subset = 1; subset < 1 << s.size; ++subset) {
     SimplexOf<Vector> part;
     std::array<Vector, 4> p;
@@ -151,12 +152,12 @@ double reduce(SimplexOf<Vector>& s) {
       case 2: valid = weigh(p[0], p[1], part); break;
       case 3: valid = weigh(p[0], p[1], p[2], part); break;
       case 4:
-        if ((least == 0 && !kInsideIsExact<Vector>) || !weigh(p[0], p[1], p[2], p[3], part.weight)) break;
+        if ((rounded(least) == 0 && !kInsideIsExact<Vector>) || !weigh(p[0], p[1], p[2], p[3], part.weight)) break;
         s = part;
-        return 0;
+        return decltype(least){0};
     }
     if (!valid) continue;
-    const double distance = rank(part.nearest);
+    const auto distance = rank(part.nearest);
     if (distance < least) least = distance, best = part;
   }
   s = best;
@@ -182,7 +183,7 @@ SeparationOf<Vector> separate(const DifferencePointOf<Vector>& first, const Supp
   simplex.weight[0] = {1};
   simplex.size = 1;
   simplex.nearest = first.difference();
-  double least = rank(simplex.nearest);
+  auto least = rank(simplex.nearest);
   // Polytopes end by themselves, as each round finds a new vertex; a cylinder's rim converges, and no bit improves
   // after some dozens of rounds.
   constexpr int kMaxRounds = 256;
@@ -200,8 +201,8 @@ SeparationOf<Vector> separate(const DifferencePointOf<Vector>& first, const Supp
     if (settled(rounded(length), gap, result.gap) || contains(simplex, w)) break;
     SimplexOf<Vector> grown = simplex;
     grown.corner[grown.size++] = farthest;
-    const double nearer = reduce(grown);
-    result.origin_inside = nearer == 0;
+    const auto nearer = reduce(grown);
+    result.origin_inside = rounded(nearer) == 0;
     if (!result.origin_inside && !(nearer < least)) break;
     simplex = grown, least = nearer;
     if (result.origin_inside) break;

@@ -9,7 +9,7 @@ WideGap gap_above_plane(const WideBody& a, const WideBody& half_space) {
   const WidePlane plane = half_space.tightest(WideVector{});
   const WideVector lowest = a.support(-plane.normal);
   const DoubleDouble height = signed_distance(plane, lowest);
-  return {height.head, height.head, rounded(plane.normal), lowest, lowest - height * plane.normal};
+  return {height.head, height.head, height.head, rounded(plane.normal), lowest, lowest - height * plane.normal};
 }
 
 }  // namespace
@@ -18,7 +18,8 @@ WideGap wide_gap(const WideBody& a, const WideBody& b, double rounding) {
   if (!bounded(b.shape)) return gap_above_plane(a, b);
   if (!bounded(a.shape)) {
     const WideGap mirrored = gap_above_plane(b, a);
-    return {mirrored.distance, mirrored.certified, -mirrored.normal, mirrored.witness_b, mirrored.witness_a};
+    return {mirrored.distance, mirrored.certified, mirrored.most,
+            -mirrored.normal,  mirrored.witness_b, mirrored.witness_a};
   }
   const auto support = [&](const WideVector& direction) {
     return DifferencePointOf<WideVector>{a.core_support(direction), b.core_support(-direction)};
@@ -37,18 +38,12 @@ WideGap wide_gap(const WideBody& a, const WideBody& b, double rounding) {
   const bool cores_apart = cores.distance > rounding && cores.gap > 0;
   WideGap result;
   result.distance = (apart - radii).head;
+  result.most = (norm(cores.simplex.witness_a() - cores.simplex.witness_b()) - radii).head;
   result.certified = cores_apart ? (dot(support(-normal).difference(), normal) - radii).head : -radii.head;
   if (cores_apart) result.normal = rounded(normal);
   result.witness_a = cores.simplex.witness_a() - DoubleDouble{radius_a} * normal;
   result.witness_b = cores.simplex.witness_b() + DoubleDouble{radius_b} * normal;
   return result;
-}
-
-double wide_depth(const WideBody& a, const WideBody& b, const WideVector& normal) {
-  if (!bounded(b.shape)) return -gap_above_plane(a, b).certified;
-  if (!bounded(a.shape)) return -gap_above_plane(b, a).certified;
-  const WideVector along = unit(normal);
-  return dot(along, b.support(along) - a.support(-along)).head;
 }
 
 }  // namespace overlapper

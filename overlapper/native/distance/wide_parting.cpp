@@ -1,177 +1,67 @@
 #include "distance/wide_parting.h"
 
 #include <algorithm>
-#include <array>
 #include <limits>
+#include <numbers>
+#include <optional>
 #include <vector>
 
+#include "distance/near_polytope.h"
+#include "distance/penetration.h"
 #include "distance/wide_gap.h"
+#include "geometry/thresholds.h"
 
 namespace overlapper {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Of directions in doubles that are right to the last bits, and of dot products with them: the share of a point's
-/// distance from the origin that may be lost.
-constexpr double kLost = 0x1p-46;
-
 /// Two directions of a smaller sine than this have their product taken in double-double.
 constexpr double kNearlyParallel = 0x1p-3;
-
-/// Directions in double-double, per sine of the angle that they were made from.
-constexpr double kLostWide = 0x1p-96;
 
 /// Of the sine between an arc's middle and a direction that is along it or against it: sums of unit vectors, times
 /// sines that may be as small as what is lost.
 constexpr double kDoubtful = 0x1p-40;
 
+/// A unit vector across two: of nearly parallel ones the product is mostly what double-doubles lose, and then taken to
+/// be across the first.
+struct Across {
+  WideVector direction;
+  double sine, lost;  ///< between the two; of the direction
+};
+Across across(const WideVector& u, const WideVector& v) {
+  const WideVector product = cross(u, v);
+  const double sine = norm(product).head;
+  const WideVector about = unit(product);
+  return {unit(about - dot(u, about) * u), sine, std::min(kLostWide / sine, kLostWide + sine)};
+}
+
 /// The least double that is surely no smaller than the sum, and the greatest that is no larger.
 double up(double x) { return std::nextafter(x, kInfinity); }
 double down(double x) { return std::nextafter(x, -kInfinity); }
 
-struct Corner {
-  Vec3 at;
-  double lost;  ///< m: of dot products with it
-};
-
-struct Facet {
-  Vec3 normal;
-  std::array<int, 3> corners;  ///< of a triangle; of a box the axis, and whether it is the far side
-};
-
-struct Ridge {
-  int from, to, left, right;  ///< no facets beside a segment: -1
-  Vec3 along;                 ///< unit
-  Corner near;                ///< its point nearest to the origin
-};
-
-/// What a polytope is made of, about a point near the contact; a point and a segment are polytopes too.
-class Core {
+/// What is known of the ways along which A - B, of the cores, is left: directions point out of it.
+class Ways {
  public:
-  Core(const WideBody& body, const WideVector& about) : body_(body), about_(about), local_(corners_of(body.shape)) {
-    for (Vec3 p : local_) {
-      const Vec3 at = rounded(body.placed(wide(p)) - about);
-      corners.push_back({at, kLost * norm(at)});
-      radius = std::max(radius, norm(at));
-    }
-  }
+  Ways(const WideBody& a, const WideBody& b) : a_(a), b_(b), lost_(0x1p-94 * (a.reach() + b.reach())) {}
 
-  /// Keeps the corners beyond a plane, then finds the facets and ridges that any of them belongs to.
-  void cut(Vec3 direction, double height) {
-    std::vector<char> kept;
-    for (const Corner& c : corners) kept.push_back(dot(direction, c.at) + c.lost >= height);
-    std::visit([&](const auto& shape) { gather(shape, kept); }, body_.shape);
-    for (Facet& facet : facets) facet.normal = rounded(normal(facet));
-    for (Ridge& ridge : ridges) complete(ridge);
-    size_t next = 0;
-    std::erase_if(corners, [&](const Corner&) { return !kept[next++]; });
-  }
+  DoubleDouble shortest() const { return shortest_; }
+  const WideVector& direction() const { return direction_; }
+  /// m: of the way along a direction, by double-doubles.
+  double lost() const { return lost_; }
 
-  std::vector<Corner> corners;
-  std::vector<Facet> facets;
-  std::vector<Ridge> ridges;
-  double radius = 0;  ///< about the origin
-
-  WideVector normal(const Facet& facet) const {
-    const auto& [i, j, k] = facet.corners;
-    if (k < 0) return body_.turned(wide(j == 0 ? -unit_vector(i) : unit_vector(i)));
-    return body_.turned(unit(wide_normal(local_[i], local_[j], local_[k])));
-  }
-  WideVector along(const Ridge& ridge) const {
-    return body_.turned(unit(wide_difference(local_[ridge.to], local_[ridge.from])));
-  }
-
-  /// How far off the direction of a needle's normal may be.
-  double lost(const Facet& facet) const {
-    const auto& [i, j, k] = facet.corners;
-    if (k < 0) return kLostWide;
-    const Vec3 u = local_[j] - local_[i], v = local_[k] - local_[i];
-    return kLostWide * (1 + norm(u) * norm(v) / norm(rounded(wide_normal(local_[i], local_[j], local_[k]))));
-  }
-
-  /// At least and at most so far it reaches along any direction that `direction` may be the rounding of.
-  double least_reach(Vec3 direction) const {
-    double farthest = -kInfinity;
-    for (const Corner& c : corners) farthest = std::max(farthest, dot(direction, c.at) - c.lost);
-    return farthest;
-  }
-  double most_reach(Vec3 direction) const {
-    double farthest = -kInfinity;
-    for (const Corner& c : corners) farthest = std::max(farthest, dot(direction, c.at) + c.lost);
-    return farthest;
+  /// The way along a unit direction.
+  double measure(const WideVector& direction) {
+    const DoubleDouble way = dot(direction, a_.core_support(direction) - b_.core_support(-direction));
+    if (way < shortest_) shortest_ = way, direction_ = direction;
+    return way.head;
   }
 
  private:
-  static Vec3 unit_vector(int axis) { return {axis == 0 ? 1.0 : 0.0, axis == 1 ? 1.0 : 0.0, axis == 2 ? 1.0 : 0.0}; }
-
-  static std::vector<Vec3> corners_of(const Shape& shape) {
-    if (const HullData* hull = polytope_of(shape)) return hull->corners;
-    if (const Capsule* capsule = std::get_if<Capsule>(&shape); capsule && capsule->length > 0)
-      return {{0, 0, -capsule->length / 2}, {0, 0, capsule->length / 2}};
-    const Box* box = std::get_if<Box>(&shape);
-    if (!box) return {{}};
-    std::vector<Vec3> corners;
-    for (int i = 0; i < 8; ++i) corners.push_back(corner(*box, i));
-    return corners;
-  }
-
-  void gather(const auto&, const std::vector<char>&) {}
-  void gather(const Capsule& capsule, const std::vector<char>&) {
-    if (capsule.length > 0) ridges = {{0, 1, -1, -1, {}, {}}};
-  }
-  void gather(const Box&, const std::vector<char>& kept) {
-    for (int f = 0; f < 6; ++f) facets.push_back({{}, {f / 2, f & 1, -1}});
-    for (int i = 0; i < 8; ++i)
-      for (int k = 0; k < 3; ++k) {
-        const int j = i | 1 << k;
-        if (j == i || !(kept[i] || kept[j])) continue;
-        const auto side_of = [&](int axis) { return 2 * axis + (i >> axis & 1); };
-        ridges.push_back({i, j, side_of((k + 1) % 3), side_of((k + 2) % 3), {}, {}});
-      }
-  }
-  void gather(const Hull& hull, const std::vector<char>& kept) { gather(*hull.data, kept); }
-  void gather(const RoundedHull& hull, const std::vector<char>& kept) { gather(*hull.core.data, kept); }
-  void gather(const HullData& hull, const std::vector<char>& kept) {
-    struct Side {
-      int from, to, facet;
-    };
-    std::vector<Side> sides;
-    for (const auto& triangle : hull.triangles) {
-      if (!(kept[triangle[0]] || kept[triangle[1]] || kept[triangle[2]])) continue;
-      for (int i = 0; i < 3; ++i) {
-        const auto [from, to] = std::minmax(triangle[i], triangle[(i + 1) % 3]);
-        if (kept[from] || kept[to]) sides.push_back({from, to, static_cast<int>(facets.size())});
-      }
-      facets.push_back({{}, triangle});
-    }
-    // Two triangles run along every ridge.
-    std::ranges::sort(sides, {}, [](const Side& s) { return std::pair(s.from, s.to); });
-    for (size_t i = 0; i + 1 < sides.size(); i += 2)
-      ridges.push_back({sides[i].from, sides[i].to, sides[i].facet, sides[i + 1].facet, {}, {}});
-  }
-
-  void complete(Ridge& ridge) const {
-    ridge.along = rounded(along(ridge));
-    const Vec3 from = corners[ridge.from].at, to = corners[ridge.to].at;  // all of them are there still
-    const double t = std::clamp(-dot(from, to - from) / norm2(to - from), 0.0, 1.0);
-    ridge.near.at = from + t * (to - from);
-    ridge.near.lost = kLost * std::max(norm(from), norm(to));
-    // Of a long edge that passes nearby, doubles do not know where.
-    if (ridge.near.lost > 0x1p-20 * norm(ridge.near.at)) ridge.near = nearest(ridge);
-  }
-
-  Corner nearest(const Ridge& ridge) const {
-    const WideVector p = body_.placed(wide(local_[ridge.from])) - about_,
-                     q = body_.placed(wide(local_[ridge.to])) - about_, step = q - p;
-    const DoubleDouble share = -dot(p, step) / dot(step, step);
-    const Vec3 near = rounded(share.head <= 0 ? p : share.head >= 1 ? q : p + share * step);
-    return {near, kLost * norm(near) + 0x1p-90 * std::max(norm(rounded(p)), norm(rounded(q)))};
-  }
-
-  const WideBody& body_;
-  WideVector about_;
-  std::vector<Vec3> local_;
+  const WideBody &a_, &b_;
+  double lost_;
+  DoubleDouble shortest_{kInfinity};
+  WideVector direction_;
 };
 
 /// A normal of the difference's that may be the least way out.
@@ -182,19 +72,24 @@ struct Candidate {
   double sign;  ///< of the product of two ridges
 };
 
-class Search {
+class PolytopeSearch {
  public:
-  Search(const WideBody& a, const WideBody& b, const WideVector& about)
-      : wide_a_(a), wide_b_(b), a_(a, about), b_(b, about), lost_(0x1p-94 * (a.reach() + b.reach())) {}
+  PolytopeSearch(const WideBody& a, const WideBody& b, const WideVector& about)
+      : ways(a, b), a_(a, about), b_(b, about) {}
 
-  void run(Vec3 hint) {
-    const Vec3 outward = norm2(hint) > 0 ? -hint : Vec3{0, 0, 1};
-    measure(unit(wide(outward)), 0);
+  Ways ways;
+  double lower = kInfinity;  ///< m: no way is shorter, if the cores have a common point
+
+  /// False if there are too many ridges to compare each with each.
+  bool run(Vec3 outward) {
+    ways.measure(unit(wide(outward)));
     // Where the bodies part, a point of each is on the other, or as near as the way out is long.
     const double farthest_a = a_.most_reach(outward), farthest_b = b_.most_reach(-outward);
-    const double room = up(way_.head * (1 + 0x1p-40)) + lost_;
+    const double room = up(way() * (1 + 0x1p-40)) + ways.lost();
     a_.cut(outward, -farthest_b - room);
     b_.cut(-outward, -farthest_a - room);
+    if (static_cast<double>(a_.ridges.size()) * static_cast<double>(b_.ridges.size()) > kMostRidgesCompared)
+      return false;
     for (int f = 0; f < static_cast<int>(a_.facets.size()); ++f)
       consider({0, Candidate::kFacetOfA, f, -1, 1}, a_.facets[f].normal);
     for (int f = 0; f < static_cast<int>(b_.facets.size()); ++f)
@@ -203,60 +98,56 @@ class Search {
     std::ranges::sort(candidates_, {}, &Candidate::least);
     for (const Candidate& candidate : candidates_) {
       // The rest are longer.
-      if (candidate.least > way_.head) break;
-      lower_ = std::min(lower_, measured(candidate));
+      if (candidate.least > way()) break;
+      lower = std::min(lower, measured(candidate));
     }
-    lower_ = std::min(lower_, way_.head - lost_);
+    lower = std::min(lower, way() - ways.lost());
+    return true;
   }
 
-  DoubleDouble way() const { return way_; }
-  const WideVector& direction() const { return direction_; }
-  double lower() const { return lower_; }
-  double lost() const { return lost_; }
   /// True if the difference has an inside, so that its least way out is along the normal of a facet.
   bool solid() const { return !a_.facets.empty() || !b_.facets.empty(); }
 
  private:
-  /// The way along a unit direction in which A - B is left, and a lower bound of that along a direction off by `lost`.
-  double measure(const WideVector& direction, double lost) {
-    const DoubleDouble way = dot(direction, wide_a_.core_support(direction) - wide_b_.core_support(-direction));
-    if (way < way_) way_ = way, direction_ = direction;
-    return way.head - lost_ - lost * (a_.radius + b_.radius);
-  }
+  double way() const { return ways.shortest().head; }
 
+  /// A lower bound of the way along the candidate's exact normal.
   double measured(const Candidate& c) {
-    if (c.kind == Candidate::kFacetOfA) return measure(a_.normal(a_.facets[c.of_a]), a_.lost(a_.facets[c.of_a]));
-    if (c.kind == Candidate::kFacetOfB) return measure(-b_.normal(b_.facets[c.of_b]), b_.lost(b_.facets[c.of_b]));
-    const WideVector product = cross(a_.along(a_.ridges[c.of_a]), b_.along(b_.ridges[c.of_b]));
-    return measure(c.sign * unit(product), kLostWide / norm(product).head);
+    const auto along = [&](const WideVector& direction, double lost) {
+      return ways.measure(direction) - ways.lost() - lost * (a_.radius + b_.radius);
+    };
+    if (c.kind == Candidate::kFacetOfA) return along(a_.normal(a_.facets[c.of_a]), a_.lost(a_.facets[c.of_a]));
+    if (c.kind == Candidate::kFacetOfB) return along(-b_.normal(b_.facets[c.of_b]), b_.lost(b_.facets[c.of_b]));
+    const Across ridges = across(a_.along(a_.ridges[c.of_a]), b_.along(b_.ridges[c.of_b]));
+    return along(c.sign * ridges.direction, ridges.lost);
   }
 
   void consider(Candidate candidate, Vec3 direction) {
-    candidate.least = a_.least_reach(direction) + b_.least_reach(-direction) - lost_;
-    if (candidate.least <= way_.head) candidates_.push_back(candidate);
+    candidate.least = a_.least_reach(direction) + b_.least_reach(-direction) - ways.lost();
+    if (candidate.least <= way()) candidates_.push_back(candidate);
   }
 
   /// False if no point of the ridge is as near to the other body as the way out is long.
-  bool near(const Ridge& ridge, const Core& other) const {
-    return norm(ridge.near.at) - ridge.near.lost <= way_.head + other.radius;
+  bool near(const NearRidge& ridge, const NearPolytope& other) const {
+    return norm(ridge.near.at) - ridge.near.lost <= way() + other.radius;
   }
 
   void consider_ridges() {
     std::vector<int> of_b;
     for (int j = 0; j < static_cast<int>(b_.ridges.size()); ++j)
       if (near(b_.ridges[j], a_)) of_b.push_back(j);
-    std::vector<double> across(b_.facets.size());
+    std::vector<double> rises(b_.facets.size());
     for (int i = 0; i < static_cast<int>(a_.ridges.size()); ++i) {
-      const Ridge& ridge = a_.ridges[i];
+      const NearRidge& ridge = a_.ridges[i];
       if (!near(ridge, b_)) continue;
-      for (size_t f = 0; f < across.size(); ++f) across[f] = dot(b_.facets[f].normal, ridge.along);
-      for (int j : of_b) consider_ridges(i, j, across);
+      for (size_t f = 0; f < rises.size(); ++f) rises[f] = dot(b_.facets[f].normal, ridge.along);
+      for (int j : of_b) consider_ridges(i, j, rises);
     }
   }
 
   /// Two ridges make a facet where the arcs between the normals of the facets beside each, one of them reversed, cross.
-  void consider_ridges(int i, int j, const std::vector<double>& across) {
-    const Ridge &of_a = a_.ridges[i], &of_b = b_.ridges[j];
+  void consider_ridges(int i, int j, const std::vector<double>& rises) {
+    const NearRidge &of_a = a_.ridges[i], &of_b = b_.ridges[j];
     Vec3 arc_a, arc_b;
     if (of_a.left >= 0) {
       const Vec3 left = a_.facets[of_a.left].normal, right = a_.facets[of_a.right].normal;
@@ -264,7 +155,7 @@ class Search {
     }
     if (of_b.left >= 0) {
       const Vec3 left = b_.facets[of_b.left].normal, right = b_.facets[of_b.right].normal;
-      if (!crossed(left, across[of_b.left], right, across[of_b.right], arc_b)) return;
+      if (!crossed(left, rises[of_b.left], right, rises[of_b.right], arc_b)) return;
     }
     Vec3 product = cross(of_a.along, of_b.along);
     double sine = norm(product);
@@ -275,10 +166,11 @@ class Search {
       if (sine < kLostWide) return;
     }
     product = product / sine;
-    const double apart = dot(product, of_a.near.at - of_b.near.at), lost = of_a.near.lost + of_b.near.lost + lost_;
+    const double apart = dot(product, of_a.near.at - of_b.near.at),
+                 lost = of_a.near.lost + of_b.near.lost + ways.lost();
     for (double sign : {1.0, -1.0}) {
       if (sign * dot(arc_a, product) < -kDoubtful || sign * dot(arc_b, product) > kDoubtful) continue;
-      if (sign * apart - lost <= way_.head) consider({0, Candidate::kRidges, i, j, sign}, sign * product);
+      if (sign * apart - lost <= way()) consider({0, Candidate::kRidges, i, j, sign}, sign * product);
     }
   }
 
@@ -291,40 +183,242 @@ class Search {
     return true;
   }
 
-  const WideBody &wide_a_, &wide_b_;
-  Core a_, b_;
-  double lost_;  ///< m: by double-doubles, of the way along a direction
+  NearPolytope a_, b_;
   std::vector<Candidate> candidates_;
-  DoubleDouble way_{kInfinity};
-  WideVector direction_;
-  double lower_ = kInfinity;
 };
+
+/// A cylinder, whose axis and rims are known in double-double.
+struct Rims {
+  WideVector centre, axis;
+  double radius, half;
+
+  explicit Rims(const WideBody& body) : centre(body.placed({})), axis(body.turned({{}, {}, {1}})) {
+    const Cylinder& cylinder = std::get<Cylinder>(body.shape);
+    radius = cylinder.radius, half = cylinder.length / 2;
+  }
+};
+
+/// The point of an ellipse about the origin, with semi-axes 1 along y and `k` < 1 along x, that is nearest to (x, y),
+/// on its side of positive x: its eccentric angle, if the distance has a local minimum there.
+///
+/// With `s` = 1 - k², the slope of half the square of the distance is cos φ (k x tan φ - y + s sin φ). For x >= 0 the
+/// bracket grows all the way, else where cos³ φ > k |x| / s; a local minimum is where it grows through zero.
+std::optional<double> nearest_on_ellipse(double k, double s, double x, double y) {
+  const double slope = k * x;
+  double end = std::numbers::pi / 2;
+  if (slope < 0) {
+    const double cube = -slope / s;
+    if (!(cube < 1)) return std::nullopt;
+    end = std::acos(std::cbrt(cube));
+  }
+  const auto bracket = [&](double angle) { return slope * std::tan(angle) - y + s * std::sin(angle); };
+  double low = -end, high = end;
+  if (slope <= 0 && !(bracket(low) < 0 && bracket(high) > 0)) return std::nullopt;
+  double angle = 0;
+  for (int round = 0; round < 200; ++round) {
+    const double value = bracket(angle);
+    (value < 0 ? low : high) = angle;
+    const double cosine = std::cos(angle);
+    double next = angle - value / (slope / (cosine * cosine) + s * cosine);
+    if (!(next > low && next < high)) next = low + (high - low) / 2;
+    if (std::abs(next - angle) <= 0x1p-52 * std::abs(angle) || next == low || next == high) return next;
+    angle = next;
+  }
+  return angle;
+}
+
+/// The ways out of a cylinder and a polytope, or of two cylinders but for those where two rims meet.
+///
+/// A support function has a local minimum on the sphere only where both radii of curvature are as long as the way
+/// out, or where it has a kink; a rim is straight across itself. So the least way is along the axis, along the normal
+/// of a facet, across the axis and a ridge, from the axis through a corner, or through a point of a rim at which a
+/// ridge leaves it: there the rim, seen along the ridge, is an ellipse, and the point the nearest one of it.
+class RimSearch {
+ public:
+  RimSearch(const WideBody& a, const WideBody& b) : ways(a, b), a_(a), b_(b) {}
+
+  Ways ways;
+  double lower = kInfinity;  ///< m: of the ways looked at
+
+  void run(Vec3 outward, const WideVector& about) {
+    ways.measure(unit(wide(outward)));
+    if (std::holds_alternative<Cylinder>(a_.shape) && std::holds_alternative<Cylinder>(b_.shape)) {
+      of_cylinders(Rims(a_), Rims(b_));
+    } else if (std::holds_alternative<Cylinder>(a_.shape)) {
+      of_polytope(Rims(a_), b_, 1, -outward, about);
+    } else {
+      of_polytope(Rims(b_), a_, -1, outward, about);
+    }
+    lower = std::min(lower, ways.shortest().head - ways.lost());
+  }
+
+ private:
+  /// Directions point from the polytope out of the cylinder; `sign` turns them out of A - B.
+  void of_polytope(const Rims& rims, const WideBody& body, double sign, Vec3 into, const WideVector& about) {
+    NearPolytope polytope(body, about);
+    const double room = up(ways.shortest().head * (1 + 0x1p-40)) + ways.lost();
+    const WideVector farthest = (sign > 0 ? a_ : b_).core_support(wide(-into)) - about;
+    const double beyond = dot(-into, rounded(farthest)) + kLost * norm(rounded(farthest));
+    polytope.cut(into, -beyond - room);
+    along_axis(rims, sign);
+    for (const NearFacet& facet : polytope.facets) look(-sign * polytope.normal(facet), polytope.lost(facet));
+    for (const NearRidge& ridge : polytope.ridges)
+      beside(rims, polytope.along(ridge), rims.centre - polytope.corner(ridge.from), sign);
+    for (const NearCorner& corner : polytope.corners) {
+      const WideVector arm = polytope.corner(corner) - rims.centre;
+      look(sign * from_axis(rims, arm), 0);
+    }
+  }
+
+  void of_cylinders(const Rims& a, const Rims& b) {
+    along_axis(a, 1);
+    along_axis(b, 1);
+    // A cylinder's side is a ridge along its axis, moved out by its radius: the ellipse grows, and its normals stay.
+    beside(a, b.axis, a.centre - b.centre, 1);
+    beside(b, a.axis, b.centre - a.centre, -1);
+    const WideVector arm = from_axis(a, b.centre - a.centre);
+    look(arm, 0), look(-arm, 0);
+  }
+
+  void along_axis(const Rims& rims, double sign) { look(sign * rims.axis, 0), look(-sign * rims.axis, 0); }
+
+  static WideVector from_axis(const Rims& rims, const WideVector& arm) {
+    // Of an arm along the axis nothing is left but what double-doubles lose, and any direction will do.
+    const auto leveled = [&](const WideVector& v) { return unit(v - dot(rims.axis, v) * rims.axis); };
+    const WideVector level = leveled(leveled(arm));
+    return norm(level).head > 0 ? level : leveled(wide(any_orthogonal(rounded(rims.axis))));
+  }
+
+  /// Across the axis and a ridge, and in the plane across the ridge; `arm` leads from the ridge to the centre.
+  void beside(const Rims& rims, const WideVector& ridge, const WideVector& arm, double sign) {
+    const auto [level, sine, lost] = across(rims.axis, ridge);
+    if (sine < kLostWide) return;
+    look(level, lost), look(-level, lost);
+    const WideVector upward = unit(cross(ridge, level));
+    const double cosine = std::abs(dot(rims.axis, ridge).head);
+    const double k = std::min(cosine, 1.0), r = rims.radius, x = -dot(arm, upward).head, y = -dot(arm, level).head;
+    if (k == 0) return;
+    for (double side : {1.0, -1.0}) {
+      const double from_cap = side * x - sine * rims.half;
+      const auto angle = nearest_on_ellipse(k, sine * sine, from_cap / r, y / r);
+      if (!angle) continue;
+      const WideVector direction = side * std::cos(*angle) * upward + k * std::sin(*angle) * level;
+      // At a local minimum, the way is by no more too long than its slope there, which rounding leaves, times the
+      // angle.
+      look(sign * unit(direction), lost, 0x1p-46 * (std::abs(from_cap) + std::abs(y) + r));
+    }
+  }
+
+  /// Measures the way along a direction that is off by `lost`, and too long by `too_long`.
+  void look(const WideVector& direction, double lost, double too_long = 0) {
+    const double way = ways.measure(direction);
+    lower = std::min(lower, way - ways.lost() - lost * (a_.reach() + b_.reach()) - too_long);
+  }
+
+  const WideBody &a_, &b_;
+};
+
+/// The way out where two rims meet, from a direction near it: a local minimum of the support function, by Newton's
+/// method.
+Vec3 between_rims(const Placed& a, const Placed& b, Vec3 outward) {
+  for (int round = 0; round < 20; ++round) {
+    const Vec3 farthest = a.support(outward) - b.support(-outward);
+    const double way = dot(outward, farthest);
+    const Vec3 slope = farthest - way * outward;
+    const Vec3 u = any_orthogonal(outward), v = cross(outward, u);
+    double uu = -way, uv = 0, vv = -way;
+    for (const Placed* body : {&a, &b}) {
+      const Vec3 tangent = cross(body->pose.rotation * Vec3{0, 0, 1}, outward);
+      const double across = norm(tangent);
+      if (!(across > 0)) return outward;
+      const double curved = std::get<Cylinder>(body->shape).radius / (across * across * across);
+      const double tu = dot(tangent, u), tv = dot(tangent, v);
+      uu += curved * tu * tu, uv += curved * tu * tv, vv += curved * tv * tv;
+    }
+    const double determinant = uu * vv - uv * uv, su = dot(slope, u), sv = dot(slope, v);
+    if (!(uu > 0 && determinant > 0)) return outward;
+    const Vec3 step = (uv * sv - vv * su) / determinant * u + (uv * su - uu * sv) / determinant * v;
+    outward = unit(outward + step);
+    if (norm(step) < 0x1p-50) break;
+  }
+  return outward;
+}
+
+/// True if no way that is shorter than `way` leads through a point where the rims of two nearly parallel cylinders
+/// meet.
+///
+/// A local minimum there, of length y, has both radii of curvature as long. With ε the sine between the axes and ρ_i
+/// that between the direction and one of them, the smaller radius is no longer than r ε² / ρ³, so that y ρ³ <= r ε²:
+/// the direction is near an axis. But there A - B reaches out to a disc across it, at the height of a cap less by how
+/// much the other tilts, whose rim surrounds the origin by `room`: the way along a direction at the angle η from the
+/// axis is no shorter than height cos η + room sin η.
+bool rims_meet_farther_out(const Rims& a, const Rims& b, double way) {
+  const Vec3 z = rounded(a.axis), apart = rounded(a.centre - b.centre);
+  const double sine = norm(rounded(cross(a.axis, b.axis))), cosine = std::abs(dot(a.axis, b.axis).head);
+  const double most = std::max(a.radius, b.radius), along = dot(apart, z);
+  if (!(way > 0)) return false;
+  if (sine < kLostWide) return true;
+  // A way of less than half is excluded by whoever asks.
+  const double tilted = std::cbrt(2 * most * sine * sine / way) * (1 + 0x1p-40);
+  if (!(tilted < 1)) return false;
+  const double lost = 0x1p-40 * (norm(apart) + a.half + b.half + a.radius + b.radius);
+  for (double side : {1.0, -1.0}) {
+    const double height = a.half + b.half * cosine + side * along - b.radius * sine - lost;
+    const Vec3 to_cap = apart + side * b.half * (dot(a.axis, b.axis).head > 0 ? 1 : -1) * rounded(b.axis);
+    const double room = a.radius + b.radius * cosine - norm(to_cap - dot(to_cap, z) * z) - lost;
+    const double at_end = height * std::sqrt(1 - tilted * tilted) + room * tilted;
+    if (!(height > way && at_end > way)) return false;
+  }
+  return true;
+}
+
+bool has_rims(const WideBody& body) { return std::holds_alternative<Cylinder>(body.shape); }
 
 }  // namespace
 
-WideParting wide_parting(const WideBody& a, const WideBody& b, Vec3 hint) {
-  const double radius_a = core_radius(a.shape), radius_b = core_radius(b.shape);
-  const DoubleDouble radii = two_sum(radius_a, radius_b);
-  const auto found = [&](const Search& search, double lower) {
-    const double depth = (search.way() + radii).head;
-    return WideParting{depth, down((DoubleDouble{lower} + radii).head), up(depth + search.lost()),
-                       -rounded(search.direction())};
+WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint) {
+  const WideBody wide_a(a, wide(reference)), wide_b(b, wide(reference));
+  const DoubleDouble radii = two_sum(core_radius(a.shape), core_radius(b.shape));
+  const Vec3 outward = norm2(hint) > 0 ? -hint : Vec3{0, 0, 1};
+  const auto found = [&](const Ways& ways, double lower) {
+    const double depth = (ways.shortest() + radii).head;
+    return WideParting{depth, down((DoubleDouble{lower} + radii).head), up(depth + ways.lost()),
+                       -rounded(ways.direction())};
   };
-  const auto is_polytope = [](const WideBody& body) { return !smooth(body.shape) && bounded(body.shape); };
-  if (is_polytope(a) && is_polytope(b) && norm2(hint) > 0) {
-    const WideVector way = wide(hint);
-    Search search(a, b, radius(a.shape) < radius(b.shape) ? a.support(-way) : b.support(way));
-    search.run(hint);
-    if (search.lower() > 0) return found(search, search.lower());
+  const auto is_polytope = [](const Shape& shape) { return !smooth(shape) && bounded(shape); };
+  if (is_polytope(a.shape) && is_polytope(b.shape) && norm2(hint) > 0) {
+    const bool a_is_smaller = radius(a.shape) < radius(b.shape);
+    PolytopeSearch search(wide_a, wide_b, a_is_smaller ? wide_a.support(wide(outward)) : wide_b.support(wide(hint)));
+    if (search.run(outward) && search.lower > 0) return found(search.ways, search.lower);
   }
-  const double lost = 0x1p-94 * (a.reach() + b.reach());
-  const WideGap gap = wide_gap(a, b, lost / 4);
-  if (norm2(gap.normal) > 0) return {-gap.distance, down(-gap.distance - lost), up(-gap.certified + lost), gap.normal};
-  Search search(a, b, gap.witness_a);
-  search.run(hint);
+  const double lost = 0x1p-94 * (wide_a.reach() + wide_b.reach());
+  const WideGap gap = wide_gap(wide_a, wide_b, lost / 4);
+  if (norm2(gap.normal) > 0) {
+    // GJK may not have ended on a rim, and the hint be better.
+    Ways ways(wide_a, wide_b);
+    const bool rims = bounded(a.shape) && bounded(b.shape) && (has_rims(wide_a) || has_rims(wide_b));
+    if (rims) ways.measure(unit(wide(outward)));
+    const double certified = rims ? std::max(gap.certified, -(ways.shortest() + radii).head) : gap.certified;
+    return {-gap.distance, down(-std::max(gap.distance, gap.most) - lost), up(-certified + lost), gap.normal};
+  }
   // Cores without an inside, or without a common point, are left at once by moving one of them to the other.
-  const bool inside = search.solid() && search.lower() > 0;
-  return found(search, inside ? search.lower() : -(gap.distance + radii.head) - lost);
+  const double touching = -(std::max(gap.distance, gap.most) + radii.head) - lost;
+  if (has_rims(wide_a) || has_rims(wide_b)) {
+    RimSearch search(wide_a, wide_b);
+    search.run(outward, gap.witness_a);
+    if (has_rims(wide_a) && has_rims(wide_b)) {
+      const EnclosedDepth enclosed = enclosed_depth(a, b);
+      const double coarse = enclosed.lower;
+      search.ways.measure(unit(wide(between_rims(a, b, -enclosed.depth.normal))));
+      const double way = std::min(search.lower, search.ways.shortest().head);
+      if (coarse > way / 2 && rims_meet_farther_out(Rims(wide_a), Rims(wide_b), way)) search.lower = way - lost;
+      else search.lower = std::min(way, coarse);
+    }
+    return found(search.ways, search.lower > 0 ? search.lower : touching);
+  }
+  PolytopeSearch search(wide_a, wide_b, gap.witness_a);
+  if (!search.run(outward)) search.lower = enclosed_depth(a, b).lower;
+  return found(search.ways, search.solid() && search.lower > 0 ? search.lower : touching);
 }
 
 }  // namespace overlapper

@@ -11,12 +11,13 @@ struct WideParting {
   Vec3 normal;                             ///< unit, from b to a
 };
 
-/// `hint` is a way out, as good as it is known, from b to a. At most one of the two may be a half-space.
+/// `hint` is a way out, as good as it is known, from b to a; coordinates count from `reference`. At most one of the two
+/// may be a half-space.
 ///
 /// The facets of the difference of two polytopes are parallel to a facet of either or to an edge of each, so the
 /// normals of these hold the least way out. About a point near the contact, every number is as exact as it is near:
 /// there doubles tell of nearly all normals, with bounds, that the way along them is longer, and double-doubles measure
-/// the rest.
-WideParting wide_parting(const WideBody& a, const WideBody& b, Vec3 hint);
+/// the rest. Cylinders have their own normals; what two rims leave open is enclosed by EPA.
+WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint);
 
 }  // namespace overlapper

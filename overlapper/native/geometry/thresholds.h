@@ -43,6 +43,9 @@ inline constexpr int kMostFacetsParted = 1024;
 /// µs.
 inline constexpr double kClear = 1e-9;
 
+/// Pairs of ridges, one of each body, up to which all are compared for the bound of a depth; EPA bounds it beyond.
+inline constexpr double kMostRidgesCompared = 0x1p22;
+
 /// Vertices that one arc between the normals of two facets may pass on the other body; doubles that stay in doubt would
 /// go on, and EPA answers.
 ///

@@ -15,38 +15,16 @@
 namespace overlapper {
 namespace {
 
-/// The shortest way out along one of the normals or of those of the planes between which the deepest ball lies.
-Penetration parting(const Arrangement& at, std::vector<Vec3> normals, const WideBall* ball) {
-  const std::vector<WideBody> bodies = at.wide_bodies();
-  if (ball)
-    for (const auto& [plane, owner] : ball->cuts)
-      if (owner >= 0) normals.push_back(owner == 0 ? -rounded(plane.normal) : rounded(plane.normal));
-  Penetration least{std::numeric_limits<double>::infinity(), {}};
-  for (Vec3 normal : normals) {
-    const double depth = wide_depth(bodies[0], bodies[1], wide(normal));
-    if (depth < least.depth) least = {depth, normal};
-  }
-  return least;
-}
-
 double up(double x) { return std::nextafter(x, std::numeric_limits<double>::infinity()); }
 
-bool rim(const Placed& body) { return std::holds_alternative<Cylinder>(body.shape); }
-
-/// True if doubles leave more of the depth in doubt than kClear.
-bool in_doubt(double depth, const Placed& a, const Placed& b) {
-  const double between = radius(a.shape) + radius(b.shape) + norm(a.pose.translation - b.pose.translation);
-  return rounding(reach(a, reach(b, between))) > kClear * depth;
-}
-
 Penetration parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint) {
-  const WideParting way = wide_parting(WideBody(a, wide(reference)), WideBody(b, wide(reference)), hint);
+  const WideParting way = wide_parting(a, b, reference, hint);
   return {way.depth, way.normal};
 }
 
-Distance wide_distance(const Arrangement& at, double reach) {
+Distance wide_distance(const Arrangement& at) {
   const std::vector<WideBody> bodies = at.wide_bodies();
-  const WideGap gap = wide_gap(bodies[0], bodies[1], wide_rounding(reach));
+  const WideGap gap = wide_gap(bodies[0], bodies[1], wide_rounding(bodies[0].reach() + bodies[1].reach()));
   return {gap.distance, gap.certified, gap.normal, rounded(gap.witness_a), rounded(gap.witness_b)};
 }
 
@@ -63,38 +41,43 @@ Vec3 reversed(Vec3 v) { return Vec3{} - v; }
 
 }  // namespace
 
+bool in_doubt(double length, const Placed& a, const Placed& b) {
+  const double between = radius(a.shape) + radius(b.shape) + norm(a.pose.translation - b.pose.translation);
+  return rounding(reach(a, reach(b, between))) > kClear * length;
+}
+
+bool has_rims(const Placed& a, const Placed& b) {
+  const bool rims = std::holds_alternative<Cylinder>(a.shape) || std::holds_alternative<Cylinder>(b.shape);
+  return rims && bounded(a.shape) && bounded(b.shape);
+}
+
 Penetration penetration_in_order(const Placed& a, const Placed& b) {
   const bool swapped = comes_before(b, a);
   const Placed &first = swapped ? b : a, &second = swapped ? a : b;
   const Vec3 reference = first.pose.translation;
-  Penetration p = penetration(first.seen_from(reference), second.seen_from(reference));
-  if (in_doubt(p.depth, first, second)) p = parting(first, second, reference, p.normal);
+  const Placed seen_first = first.seen_from(reference), seen_second = second.seen_from(reference);
+  Penetration p = penetration(seen_first, seen_second);
+  if (in_doubt(p.depth, seen_first, seen_second)) p = parting(seen_first, seen_second, reference, p.normal);
   if (swapped) p.normal = reversed(p.normal);
   return p;
 }
 
-Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, const WideBall* wide_ball) {
+Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool doubtful) {
   const Placed &a = at.relative[0], &b = at.relative[1];
-  const auto reach = [&] { return std::max(magnitude(a), magnitude(b)); };
   Contact contact;
   if (status == Status::kOverlapping) {
     Penetration p = penetration(a, b);
-    if (rim(a) || rim(b)) {
-      if (wide_ball || p.depth <= doubt(reach())) p = parting(at, {p.normal}, wide_ball);
-    } else if (wide_ball || in_doubt(p.depth, a, b)) {
-      p = parting(a, b, at.reference, p.normal);
-    }
+    if (doubtful || has_rims(a, b) || in_doubt(p.depth, a, b)) p = parting(a, b, at.reference, p.normal);
     contact.depth = p.depth;
     contact.normal = p.normal;
   } else {
     Distance d = distance(a, b);
-    const double size = reach();
-    if (rounding(size) > kClear * d.gap && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(at, size);
+    if (in_doubt(d.gap, a, b) && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(at);
     contact.normal = d.normal;
     // Where the bodies touch, which method "paper" may call apart, the line between the witness points may be all
     // rounding; the way out is not.
     if ((status == Status::kTouching || as_in_paper) && !(d.gap > 0))
-      contact.normal = parting(at, {penetration(a, b).normal}, wide_ball).normal;
+      contact.normal = parting(a, b, at.reference, penetration(a, b).normal).normal;
     contact.distance = status == Status::kSeparated ? std::max(0.0, d.distance) : 0;
     contact.witness_a = d.witness_a + at.reference;
     contact.witness_b = d.witness_b + at.reference;
@@ -121,21 +104,23 @@ double outside(const Placed& body, Vec3 point) {
   const WideBody wide_body(body, wide(point));
   const WideBody at_point({Sphere{0}, point, {}, {{}, point}}, wide(point));
   const double lost = 0x1p-94 * wide_body.reach();
-  return std::max(0.0, wide_gap(at_point, wide_body, lost).distance) + lost;
+  return std::max(0.0, wide_gap(at_point, wide_body, lost).most) + lost;
 }
 
 }  // namespace
 
 ContactErrors errors_of(const Contact& contact, const Placed& a, const Placed& b, Status status) {
   const Vec3 reference = a.pose.translation;
-  const WideParting way = wide_parting(WideBody(a, wide(reference)), WideBody(b, wide(reference)), contact.normal);
+  WideParting way = wide_parting(a.seen_from(reference), b.seen_from(reference), reference, contact.normal);
   ContactErrors errors;
+  if (status != Status::kOverlapping) {
+    const double beside = up(std::max(outside(a, contact.witness_a), outside(b, contact.witness_b)));
+    const double between = norm(rounded(wide_difference(contact.witness_a, contact.witness_b))) * (1 + 0x1p-50);
+    way.lower = std::max(way.lower, -up(between + 2 * beside));
+    errors.witnesses = up(beside + std::max(0.0, between - std::max(0.0, -way.upper)));
+  }
   errors.depth = off(contact.depth, std::max(0.0, way.lower), std::max(0.0, way.upper));
   errors.distance = off(contact.distance, std::max(0.0, -way.upper), std::max(0.0, -way.lower));
-  if (status == Status::kOverlapping) return errors;
-  const double between = norm(rounded(wide_difference(contact.witness_a, contact.witness_b)));
-  errors.witnesses = up(std::max(outside(a, contact.witness_a), outside(b, contact.witness_b)) +
-                        std::max(0.0, between * (1 + 0x1p-50) - std::max(0.0, -way.upper)));
   return errors;
 }
 

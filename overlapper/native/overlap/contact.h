@@ -19,8 +19,15 @@ struct Contact {
 /// The contact of a pair that overlaps beyond the doubt of its signs.
 Penetration penetration_in_order(const Placed& a, const Placed& b);
 
-/// The contact of a pair of which more is in doubt. Method "paper" may call apart what is not, and does not search.
-Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, const WideBall* wide_ball);
+/// The contact of a pair of which more is in doubt; `doubtful` if doubles could not even tell the status. Method
+/// "paper" may call apart what is not.
+Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool doubtful);
+
+/// True if doubles leave more of a depth or distance, of bodies in coordinates about one of them, in doubt than kClear.
+bool in_doubt(double length, const Placed& a, const Placed& b);
+
+/// True of a cylinder and another bounded body: EPA approaches a rim, and knows its direction to half of the digits.
+bool has_rims(const Placed& a, const Placed& b);
 
 /// How far the figures of a contact may be off, in m.
 struct ContactErrors {

@@ -230,9 +230,8 @@ const Contact& Overlap::contact() const {
       return Contact{0, depth, normal, {}, {}, {}};
     }
     const bool searched = method_ == Method::kAuto && !at_once_;
-    const WideBall* ball =
-        searched && search().inside && search().inside->wide_ball ? &*search().inside->wide_ball : nullptr;
-    return contact_of(arrangement(), status_, method_ == Method::kPaper, ball);
+    const bool doubtful = searched && search().inside && search().inside->wide_ball;
+    return contact_of(arrangement(), status_, method_ == Method::kPaper, doubtful);
   });
 }
 

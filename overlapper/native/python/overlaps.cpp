@@ -368,6 +368,11 @@ std::pair<Placed, Placed> relative_pair(nb::handle a, nb::handle b) {
   return {first.seen_from(first.pose.translation), second.seen_from(first.pose.translation)};
 }
 
+/// Of a pair whose status doubles alone do not know, or whose contact they do not know well enough.
+Contact contact_in_doubt(nb::handle a, nb::handle b) {
+  return Overlap(to_placed(a, "a"), to_placed(b, "b"), 1e-3, Method::kAuto).contact();
+}
+
 double union_ratio(nb::handle a, nb::handle b, double tolerance) {
   const Overlap common = make_overlap({to_placed(a, "a"), to_placed(b, "b")}, tolerance, Method::kAuto);
   if (!solid(common)) return 0;
@@ -407,7 +412,10 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
       "distance",
       [](nb::handle a, nb::handle b) {
         const auto [p, q] = relative_pair(a, b);
-        return std::max(0.0, distance(p, q).distance);
+        const Distance d = distance(p, q);
+        if (!in_doubt(d.gap, p, q)) return d.distance;
+        if (norm2(d.normal) > 0 && !in_doubt(-d.distance, p, q)) return 0.0;
+        return contact_in_doubt(a, b).distance;
       },
       "a"_a.none(), "b"_a.none(),
       nb::sig("def distance(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | "
@@ -419,7 +427,9 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
       "penetration_depth",
       [](nb::handle a, nb::handle b) {
         const auto [p, q] = relative_pair(a, b);
-        return std::max(0.0, penetration(p, q).depth);
+        const double depth = penetration(p, q).depth;
+        if (!in_doubt(-depth, p, q)) return 0.0;
+        return in_doubt(depth, p, q) || has_rims(p, q) ? contact_in_doubt(a, b).depth : depth;
       },
       "a"_a.none(), "b"_a.none(),
       nb::sig("def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | "

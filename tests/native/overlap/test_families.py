@@ -58,8 +58,15 @@ def test_an_answer_with_a_fault_breaks_the_rule_about_it():
         (deep, off, "volume_is_as_right_as_its_conditioning"),
         (deep, off, "volume_of_hulls_is_right_to_twelve_digits"),
         (deep, {"centroid": rules.answer(deep.placed).centroid + 1e-11}, "centroid_is_as_right_as_its_conditioning"),
-        (deep, {"depth": rules.answer(deep.placed).depth * (1 + 2e-9)}, "depth_and_distance_are_right_to_nine_digits"),
-        (apart, {"distance": 7.0}, "depth_and_distance_are_right_to_nine_digits"),
+        (deep, {"depth": rules.answer(deep.placed).depth * (1 + 1e-14)}, "the_errors_hold_depth_and_distance"),
+        (apart, {"distance": 7.0}, "the_errors_hold_depth_and_distance"),
+        (apart, {"witness_a": np.zeros(3)}, "the_error_of_witnesses_holds_them"),
+        (
+            apart,
+            {"errors": Planted(rules.answer(apart.placed).errors, witnesses=1e-9)},
+            "errors_of_depth_and_distance_are_small",
+        ),
+        (deep, {"errors": Planted(errors, depth=1e-9)}, "errors_of_depth_and_distance_are_small"),
         (deep, {"area": rules.answer(deep.placed).area * (1 + 1e-12)}, "the_errors_hold_the_measures"),
         (deep, {"errors": Planted(errors, gradient=np.zeros((2, 6)))}, "the_errors_hold_the_measures"),
         (
