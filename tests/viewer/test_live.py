@@ -1,0 +1,73 @@
+"""A live view shows the last step, where it is asked to be, and ends with its server."""
+
+from __future__ import annotations
+
+import base64
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import umsgpack
+from pages import CUP, Bodies, hand_at
+
+from overlapper import Placed, Sphere
+from overlapper.viewer import Viewer
+
+
+def test_a_live_view_is_seen_where_it_is_asked_to_be():
+    def listening(port):
+        """The addresses at which this machine answers on a port, as the kernel lists them."""
+        lines = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
+        return {at.partition(":")[0] for _, at, _, state, *_ in lines if state == "0A" and at.endswith(f":{port:04X}")}
+
+    for host, address in (("127.0.0.1", "0100007F"), ("0.0.0.0", "00000000")):
+        with Viewer(host=host) as viewer:
+            assert re.fullmatch(r"http://127\.0\.0\.1:\d+/static/", viewer.url)
+            assert listening(int(viewer.url.split(":")[2].split("/")[0])) == {address}
+            assert listening(int(viewer.visualizer.window.zmq_url.split(":")[2])) == {"0100007F"}
+    with pytest.raises(
+        ValueError, match=r"^host must be an address of this machine, not '192\.0\.2\.1': Cannot assign"
+    ):
+        Viewer(host="192.0.2.1")
+
+
+def live_paths(viewer: Viewer, command: str = "set_object") -> set[str]:
+    """The paths to which the server of a live view applies a command."""
+    messages = [
+        base64.b64decode(each)
+        for each in re.findall(r'fetch\(.data:[a-z/-]*;base64,([^"]+)"', viewer.visualizer.static_html())
+    ]
+    return {each["path"] for each in map(umsgpack.unpackb, messages) if each["type"] == command}
+
+
+def test_a_live_view_shows_the_last_step_and_ends_with_its_server():
+    for _ in range(2):
+        with Viewer() as viewer:
+            server = viewer._server.process
+            bodies = hand_at(0.12)
+            viewer.show(bodies, bodies.contacts())
+            arm, cup = "/overlapper/bodies/arm/hand/0", "/overlapper/bodies/cup/base/0"
+            assert live_paths(viewer) == {arm, cup, "/overlapper/overlaps/cup-arm.hand/1.34 dm³"}
+            viewer.show(Bodies({CUP: Placed(Sphere(0.1))}), [])
+            assert live_paths(viewer) == {cup}
+        assert server.returncode is not None
+
+
+def test_a_visualizer_passed_in_keeps_its_camera_and_its_server():
+    with Viewer() as owner:
+        empty = owner.visualizer.static_html()
+        with Viewer(owner.visualizer) as guest:
+            guest.show(hand_at(0.12), [])
+        assert owner._server.alive()
+        assert owner.visualizer.static_html() != empty
+        assert not live_paths(owner, "set_property")
+        owner.show(hand_at(0.12), [])
+        assert "/Cameras/default/rotated/<object>" in live_paths(owner, "set_property")
+
+
+def test_without_meshcat_one_sentence_says_what_to_install():
+    program = "import sys; sys.modules['meshcat'] = None; import overlapper.viewer"
+    failed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert failed.stderr.splitlines()[-1] == "ImportError: overlapper.viewer needs meshcat: pip install meshcat"
