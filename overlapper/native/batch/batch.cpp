@@ -316,12 +316,18 @@ std::vector<IndexPair> Batch::candidate_pairs(std::span<const double> positions,
 
 Overlaps Batch::overlaps(std::span<const double> positions, std::span<const double> orientations,
                          std::optional<std::span<const IndexPair>> given, bool separated, double tolerance,
-                         Method method, int threads, const std::function<bool()>& go_on, bool& finished) {
+                         Method method, int threads, bool& finished) {
   if (!(tolerance > 0 && tolerance < 1))
     throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
   Borrowed memory(*this);
   memory->place(positions, orientations);
-  if (!given) memory->tree.pairs(memory->enclosures, memory->candidates);
+  finished = true;
+  if (!given) try {
+      memory->tree.pairs(memory->enclosures, memory->candidates);
+    } catch (const Cancelled&) {
+      finished = false;
+      memory->candidates.clear();
+    }
   const std::span<const IndexPair> pairs = given ? *given : std::span<const IndexPair>(memory->candidates);
   Overlaps answer;
   answer.tolerance = tolerance;
@@ -332,18 +338,16 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
     return memory->done[i] && (separated || memory->next_rows[i].measures.status != Status::kSeparated);
   };
   memory->begin(pairs);
-  finished = true;
   for (size_t first = 0; finished && first < pairs.size(); first += kStretch) {
     const size_t count = std::min(kStretch, pairs.size() - first);
     memory->recall(pairs.subspan(first, count));
-    finished = for_each_in_parallel(
-        count, threads, [&](size_t i, int) { return memory->answer(first + i, tolerance, method); }, go_on);
+    finished = for_each_in_parallel(count, threads,
+                                    [&](size_t i, int) { return memory->answer(first + i, tolerance, method); });
     size_t rows = 0;
     for (size_t i = first; i < first + count; ++i) answer.examined += memory->done[i], rows += listed(i);
     if (first == 0) answer.reserve(separated ? pairs.size() : rows);
     for (size_t i = first; i < first + count; ++i)
       if (listed(i)) answer.append(pairs[i], memory->next_rows[i]);
-    finished = finished && (first + count == pairs.size() || go_on());
   }
   answer.planes_asked = memory->asked;
   if (finished) memory->keep(tolerance, method);

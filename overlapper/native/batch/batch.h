@@ -3,7 +3,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -68,11 +67,11 @@ class Batch {
   std::vector<IndexPair> candidate_pairs(std::span<const double> positions, std::span<const double> orientations);
 
   /// A row for each of `pairs`, or without them for each whose boxes meet, that overlaps or touches; for the others,
-  /// too, if the `separated` are wanted. The bits depend neither on `threads` nor on earlier calls. When `go_on`, asked
-  /// every 50 ms, says no, `finished` becomes false and only pairs that were done have rows.
+  /// too, if the `separated` are wanted. The bits depend neither on `threads` nor on earlier calls. Once the answer is
+  /// not wanted any more, `finished` becomes false and only pairs that were done have rows.
   Overlaps overlaps(std::span<const double> positions, std::span<const double> orientations,
                     std::optional<std::span<const IndexPair>> pairs, bool separated, double tolerance, Method method,
-                    int threads, const std::function<bool()>& go_on, bool& finished);
+                    int threads, bool& finished);
 
  private:
   struct Memory;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "geometry/cancellation.h"
 #include "geometry/rounding.h"
 #include "geometry/thresholds.h"
 
@@ -101,6 +102,7 @@ void BoxTree::fit(std::span<const Enclosure> bodies) {
 }
 
 void BoxTree::within(int node) {
+  cancellation_point();
   const Node& n = nodes_[node];
   if (n.second_half >= 0) {
     within(node + 1);
@@ -114,6 +116,7 @@ void BoxTree::within(int node) {
 }
 
 void BoxTree::between(int a, int b) {
+  cancellation_point();
   ++looked_at_;
   const Node &m = nodes_[a], &n = nodes_[b];
   if (!meet(m.box, n.box)) return;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
@@ -10,15 +9,17 @@
 #include <thread>
 #include <vector>
 
+#include "geometry/cancellation.h"
+
 namespace overlapper {
 
 /// Calls `work(i, thread)` for every i below `count`, on the calling thread and on `threads` - 1 others. They live for
 /// this call only, so that a process forked between calls lacks nothing. `work` returns false if it took long enough to
-/// look at the clock. Every 50 ms the calling thread asks `go_on()`; once that is false, no further i is begun, and so
-/// is the result. The exception of the least i is thrown again: blocks are begun in order, and all that were
-/// begun are finished.
-template <class Work, class GoOn>
-bool for_each_in_parallel(size_t count, int threads, const Work& work, const GoOn& go_on) {
+/// look at the clock. Once the answer is not wanted any more, no further i is begun, those under way are given up at
+/// their next cancellation point, and the result is false. The exception of the least i is thrown again: blocks are
+/// begun in order, and all that were begun are finished.
+template <class Work>
+bool for_each_in_parallel(size_t count, int threads, const Work& work) {
   constexpr size_t kBlock = 16;
   std::atomic<size_t> next{0};
   std::atomic<bool> stopped{false};
@@ -26,11 +27,13 @@ bool for_each_in_parallel(size_t count, int threads, const Work& work, const GoO
   std::exception_ptr failure;
   size_t failed_at = count;
 
-  const auto work_on = [&](int thread, const auto& pause) {
+  const auto work_on = [&](int thread) {
     for (size_t begin = next.fetch_add(kBlock); begin < count; begin = next.fetch_add(kBlock)) {
       const size_t end = std::min(begin + kBlock, count);
       for (size_t i = begin; i < end && !stopped.load(std::memory_order_relaxed); ++i) try {
-          if (!work(i, thread) || i + 1 == end) pause();
+          if (!work(i, thread) || i + 1 == end) cancellation::look_at_clock();
+        } catch (const Cancelled&) {
+          stopped = true;
         } catch (...) {
           const std::scoped_lock lock(mutex);
           if (i < failed_at) failed_at = i, failure = std::current_exception();
@@ -40,20 +43,12 @@ bool for_each_in_parallel(size_t count, int threads, const Work& work, const GoO
     }
   };
 
-  using Clock = std::chrono::steady_clock;
-  constexpr std::chrono::milliseconds kPatience(50);
-  auto due = Clock::now() + kPatience;
-  const auto ask = [&] {
-    if (Clock::now() < due) return;
-    if (!go_on()) stopped = true;
-    due = Clock::now() + kPatience;
-  };
-
   int working = static_cast<int>(std::min<size_t>(threads, (count + kBlock - 1) / kBlock)) - 1;
   std::condition_variable done;
   std::vector<std::jthread> others;
   const auto help = [&](int thread) {
-    work_on(thread, [] {});
+    cancellation::given_up = &stopped;
+    work_on(thread);
     const std::scoped_lock lock(mutex);
     if (--working == 0) done.notify_one();
   };
@@ -65,11 +60,15 @@ bool for_each_in_parallel(size_t count, int threads, const Work& work, const GoO
       working -= wanted - t + 1;
       break;
     }
-  work_on(0, ask);
+  work_on(0);
   for (std::unique_lock lock(mutex); working > 0;) {
-    if (done.wait_for(lock, kPatience, [&] { return working == 0; })) break;
+    if (done.wait_for(lock, cancellation::kPatience, [&] { return working == 0; })) break;
     lock.unlock();
-    ask();
+    try {
+      cancellation::look_at_clock();
+    } catch (const Cancelled&) {
+      stopped = true;
+    }
     lock.lock();
   }
   others.clear();

@@ -7,6 +7,7 @@
 #include "distance/box_axes.h"
 #include "distance/gjk.h"
 #include "distance/polytope_axes.h"
+#include "geometry/cancellation.h"
 #include "geometry/expanding_hull.h"
 #include "geometry/predicates.h"
 #include "geometry/rounding.h"
@@ -38,6 +39,7 @@ class DepthSearch {
     }
     if (!solid) return best_;
     for (int round = 0; round < kMaxRounds; ++round) {
+      cancellation_point();
       const int facet = least_facet();
       if (facet < 0) break;
       const Vec3 normal = normal_of(facet);

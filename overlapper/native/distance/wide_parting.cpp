@@ -9,6 +9,7 @@
 #include "distance/near_polytope.h"
 #include "distance/penetration.h"
 #include "distance/wide_gap.h"
+#include "geometry/cancellation.h"
 #include "geometry/thresholds.h"
 
 namespace overlapper {
@@ -97,6 +98,7 @@ class PolytopeSearch {
     consider_ridges();
     std::ranges::sort(candidates_, {}, &Candidate::least);
     for (const Candidate& candidate : candidates_) {
+      cancellation_point();
       // The rest are longer.
       if (candidate.least > way()) break;
       lower = std::min(lower, measured(candidate));
@@ -138,6 +140,7 @@ class PolytopeSearch {
       if (near(b_.ridges[j], a_)) of_b.push_back(j);
     std::vector<double> rises(b_.facets.size());
     for (int i = 0; i < static_cast<int>(a_.ridges.size()); ++i) {
+      cancellation_point();
       const NearRidge& ridge = a_.ridges[i];
       if (!near(ridge, b_)) continue;
       for (size_t f = 0; f < rises.size(); ++f) rises[f] = dot(b_.facets[f].normal, ridge.along);

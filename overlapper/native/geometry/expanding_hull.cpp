@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "geometry/cancellation.h"
 #include "geometry/predicates.h"
 #include "geometry/thresholds.h"
 
@@ -182,6 +183,7 @@ void ExpandingHull::collect_visible(int p, int seen) {
 }
 
 void ExpandingHull::insert(int p, int seen) {
+  cancellation_point();
   collect_visible(p, seen);
   link_cone(p);
   ++inserted_;
@@ -263,6 +265,7 @@ void ExpandingHull::hand_on_conflicts(int facet, int except, Wait wait_elsewhere
   int p = facets[facet].first_conflict;
   facets[facet].first_conflict = facets[facet].farthest_conflict = -1;
   while (p >= 0) {
+    cancellation_point();
     const int next = next_conflict_[p];
     if (p != except) wait_elsewhere(p);
     p = next;
@@ -304,6 +307,7 @@ bool ExpandingHull::rises_above_facet(int facet, int p, double fraction) const {
 }
 
 bool ExpandingHull::rises_above(int facet, int p, double fraction) {
+  cancellation_point();
   if (rises_above_facet(facet, p, fraction)) return true;
   collect_visible(p, facet);
   return std::any_of(removed_.begin(), removed_.end(), [&](int seen) { return rises_above_facet(seen, p, fraction); });
@@ -314,6 +318,7 @@ bool ExpandingHull::build(std::span<const double> negligible) {
   next_conflict_.assign(points.size(), -1);
   const std::array<int, 4> first_facets{0, 1, 2, 3};
   for (int p = 0; p < static_cast<int>(points.size()); ++p) {
+    cancellation_point();
     const int facet = first_that_sees(first_facets, p);
     if (facet >= 0) wait(facet, p);
   }

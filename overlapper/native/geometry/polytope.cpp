@@ -1,5 +1,6 @@
 #include "geometry/polytope.h"
 
+#include "geometry/cancellation.h"
 #include "geometry/predicates.h"
 
 namespace overlapper {
@@ -10,6 +11,7 @@ Polytope polar_dual(const ExpandingHull& hull) {
   for (int f = 0; f < static_cast<int>(hull.facets.size()); ++f) {
     const ExpandingHull::Facet& facet = hull.facets[f];
     if (facet.removed()) continue;
+    cancellation_point();
     const auto [a, b, c] = facet.vertex;
     vertex_of[f] = static_cast<int>(polytope.vertices.size());
     polytope.vertices.push_back(polar_vertex(hull.points[a], hull.points[b], hull.points[c]));
@@ -18,6 +20,7 @@ Polytope polar_dual(const ExpandingHull& hull) {
   polytope.ring_start.push_back(0);
   for (int p = 0; p < static_cast<int>(hull.points.size()); ++p) {
     if (at[p] < 0) continue;
+    cancellation_point();
     int f = at[p];
     do {
       polytope.ring.push_back(vertex_of[f]);
@@ -47,6 +50,7 @@ Moments moments(const Polytope& polytope) {
   sum.cone_volume.reserve(polytope.facets());
   sum.facet_centroid.reserve(polytope.facets());
   for (int f = 0; f < polytope.facets(); ++f) {
+    cancellation_point();
     const auto ring = polytope.facet(f);
     const Vec3 a = polytope.vertices[ring[0]];
     double cone = 0;

@@ -1,35 +1,56 @@
 #pragma once
 
-#include <cstdint>
-#include <unordered_map>
+#include <algorithm>
+#include <vector>
 
+#include "geometry/cancellation.h"
 #include "geometry/polytope.h"
 
 namespace overlapper {
 
-/// The facet on the other side of each directed ridge of a polytope.
+/// The directed ridges of a polytope by their ends: the number of each is its place in the polytope's `ring`.
 class Ridges {
  public:
   explicit Ridges(const Polytope& polytope)
-      : polytope_(polytope), count_(static_cast<int64_t>(polytope.vertices.size())) {
-    for (int f = 0; f < polytope.facets(); ++f) {
-      const auto ring = polytope.facet(f);
-      for (size_t i = 0; i < ring.size(); ++i) facet_left_of_[key(ring[i], ring[(i + 1) % ring.size()])] = f;
+      : polytope_(polytope), starts_(polytope.vertices.size() + 1, 0), heads_(polytope.ring.size()) {
+    const std::vector<int>& ring = polytope.ring;
+    facet_.reserve(ring.size());
+    for (int f = 0; f < polytope.facets(); ++f) facet_.insert(facet_.end(), polytope.facet(f).size(), f);
+    for (int from : ring) ++starts_[from + 1];
+    for (size_t v = 1; v < starts_.size(); ++v) starts_[v] += starts_[v - 1];
+    for (int place = 0; place < static_cast<int>(ring.size()); ++place)
+      heads_[starts_[ring[place]]++] = {ring[next(place)], place};
+    // Each start has moved on to the next one's.
+    for (size_t v = starts_.size() - 1; v > 0; --v) starts_[v] = starts_[v - 1];
+    starts_[0] = 0;
+    for (size_t v = 0; v + 1 < starts_.size(); ++v) {
+      cancellation_point();
+      std::sort(heads_.begin() + starts_[v], heads_.begin() + starts_[v + 1],
+                [](const Head& a, const Head& b) { return a.vertex < b.vertex; });
     }
   }
-  int left_of(int from, int to) const { return facet_left_of_.at(key(from, to)); }
-  int next_in(int facet, int vertex) const {
-    const auto ring = polytope_.facet(facet);
-    size_t i = 0;
-    while (ring[i] != vertex) ++i;
-    return ring[(i + 1) % ring.size()];
+
+  int number(int from, int to) const {
+    const auto begin = heads_.begin() + starts_[from], end = heads_.begin() + starts_[from + 1];
+    return std::lower_bound(begin, end, to, [](const Head& head, int vertex) { return head.vertex < vertex; })->place;
   }
+  int left_of(int from, int to) const { return facet_[number(from, to)]; }
+  /// The corner after `to` of the facet left of the ridge.
+  int after(int from, int to) const { return polytope_.ring[next(next(number(from, to)))]; }
 
  private:
-  int64_t key(int from, int to) const { return from * count_ + to; }
+  struct Head {
+    int vertex, place;
+  };
+
+  int next(int place) const {
+    const int facet = facet_[place];
+    return place + 1 < polytope_.ring_start[facet + 1] ? place + 1 : polytope_.ring_start[facet];
+  }
+
   const Polytope& polytope_;
-  int64_t count_;
-  std::unordered_map<int64_t, int> facet_left_of_;
+  std::vector<int> starts_, facet_;
+  std::vector<Head> heads_;
 };
 
 }  // namespace overlapper

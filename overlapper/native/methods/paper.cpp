@@ -1,13 +1,17 @@
 #include "methods/paper.h"
 
 #include <algorithm>
+#include <atomic>
 #include <future>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
+#include <thread>
 #include <unordered_set>
+#include <utility>
 
 #include "distance/gjk.h"
+#include "geometry/cancellation.h"
 #include "geometry/expanding_hull.h"
 #include "geometry/polytope.h"
 #include "geometry/predicates.h"
@@ -141,6 +145,7 @@ std::vector<int> planes_through(const ExpandingHull& dual, int face, std::span<c
   std::vector<int> planes, stack{face};
   std::unordered_set<int> seen{face};
   while (!stack.empty()) {
+    cancellation_point();
     const ExpandingHull::Facet& facet = dual.facets[stack.back()];
     stack.pop_back();
     planes.insert(planes.end(), facet.vertex.begin(), facet.vertex.end());
@@ -154,16 +159,19 @@ std::vector<int> planes_through(const ExpandingHull& dual, int face, std::span<c
 }
 
 /// The source plane that a facet of the second hull lies in: of those through its corners, the one that all corners fit
-/// best.
+/// best. `tried` has an element per plane, -1 before the first call.
 int plane_of_facet(const HullData& hull, int facet, std::span<const std::vector<int>> planes_at,
-                   std::span<const Plane> planes) {
+                   std::span<const Plane> planes, std::span<int> tried) {
   int best = -1;
   double least = std::numeric_limits<double>::infinity();
   for (int corner : hull.facet(facet)) {
     for (int p : planes_at[corner]) {
+      // Once for all corners that it passes through, and no further than up to one that it misses.
+      if (std::exchange(tried[p], facet) == facet) continue;
       double misfit = 0;
-      for (int v : hull.facet(facet))
-        misfit = std::max(misfit, std::abs(signed_distance(planes[p], hull.vertices[v] + hull.origin)));
+      const auto ring = hull.facet(facet);
+      for (size_t i = 0; i < ring.size() && misfit < least; ++i)
+        misfit = std::max(misfit, std::abs(signed_distance(planes[p], hull.vertices[ring[i]] + hull.origin)));
       if (misfit < least) least = misfit, best = p;
     }
   }
@@ -206,8 +214,11 @@ Intersection intersect_about(const Part& a, const Part& b, Vec3 origin) {
   for (int s : source)
     planes_at.push_back(planes_through(dual, face_of[s], vertex_of_face, 64 * rounding(extent_of_vertices)));
   Part part = placed_part({hull}, {{}, hull->origin}, -1);
-  for (int f = 0; f < static_cast<int>(part.owner.size()); ++f)
-    part.owner[f] = owner[plane_of_facet(*hull, f, planes_at, planes)];
+  std::vector<int> tried(planes.size(), -1);
+  for (int f = 0; f < static_cast<int>(part.owner.size()); ++f) {
+    cancellation_point();
+    part.owner[f] = owner[plane_of_facet(*hull, f, planes_at, planes, tried)];
+  }
   return {Status::kOverlapping, std::move(part)};
 }
 
@@ -223,19 +234,34 @@ Intersection intersect(const Part& a, const Part& b) {
   return intersect_about(a, b, point);
 }
 
+/// What another thread computes, which ends early if `given_up` tells it to.
+Intersection wait_for(std::future<Intersection>& answer, std::atomic<bool>& given_up) {
+  try {
+    while (answer.wait_for(cancellation::kPatience) == std::future_status::timeout) cancellation::look_at_clock();
+    return answer.get();
+  } catch (const Cancelled&) {
+    given_up = true;
+    throw;
+  }
+}
+
 /// Step 6. A level's pairs run side by side; a body without a partner waits for the next level.
 Intersection intersect_tree(std::vector<Part> parts) {
   while (parts.size() > 1) {
+    std::atomic<bool> given_up{false};
     std::vector<std::future<Intersection>> pairs;
     for (size_t i = 0; i + 1 < parts.size(); i += 2) {
       // The last pair of a level is computed here, when it is asked for, so that one pair alone costs no thread.
       const auto policy = i + 3 < parts.size() ? std::launch::async : std::launch::deferred;
-      pairs.push_back(std::async(policy, [&parts, i] { return intersect(parts[i], parts[i + 1]); }));
+      pairs.push_back(std::async(policy, [&, i, asking = std::this_thread::get_id()] {
+        if (std::this_thread::get_id() != asking) cancellation::given_up = &given_up;
+        return intersect(parts[i], parts[i + 1]);
+      }));
     }
     std::vector<Part> next;
     Status worst = Status::kOverlapping;
     for (auto pair = pairs.rbegin(); pair != pairs.rend(); ++pair) {
-      Intersection common = pair->get();
+      Intersection common = wait_for(*pair, given_up);
       worst = std::min(worst, common.status);
       next.push_back(std::move(common.part));
     }

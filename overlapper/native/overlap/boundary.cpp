@@ -1,11 +1,10 @@
 #include "overlap/boundary.h"
 
-#include <cstdint>
 #include <limits>
 #include <numeric>
-#include <unordered_map>
 #include <utility>
 
+#include "geometry/cancellation.h"
 #include "geometry/ridges.h"
 
 namespace overlapper {
@@ -15,11 +14,10 @@ namespace {
 /// outside.
 void walk_around_patches(const Polytope& polytope, std::span<const Region::Facet> facets, const Ridges& ridges,
                          int owner, std::vector<std::vector<int>>& loops) {
-  std::unordered_map<int, std::vector<int>>
-      open;  // vertices that begin border ridges not yet walked, and where they lead
   const auto mine = [&](int facet) { return facets[facet].owner == owner; };
   std::vector<std::pair<int, int>> border;
   for (int f = 0; f < polytope.facets(); ++f) {
+    cancellation_point();
     if (!mine(f)) continue;
     const auto ring = polytope.facet(f);
     for (size_t i = 0; i < ring.size(); ++i) {
@@ -27,22 +25,17 @@ void walk_around_patches(const Polytope& polytope, std::span<const Region::Facet
       if (!mine(ridges.left_of(to, from))) border.push_back({from, to});
     }
   }
-  std::unordered_map<int64_t, bool> walked;
-  const int64_t n = static_cast<int64_t>(polytope.vertices.size());
+  std::vector<char> walked(polytope.ring.size(), false);
   for (const auto& [first_from, first_to] : border) {
-    if (walked[first_from * n + first_to]) continue;
+    if (walked[ridges.number(first_from, first_to)]) continue;
     std::vector<int> loop;
     int from = first_from, to = first_to;
-    while (!walked[from * n + to]) {
-      walked[from * n + to] = true;
+    while (!std::exchange(walked[ridges.number(from, to)], true)) {
+      cancellation_point();
       loop.push_back(from);
       // At the head, turn through the facets of this owner until the next ridge has another on its far side.
-      int facet = ridges.left_of(from, to);
-      int next = ridges.next_in(facet, to);
-      while (mine(ridges.left_of(next, to))) {
-        facet = ridges.left_of(next, to);
-        next = ridges.next_in(facet, to);
-      }
+      int next = ridges.after(from, to);
+      while (mine(ridges.left_of(next, to))) next = ridges.after(next, to);
       from = to;
       to = next;
     }
@@ -68,6 +61,7 @@ std::vector<int> merge_vertices(const Region& region, int& groups) {
     return v;
   };
   for (int f = 0; f < p.facets(); ++f) {
+    cancellation_point();
     const auto ring = p.facet(f);
     for (size_t i = 0; i < ring.size(); ++i) {
       const int u = ring[i], v = ring[(i + 1) % ring.size()];
@@ -91,6 +85,7 @@ std::vector<int> representatives(const Polytope& p, std::span<const int> group, 
       if (members[group[v]].size() > 1) facets_of[group[v]].push_back(f);
   std::vector<int> chosen(groups);
   for (int g = 0; g < groups; ++g) {
+    cancellation_point();
     double least = std::numeric_limits<double>::infinity();
     for (int v : members[g]) {
       double misfit = 0;
@@ -127,6 +122,7 @@ Boundary boundary_of(const Region& region, int bodies) {
         std::max(boundary.merged, norm(region.frame.axes * (p.vertices[v] - p.vertices[chosen[group[v]]])));
   boundary.ring_start.push_back(0);
   for (int f = 0; f < p.facets(); ++f) {
+    cancellation_point();
     const std::vector<int> ring = contracted(p.facet(f), group);
     if (ring.empty()) continue;
     boundary.ring.insert(boundary.ring.end(), ring.begin(), ring.end());

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/cancellation.h"
 #include "geometry/ridges.h"
 #include "methods/dual/wide_dual.h"
 
@@ -41,6 +42,7 @@ double misfit(const Polytope& p, const Ridges& ridges) {
   const auto off = [&](int facet, int vertex) { return dot(p.dual[facet], p.vertices[vertex]) - 1; };
   double worst = 0, product = 0;
   for (int f = 0; f < p.facets(); ++f) {
+    cancellation_point();
     const auto ring = p.facet(f);
     for (size_t i = 0; i < ring.size(); ++i) {
       const int from = ring[i], to = ring[(i + 1) % ring.size()], next = ring[(i + 2) % ring.size()];
@@ -145,6 +147,7 @@ class Sandwich {
     }
     std::vector<double> areas;
     for (size_t f = 0; f < facets_.size(); ++f) {
+      cancellation_point();
       const Seen& facet = facets_[f];
       const auto ring = region_.polytope.facet(static_cast<int>(f));
       double around = 0;
@@ -169,6 +172,7 @@ class Sandwich {
   std::vector<double> doubtful_beside_smooth() const {
     std::vector<double> areas;
     for (size_t f = 0; f < facets_.size(); ++f) {
+      cancellation_point();
       const std::vector<Vec3> corners = polygon(f);
       double doubtful = beside_smooth(corners, facets_[f]) ? kInfinity : 0;
       const auto ring = region_.polytope.facet(static_cast<int>(f));
@@ -333,6 +337,7 @@ double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b) {
   double farthest = 0;
   for (const auto& [from, to] : {std::pair(a, b), std::pair(b, a)}) {
     for (Vec3 p : from) {
+      cancellation_point();
       double nearest = kInfinity;
       for (Vec3 q : to) nearest = std::min(nearest, norm2(p - q));
       farthest = std::max(farthest, nearest);

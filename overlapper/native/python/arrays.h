@@ -23,6 +23,13 @@ using Matrix = nb::ndarray<nb::numpy, const double, nb::ndim<2>>;
 using Indices = nb::ndarray<nb::numpy, const int, nb::ndim<1>>;
 using IndexMatrix = nb::ndarray<nb::numpy, const int, nb::ndim<2>>;
 
+/// What `compute` returns; other Python threads run meanwhile.
+template <class Compute>
+decltype(auto) unlocked(Compute compute) {
+  const nb::gil_scoped_release release;
+  return compute();
+}
+
 /// Hands a vector over to numpy, which frees it.
 template <class Array, class T>
 Array to_numpy(std::vector<T> values, std::initializer_list<size_t> shape) {

@@ -46,11 +46,6 @@ int to_threads(nb::handle given) {
   return threads;
 }
 
-bool go_on() {
-  const nb::gil_scoped_acquire acquire;
-  return PyErr_CheckSignals() == 0;
-}
-
 nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orientations, nb::handle pairs,
                           nb::handle tolerance_given, nb::handle threads_given, nb::handle method_name,
                           bool separated) {
@@ -67,7 +62,7 @@ nb::object batch_overlaps(Batch& batch, nb::handle positions, nb::handle orienta
   Overlaps found;
   {
     const nb::gil_scoped_release release;
-    found = batch.overlaps(p, q, span, given && separated, tolerance, method, threads, go_on, finished);
+    found = batch.overlaps(p, q, span, given && separated, tolerance, method, threads, finished);
   }
   nb::object answer = nb::cast(std::move(found));
   if (finished) return answer;

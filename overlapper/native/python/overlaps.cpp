@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "distance/gjk.h"
 #include "distance/penetration.h"
 #include "overlap/overlap.h"
@@ -47,6 +49,19 @@ nb::object overlap_of_pair(nb::handle type, const Placed& a, const Placed& b) {
   return answer;
 }
 
+/// What `compute` returns of such bodies; other Python threads run meanwhile unless it is quick.
+template <class Compute>
+decltype(auto) computed_of(std::span<const Placed> bodies, Compute compute) {
+  if (std::ranges::all_of(bodies, [](const Placed& body) { return quick(body.shape); })) return compute();
+  return unlocked(compute);
+}
+
+/// What an overlap answers, and may have to compute first.
+template <class Answer>
+Answer computed(const Overlap& o, Answer (Overlap::*ask)() const) {
+  return computed_of(o.bodies(), [&]() -> Answer { return (o.*ask)(); });
+}
+
 /// Computes what the properties are about to read while other Python threads run.
 const Overlap& measured(const Overlap& o) {
   if (solid(o) && !o.measured_at_once()) {
@@ -74,7 +89,7 @@ void contact_property(nb::class_<Overlap>& cls, const char* name, Given given, G
       name,
       [given, getter](const Overlap& o) -> nb::object {
         if (!o.pair() || !given(o)) return nb::none();
-        return nb::cast(getter(o.contact()), nb::rv_policy::move);
+        return nb::cast(getter(computed(o, &Overlap::contact)), nb::rv_policy::move);
       },
       sig, doc);
 }
@@ -82,8 +97,9 @@ void contact_property(nb::class_<Overlap>& cls, const char* name, Given given, G
 std::string repr(const Overlap& o) {
   std::string text = "Overlap(" + std::string(status_name(o.status()));
   if (solid(o)) text += ", volume=" + number(o.volume()) + " ± " + number(o.volume_error()) + " m³";
-  if (o.pair() && solid(o)) text += ", depth=" + number(o.contact().depth) + " m";
-  if (o.pair() && o.status() == Status::kSeparated) text += ", distance=" + number(o.contact().distance) + " m";
+  if (o.pair() && solid(o)) text += ", depth=" + number(computed(o, &Overlap::contact).depth) + " m";
+  if (o.pair() && o.status() == Status::kSeparated)
+    text += ", distance=" + number(computed(o, &Overlap::contact).distance) + " m";
   return text + ", " + std::to_string(o.bodies().size()) + " bodies)";
 }
 
@@ -124,7 +140,7 @@ void define_measures(nb::class_<Overlap>& cls) {
   cls.def_prop_ro(
       "volume", [](const Overlap& o) { return measured(o).volume(); }, "m³, the best estimate; 0 unless overlapping.");
   cls.def_prop_ro(
-      "volume_error", [](const Overlap& o) { return measured(o).volume_error(); },
+      "volume_error", [](const Overlap& o) { return computed(o, &Overlap::volume_error); },
       R"(m³, certified: the true volume is within volume ± volume_error.
 
 For polyhedra it bounds the rounding: every plane moved by 16 half-ulps of the coordinates' magnitude, times the
@@ -148,14 +164,14 @@ arithmetic from the shapes' own numbers, as were centroid, area, inertia and gra
       "(3,) centre of the common volume, m; None unless overlapping.");
   array_property(
       cls, "inertia",
-      [](const Overlap& o) { return solid(o) ? to_numpy(measured(o).inertia()) : to_numpy(Mat3{{}, {}, {}}); },
+      [](const Overlap& o) { return solid(o) ? to_numpy(computed(o, &Overlap::inertia)) : to_numpy(Mat3{{}, {}, {}}); },
       "(3, 3) inertia tensor about the centroid at unit density, world axes, m⁵ (trimesh's moment_inertia); zeros "
       "unless overlapping.");
   array_property(
       cls, "gradient",
       [](const Overlap& o) {
         std::vector<double> values;
-        for (const auto& row : o.gradient()) values.insert(values.end(), row.begin(), row.end());
+        for (const auto& row : computed(o, &Overlap::gradient)) values.insert(values.end(), row.begin(), row.end());
         return to_numpy<Matrix>(std::move(values), {o.bodies().size(), 6});
       },
       R"((m, 6) d volume / d (translation, rotation vector about the body's own position) of each body, world axes: the area vector
@@ -228,27 +244,34 @@ overlapping.)");
 
 void define_boundary(nb::class_<Overlap>& cls) {
   array_property(
-      cls, "vertices", [](const Overlap& o) { return solid(o) ? to_numpy(o.boundary().vertices) : empty_rows(3); },
+      cls, "vertices",
+      [](const Overlap& o) { return solid(o) ? to_numpy(computed(o, &Overlap::boundary).vertices) : empty_rows(3); },
       "(n, 3) corners of the common polytope, m; empty unless overlapping.");
   array_property(
       cls, "faces",
       [](const Overlap& o) {
-        return solid(o) ? triangles(o.boundary()) : to_numpy<IndexMatrix>(std::vector<int>{}, {0, 3});
+        return solid(o) ? triangles(computed(o, &Overlap::boundary))
+                        : to_numpy<IndexMatrix>(std::vector<int>{}, {0, 3});
       },
       "(k, 3) the facets as triangles, counter-clockwise from outside: indices into vertices.");
   cls.def_prop_ro(
       "facets",
-      [](const Overlap& o) { return solid(o) ? polygons(o.boundary().ring, o.boundary().ring_start) : nb::list(); },
+      [](const Overlap& o) {
+        return solid(o) ? polygons(computed(o, &Overlap::boundary).ring, computed(o, &Overlap::boundary).ring_start)
+                        : nb::list();
+      },
       nb::sig("def facets(self) -> list[numpy.typing.NDArray[numpy.int32]]"),
       "Indices of the vertices around each facet, counter-clockwise from outside.");
   array_property(
       cls, "halfspaces",
-      [](const Overlap& o) { return solid(o) ? halfspace_rows(o.boundary().planes) : empty_rows(4); },
+      [](const Overlap& o) {
+        return solid(o) ? halfspace_rows(computed(o, &Overlap::boundary).planes) : empty_rows(4);
+      },
       "(f, 4) rows [n, b], one per facet: n · x + b <= 0 inside, n unit (scipy's form).");
   array_property(
       cls, "owner",
       [](const Overlap& o) {
-        return to_numpy(std::span<const int>(solid(o) ? o.boundary().owner : std::vector<int>{}));
+        return to_numpy(std::span<const int>(solid(o) ? computed(o, &Overlap::boundary).owner : std::vector<int>{}));
       },
       "(f,) which of the shapes each facet belongs to.");
   cls.def_prop_ro(
@@ -256,7 +279,8 @@ void define_boundary(nb::class_<Overlap>& cls) {
       [](const Overlap& o) {
         nb::list list;
         if (solid(o))
-          for (const auto& polygon : o.boundary().patch) list.append(nb::cast(to_numpy(polygon), nb::rv_policy::move));
+          for (const auto& polygon : computed(o, &Overlap::boundary).patch)
+            list.append(nb::cast(to_numpy(polygon), nb::rv_policy::move));
         return list;
       },
       nb::sig("def patch(self) -> list[numpy.typing.NDArray[numpy.float64]]"),
@@ -266,7 +290,7 @@ counter-clockwise around a's part of the surface; for more bodies, around the pa
       "bounds",
       [](const Overlap& o) -> nb::object {
         if (!solid(o)) return nb::none();
-        const auto& vertices = o.boundary().vertices;
+        const auto& vertices = computed(o, &Overlap::boundary).vertices;
         Bounds box{vertices[0], vertices[0]};
         for (Vec3 v : vertices) box = {min(box.lower, v), max(box.upper, v)};
         return nb::cast(to_numpy(box), nb::rv_policy::move);
@@ -316,13 +340,14 @@ round bodies, integrated. 'dual hull': the convex hull of dual points. 'wide ...
 enough. 'doubt': not even these tell whether there is an inside, so that the bodies are said to touch. 'paper': the
 method asked for.)");
   cls.def_prop_ro(
-      "facets_touched", [](const Overlap& o) { return o.facets_touched(); },
+      "facets_touched", [](const Overlap& o) { return computed(o, &Overlap::facets_touched); },
       "How many planes of the shapes took part in the measures.");
   cls.def_prop_ro(
       "errors",
       [](const Overlap& o) {
-        const nb::gil_scoped_release release;
-        return ErrorsOf{o.errors(), solid(o), o.pair() ? std::optional(o.contact_errors()) : std::nullopt};
+        return computed_of(o.bodies(), [&] {
+          return ErrorsOf{o.errors(), solid(o), o.pair() ? std::optional(o.contact_errors()) : std::nullopt};
+        });
       },
       R"(How far each figure may be off, as `volume_error` is that of the volume. It costs about as much as all figures
 together.)");
@@ -361,7 +386,7 @@ volume in m³. Raises CertificateError where there is none.)");
 }
 
 /// In the order and from the reference of an Overlap, so that both say the same to the last bit.
-std::pair<Placed, Placed> relative_pair(nb::handle a, nb::handle b) {
+std::array<Placed, 2> relative_pair(nb::handle a, nb::handle b) {
   const std::array<Placed, 2> pair{to_placed(a, "a"), to_placed(b, "b")};
   const std::vector<int> order = canonical_order(pair);
   const Placed &first = pair[order[0]], &second = pair[order[1]];
@@ -370,7 +395,8 @@ std::pair<Placed, Placed> relative_pair(nb::handle a, nb::handle b) {
 
 /// Of a pair whose status doubles alone do not know, or whose contact they do not know well enough.
 Contact contact_in_doubt(nb::handle a, nb::handle b) {
-  return Overlap(to_placed(a, "a"), to_placed(b, "b"), 1e-3, Method::kAuto).contact();
+  const std::array pair{to_placed(a, "a"), to_placed(b, "b")};
+  return computed_of(pair, [&] { return Overlap(pair[0], pair[1], 1e-3, Method::kAuto).contact(); });
 }
 
 double union_ratio(nb::handle a, nb::handle b, double tolerance) {
@@ -411,8 +437,9 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
   m.def(
       "distance",
       [](nb::handle a, nb::handle b) {
-        const auto [p, q] = relative_pair(a, b);
-        const Distance d = distance(p, q);
+        const auto pair = relative_pair(a, b);
+        const auto& [p, q] = pair;
+        const Distance d = computed_of(pair, [&] { return distance(pair[0], pair[1]); });
         if (!in_doubt(d.gap, p, q)) return d.distance;
         if (norm2(d.normal) > 0 && !in_doubt(-d.distance, p, q)) return 0.0;
         return contact_in_doubt(a, b).distance;
@@ -426,8 +453,9 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
   m.def(
       "penetration_depth",
       [](nb::handle a, nb::handle b) {
-        const auto [p, q] = relative_pair(a, b);
-        const double depth = penetration(p, q).depth;
+        const auto pair = relative_pair(a, b);
+        const auto& [p, q] = pair;
+        const double depth = computed_of(pair, [&] { return penetration(pair[0], pair[1]).depth; });
         if (!in_doubt(-depth, p, q)) return 0.0;
         return in_doubt(depth, p, q) || has_rims(p, q) ? contact_in_doubt(a, b).depth : depth;
       },

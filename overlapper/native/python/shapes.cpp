@@ -36,7 +36,8 @@ Shape to_shape(nb::handle value, const std::string& name) {
     throw nb::type_error((name + " must be a shape or an (n, 3) array of points, not " +
                           nb::cast<std::string>(value.type().attr("__name__")))
                              .c_str());
-  return make_hull(to_rows(value, name));
+  const std::vector<Vec3> points = to_rows(value, name);
+  return unlocked([&] { return make_hull(points); });
 }
 
 Placed to_placed(nb::handle value, const std::string& name) {
@@ -160,7 +161,9 @@ Hull hull_from_state(nb::handle given) {
   const auto index = [&](std::int64_t i) { return i >= 0 && i <= kMost ? static_cast<int>(i) : -1; };
   for (size_t i = 0; i < flat.size(); i += 3)
     triangles.push_back({index(flat[i]), index(flat[i + 1]), index(flat[i + 2])});
-  const Hull hull = hull_of_surface(to_vec3(state[0], "origin"), to_rows(state[5], "corners"), triangles);
+  const Vec3 origin = to_vec3(state[0], "origin");
+  const std::vector<Vec3> corners = to_rows(state[5], "corners");
+  const Hull hull = unlocked([&] { return hull_of_surface(origin, corners, triangles); });
   const nb::tuple anew = hull_state(hull);
   for (size_t i = 0; i < 8; ++i)
     if (!equal(state[i], anew[i])) throw nb::value_error(kNoHull);
@@ -248,7 +251,11 @@ As in pybullet, `length` lies between the centres of the caps; it may be 0.)");
 Interior, duplicate and coplanar points are welcome; coplanar triangles become one facet. Raises
 ValueError for fewer than four points, for points that are not finite and for points in one plane.)");
   hull.def(
-      "__init__", [](Hull* self, nb::handle vertices) { new (self) Hull(make_hull(to_rows(vertices, "vertices"))); },
+      "__init__",
+      [](Hull* self, nb::handle vertices) {
+        const std::vector<Vec3> points = to_rows(vertices, "vertices");
+        new (self) Hull(unlocked([&] { return make_hull(points); }));
+      },
       "vertices"_a.none(), nb::sig("def __init__(self, vertices: numpy.typing.ArrayLike) -> None"));
   array_property(
       hull, "vertices", [](const Hull& h) { return to_numpy(h.data->vertices, h.data->origin); },
@@ -288,7 +295,9 @@ for Hull and Sphere. Method "paper" does not take it, and it has no certificate.
   rounded.def(
       "__init__",
       [](RoundedHull* self, nb::handle vertices, nb::handle radius) {
-        new (self) RoundedHull(make_rounded_hull(to_rows(vertices, "vertices"), to_double(radius, "radius")));
+        const std::vector<Vec3> points = to_rows(vertices, "vertices");
+        const double of_ball = to_double(radius, "radius");
+        new (self) RoundedHull(unlocked([&] { return make_rounded_hull(points, of_ball); }));
       },
       "vertices"_a.none(), "radius"_a.none(),
       nb::sig("def __init__(self, vertices: numpy.typing.ArrayLike, radius: float) -> None"));

@@ -7,6 +7,7 @@
 #include <string>
 #include <unordered_map>
 
+#include "geometry/cancellation.h"
 #include "geometry/expanding_hull.h"
 #include "geometry/predicates.h"
 #include "geometry/wide.h"
@@ -89,6 +90,7 @@ struct CoplanarRegions {
     while (!stack.empty()) {
       const int t = stack.back();
       stack.pop_back();
+      cancellation_point();
       for (int other : hull.facets[t].neighbour) {
         if (region[other] >= 0) continue;
         // The far side of a plate thinner than rounding is another facet.
@@ -107,8 +109,10 @@ CoplanarRegions merge_coplanar(const ExpandingHull& hull, double rounding) {
   std::vector<int> by_area;
   for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t)
     if (!hull.facets[t].removed()) by_area.push_back(t);
-  std::sort(by_area.begin(), by_area.end(),
-            [&](int a, int b) { return norm2(hull.facets[a].normal) > norm2(hull.facets[b].normal); });
+  std::sort(by_area.begin(), by_area.end(), [&](int a, int b) {
+    cancellation_point();
+    return norm2(hull.facets[a].normal) > norm2(hull.facets[b].normal);
+  });
   for (int t : by_area)
     if (regions.region[t] < 0) regions.grow(t);
   return regions;
@@ -123,6 +127,7 @@ std::vector<std::vector<int>> region_loops(const CoplanarRegions& regions) {
   std::vector<std::vector<Ridge>> border(regions.first.size());
   for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t) {
     if (hull.facets[t].removed()) continue;
+    cancellation_point();
     for (int i = 0; i < 3; ++i)
       if (regions.region[hull.facets[t].neighbour[i]] != regions.region[t])
         border[regions.region[t]].push_back({hull.facets[t].vertex[i], hull.facets[t].vertex[(i + 1) % 3]});
@@ -130,6 +135,7 @@ std::vector<std::vector<int>> region_loops(const CoplanarRegions& regions) {
   std::vector<std::vector<int>> loops(border.size());
   std::vector<int> next(hull.points.size(), -1);
   for (int r = 0; r < static_cast<int>(border.size()); ++r) {
+    cancellation_point();
     if (border[r].empty()) continue;
     for (const Ridge& ridge : border[r]) next[ridge.from] = ridge.to;
     const int begin = border[r][0].from;
@@ -148,6 +154,7 @@ void drop_edge_points(std::vector<std::vector<int>>& loops, int points) {
   for (const auto& loop : loops)
     for (int v : loop) ++facets_at[v];
   for (auto& loop : loops) {
+    cancellation_point();
     std::erase_if(loop, [&](int v) { return facets_at[v] < 3; });
     if (loop.size() < 3) loop.clear();
   }
@@ -178,6 +185,7 @@ std::vector<std::array<int, 3>> exact_corners(const CoplanarRegions& regions) {
   for (int t : regions.first) corners.push_back(hull.facets[t].vertex);
   for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t) {
     if (hull.facets[t].removed() || regions.first[regions.region[t]] == t) continue;
+    cancellation_point();
     std::array<int, 3>& corner = corners[regions.region[t]];
     if (corner[0] < 0) continue;
     const auto [a, b, c] = corner;
@@ -194,6 +202,7 @@ HullData hull_data(const CoplanarRegions& regions, const std::vector<std::vector
   data.origin = origin;
   std::vector<int> index(hull.points.size(), -1);
   for (const auto& loop : loops) {
+    cancellation_point();
     if (loop.empty()) continue;
     for (int p : loop) {
       if (index[p] < 0) {
@@ -208,6 +217,7 @@ HullData hull_data(const CoplanarRegions& regions, const std::vector<std::vector
   std::vector<int> corner(hull.points.size(), -1);
   for (const ExpandingHull::Facet& facet : hull.facets) {
     if (facet.removed()) continue;
+    cancellation_point();
     std::array<int, 3> triangle;
     for (int i = 0; i < 3; ++i) {
       const int p = facet.vertex[i];
@@ -222,6 +232,7 @@ HullData hull_data(const CoplanarRegions& regions, const std::vector<std::vector
   const std::vector<std::array<int, 3>> exact = exact_corners(regions);
   for (int r = 0; r < static_cast<int>(loops.size()); ++r) {
     if (loops[r].empty()) continue;
+    cancellation_point();
     const auto& [a, b, c] = exact[r];
     data.facet_corners.push_back(a < 0 ? exact[r] : std::array{corner[a], corner[b], corner[c]});
     data.planes.push_back(supporting_plane(data.vertices, data.facet(static_cast<int>(data.planes.size()))));
@@ -231,15 +242,29 @@ HullData hull_data(const CoplanarRegions& regions, const std::vector<std::vector
 
 std::vector<Edge> edges_of(const HullData& data) {
   struct Side {
-    int from, to, facet;
+    int from, to, facet, number;
   };
-  std::vector<Side> sides;
-  for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
-    const auto ring = data.facet(f);
-    for (size_t i = 0; i < ring.size(); ++i) sides.push_back({ring[i], ring[(i + 1) % ring.size()], f});
-  }
   const auto ends = [](const Side& s) { return std::minmax(s.from, s.to); };
-  std::stable_sort(sides.begin(), sides.end(), [&](const Side& a, const Side& b) { return ends(a) < ends(b); });
+  std::vector<Side> sides(data.ring.size());
+  // By the lower of both ends, counting how often each is that; then by the other, of which there are few to each.
+  std::vector<int> starts(data.vertices.size() + 1, 0);
+  const auto for_each_side = [&](auto use) {
+    for (int f = 0, number = 0; f < static_cast<int>(data.planes.size()); ++f) {
+      cancellation_point();
+      const auto ring = data.facet(f);
+      for (size_t i = 0; i < ring.size(); ++i) use(Side{ring[i], ring[(i + 1) % ring.size()], f, number++});
+    }
+  };
+  for_each_side([&](const Side& s) { ++starts[ends(s).first + 1]; });
+  for (size_t v = 1; v < starts.size(); ++v) starts[v] += starts[v - 1];
+  for_each_side([&](const Side& s) { sides[starts[ends(s).first]++] = s; });
+  // Each start has moved on to the next one's.
+  for (size_t v = 0, begin = 0; v < data.vertices.size(); begin = starts[v++]) {
+    cancellation_point();
+    std::sort(sides.begin() + begin, sides.begin() + starts[v], [&](const Side& a, const Side& b) {
+      return std::pair(ends(a).second, a.number) < std::pair(ends(b).second, b.number);
+    });
+  }
   std::vector<Edge> edges;
   for (size_t i = 0; i < sides.size(); i += 2) {
     const bool paired = i + 1 < sides.size() && sides[i].from == sides[i + 1].to && sides[i].to == sides[i + 1].from;
@@ -283,9 +308,13 @@ namespace {
 double rise_over_edges(const HullData& data, double rounding) {
   const auto side = [](int from, int to) { return static_cast<std::uint64_t>(from) << 32 | static_cast<unsigned>(to); };
   std::unordered_map<std::uint64_t, int> across;
-  for (const Edge& e : data.edges) across[side(e.from, e.to)] = e.right, across[side(e.to, e.from)] = e.left;
+  for (const Edge& e : data.edges) {
+    cancellation_point();
+    across[side(e.from, e.to)] = e.right, across[side(e.to, e.from)] = e.left;
+  }
   double highest = 0;
   for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
+    cancellation_point();
     const auto ring = data.facet(f);
     for (size_t i = 0; i < ring.size(); ++i) {
       const auto found = across.find(side(ring[i], ring[(i + 1) % ring.size()]));
@@ -302,12 +331,16 @@ void complete(HullData& data) {
   data.edges = edges_of(data);
   std::vector<std::vector<int>> around(data.vertices.size());
   for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
+    cancellation_point();
     for (int v : data.facet(f)) {
       around[v].push_back(f);
       data.flatness = std::max(data.flatness, -signed_distance(data.planes[f], data.vertices[v]));
     }
   }
-  for (const auto& facets : around) data.facets_meet.push_back(well_spread(facets, data.planes));
+  for (const auto& facets : around) {
+    cancellation_point();
+    data.facets_meet.push_back(well_spread(facets, data.planes));
+  }
   for (Vec3 v : data.vertices) data.radius = std::max(data.radius, norm(v));
   data.flatness = std::max(data.flatness, rise_over_edges(data, 256 * DBL_EPSILON * data.radius + 4 * data.flatness));
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "geometry/cancellation.h"
 #include "geometry/thresholds.h"
 #include "shapes/shape.h"
 
@@ -172,6 +173,7 @@ bool link(const HullData& hull, HullGraph& graph) {
   graph.beside.resize(edges);
   graph.leaving.assign(vertices, -1);
   for (int h = 0; h < edges; ++h) {
+    cancellation_point();
     const int from = hull.ring[h], to = hull.ring[graph.next[h]];
     graph.leaving[from] = h;
     // The smaller of the degrees at both ends of an edge, summed over those of a planar graph, is in proportion to
@@ -196,6 +198,7 @@ bool link(const HullData& hull, HullGraph& graph) {
 /// True if no facet rises above the one beside it by more than `rounding`.
 bool convex(const HullData& hull, const HullGraph& graph, double rounding) {
   for (int h = 0; h < static_cast<int>(hull.ring.size()); ++h) {
+    cancellation_point();
     const int other = graph.beside[h];
     const size_t edge = graph.twin[h] - hull.ring_start[other];
     if (rise_beside(hull, hull.planes[graph.facet[h]], hull.facet(other), edge, rounding) > rounding) return false;
@@ -242,15 +245,20 @@ void fill_maps(const HullData& hull, HullGraph& graph) {
   if (vertices > kMostScanned) {
     DirectionMap map(vertices);
     int v = 0;
-    for (int cell = 0; cell < map.cells(); ++cell) map.set(cell, v = graph.farthest_vertex(hull, map.centre(cell), v));
+    for (int cell = 0; cell < map.cells(); ++cell) {
+      cancellation_point();
+      map.set(cell, v = graph.farthest_vertex(hull, map.centre(cell), v));
+    }
     graph.vertex_near = std::move(map);
   }
   if (facets > kMostScanned) {
     DirectionMap map(facets);
     int f = 0;
     double gauge;
-    for (int cell = 0; cell < map.cells(); ++cell)
+    for (int cell = 0; cell < map.cells(); ++cell) {
+      cancellation_point();
       map.set(cell, f = graph.facet_towards(hull, hull.centroid + map.centre(cell), gauge, f));
+    }
     graph.facet_near = std::move(map);
   }
 }

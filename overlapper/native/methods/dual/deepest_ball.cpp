@@ -4,6 +4,7 @@
 #include <limits>
 #include <numeric>
 
+#include "geometry/cancellation.h"
 #include "geometry/rounding.h"
 #include "methods/dual/basis.h"
 
@@ -75,6 +76,7 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double>
   constexpr int kMaxRounds = 256;
   const double largest_reach = *std::max_element(reach.begin(), reach.end());
   for (int round = 0; round < kMaxRounds; ++round) {
+    cancellation_point(planes.size());
     const auto [centre, radius] = basis.ball();
     // At a nearly singular corner the centre runs away, and both figures with it.
     const OwnedPlane worst = tightest(bodies, planes, centre);
@@ -196,6 +198,7 @@ class AnalyticCentre {
 
   void settle(std::span<const Owned<AnyPlane>> planes) {
     for (int step = 0; step < kMaxSteps; ++step) {
+      cancellation_point(planes.size());
       std::vector<Vec3> a;
       Vec3 nearest{1, 0, 0};
       double closest = kInfinity;
@@ -237,6 +240,7 @@ FrameAbout<PointOf<Body>> round_frame(std::span<const Body> bodies, std::span<co
   AnalyticCentre<PlaneOf<Body>> centre(safe);
   constexpr int kMaxRounds = 64;
   for (int round = 0; round < kMaxRounds; ++round) {
+    cancellation_point(planes.size() + cuts.size());
     centre.settle(cuts);
     const FrameAbout<PointOf<Body>>& frame = centre.frame();
     // The plane that is nearest in the metric of the frame, or violated.

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "geometry/cancellation.h"
 #include "geometry/predicates.h"
 #include "methods/dual/wide_dual.h"
 
@@ -58,6 +59,7 @@ struct Growth {
     std::deque<int> unsettled(hull.facets.size());
     std::iota(unsettled.begin(), unsettled.end(), 0);
     while (!unsettled.empty()) {
+      cancellation_point();
       const int f = unsettled.front();
       unsettled.pop_front();
       if (hull.facets[f].removed()) continue;
@@ -112,6 +114,7 @@ Region grow(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> 
   Growth<Body> growth{bodies, frame, {}, {}, {}};
   std::vector<double> negligible;
   for (const auto& p : planes) {
+    cancellation_point();
     growth.add(p);
     negligible.push_back(4 * rounding / growth.slack(p) + (kWide ? kLastRounding : 0));
   }
@@ -126,6 +129,7 @@ Region grow(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> 
   region.facets_touched = growth.hull.inserted();
   const double farthest = kWide ? farthest_vertex(region.polytope) : 0;
   for (int f = 0; f < region.polytope.facets(); ++f) {
+    cancellation_point();
     const auto& owned = growth.planes[region.polytope.plane[f]];
     const double slack = growth.slack(owned);
     const double of_dual = kWide ? rounding_of_dual(slack, region.polytope.dual[f], farthest) : 0;
@@ -229,6 +233,7 @@ MeasuresAndInertia measure(const Region& region, std::span<const Placed> bodies)
   if (bodies.size() > 2) m.pulls_of_group.resize(bodies.size());
   double moved = 0, farthest = 0, least_slack = std::numeric_limits<double>::infinity();
   for (int f = 0; f < region.polytope.facets(); ++f) {
+    cancellation_point();
     const Region::Facet& facet = region.facets[f];
     const double area = 3 * scale * in_frame.cone_volume[f] / facet.slack;
     m.area += area;

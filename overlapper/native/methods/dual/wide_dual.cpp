@@ -1,5 +1,6 @@
 #include "methods/dual/wide_dual.h"
 
+#include "geometry/cancellation.h"
 #include "geometry/wide_pose.h"
 
 namespace overlapper {
@@ -59,6 +60,7 @@ std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference,
     const BodyDuals body(bodies[i], i, reference, frame);
     if (const Hull* hull = std::get_if<Hull>(&bodies[i].shape)) {
       for (const auto& [a, b, c] : hull->data->triangles) {
+        cancellation_point();
         const std::vector<Vec3>& corner = hull->data->corners;
         if (body.far(corner[a], corner[b], corner[c], reach)) continue;
         duals.push_back(body.through(wide_normal(corner[a], corner[b], corner[c]), corner[a]));

@@ -1,0 +1,179 @@
+"""Ctrl-C ends whatever takes long within a second, and the next answer is right."""
+
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from overlapper import Batch, Box, Capsule, Cylinder, Hull, Placed, RoundedHull, Sphere, overlap
+
+HANG = 240  # s
+
+TURNED = (0.1, 0.2, 0.3, 0.9)
+
+
+def ball(count):
+    points = np.random.default_rng(0).normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1)[:, None]
+
+
+def clump(count):
+    rng = np.random.default_rng(1)
+    return [Placed(ROUND[0], rng.normal(size=3) * 1e-3, rng.normal(size=4)) for _ in range(count)]
+
+
+ROUND = []  # the hull of a ball of many points, in the process that asks
+
+
+def hull():
+    points = ball(300_000)
+    return lambda: Hull(points)
+
+
+def rounded_hull():
+    points = ball(300_000)
+    return lambda: RoundedHull(points, 0.1)
+
+
+def points_for_a_hull():
+    points = ball(300_000)
+    return lambda: overlap(points, Sphere(1))
+
+
+def unpickled_hull():
+    text = pickle.dumps(ROUND[0])
+    return lambda: pickle.loads(text)
+
+
+def pair():
+    a, b = clump(2)
+    return lambda: overlap(a, b).volume
+
+
+def group():
+    bodies = clump(4)
+    return lambda: overlap(*bodies).volume
+
+
+def group_by_the_article():
+    bodies = clump(5)
+    return lambda: overlap(*bodies, method="paper").volume
+
+
+def polytope():
+    a, b = clump(2)
+    common = overlap(a, b)
+    assert common.volume > 0
+    return lambda: common.vertices
+
+
+def round_bodies_to_a_fine_tolerance():
+    bodies = Capsule(1, 1), Placed(Cylinder(1, 1), (0.3, 0.2, 0.1), TURNED)
+    return lambda: overlap(*bodies, tolerance=1e-7).vertices
+
+
+def one_long_row(threads=1):
+    batch, bodies = Batch(ROUND * 4), clump(4)
+    poses = [body.position for body in bodies], [body.orientation for body in bodies]
+    return lambda: batch.overlaps(*poses, threads=threads)
+
+
+def long_rows_of_many_threads():
+    return one_long_row(8)
+
+
+def pairs_of_boxes():
+    batch, places = Batch([Box([1, 1, 1])] * 20_000), np.random.default_rng(2).uniform(0, 1, (20_000, 3))
+    return lambda: batch.candidate_pairs(places, [TURNED] * len(places))
+
+
+def overlaps_before_the_first_pair():
+    batch, places = Batch([Box([1, 1, 1])] * 20_000), np.random.default_rng(2).uniform(0, 1, (20_000, 3))
+    return lambda: batch.overlaps(places, [TURNED] * len(places))
+
+
+JOBS = [
+    hull, rounded_hull, points_for_a_hull, unpickled_hull, pair, group, group_by_the_article, polytope,
+    round_bodies_to_a_fine_tolerance, one_long_row, long_rows_of_many_threads, pairs_of_boxes,
+    overlaps_before_the_first_pair,
+]  # fmt: skip
+
+
+def presses(job):
+    """Seconds of the processor from Ctrl-C to the exception at several moments, and whether another answer is right."""
+    ROUND.append(Hull(ball(50_000)))
+    late = []
+    for moment in (0.02, 0.1, 0.3, 0.7):
+        work = job()
+        pressed = []
+
+        def press(pressed=pressed):
+            pressed.append(time.process_time())
+            os.kill(os.getpid(), signal.SIGINT)
+
+        timer = threading.Timer(moment, press)
+        try:
+            timer.start()
+            work()
+            timer.cancel()
+            timer.join()
+        except KeyboardInterrupt:
+            late.append(time.process_time() - pressed[0])
+    right = overlap(Placed(ROUND[0]), Box([2, 2, 2])).volume == pytest.approx(ROUND[0].volume, rel=1e-12)
+    return late, right
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_ctrl_c_is_answered_within_a_second(job):
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        late, right = pool.apply_async(presses, (job,)).get(timeout=HANG)
+    assert late
+    assert max(late) < 1
+    assert right
+
+
+def handled():
+    """What a long answer is if a signal handler computes something meanwhile, and what it is alone."""
+    ROUND.append(Hull(ball(30_000)))
+    found = []
+    alone = overlap(*clump(2)).volume
+    signal.signal(signal.SIGALRM, lambda *_: found.append(overlap(*clump(2)).volume))
+    a, b, c = clump(3)
+    signal.setitimer(signal.ITIMER_REAL, 0.05)
+    volume = overlap(a, b, c).volume
+    return volume, overlap(a, b, c).volume, found, alone
+
+
+def test_a_signal_handler_may_compute_while_something_else_is_computed():
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        volume, again, found, alone = pool.apply_async(handled).get(timeout=HANG)
+    assert volume == again
+    assert found == [alone]
+
+
+def beats(job):
+    """How often another thread gets its turn while one computes, per second."""
+    work, count, stop = job(), [0], threading.Event()
+
+    def beat():
+        while not stop.wait(0.01):
+            count[0] += 1
+
+    other = threading.Thread(target=beat)
+    other.start()
+    start = time.perf_counter()
+    work()
+    spent = time.perf_counter() - start
+    stop.set()
+    other.join()
+    return count[0] / spent
+
+
+def test_other_threads_run_while_a_hull_is_made():
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply_async(beats, (hull,)).get(timeout=HANG) > 10
