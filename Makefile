@@ -5,6 +5,7 @@ PYTEST := $(VENV)/bin/pytest
 SCENE := franka_grasp
 FUZZ := -max_total_time=60
 MUTANTS := --seed 0 --count 200
+GROWTH := --rounds 50 --seed 0
 NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
 # Shares in percent that tests are to reach: of the lines and branches of Python, and of the lines of the core.
 LEAST_OF_PYTHON := 87
@@ -14,7 +15,7 @@ COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_out_of_memory python/test_stub
 
-.PHONY: help run test record coverage coverage-python coverage-core mutants fuzz lint format hooks ci clean
+.PHONY: help run test record coverage coverage-python coverage-core mutants growth fuzz lint format hooks ci clean
 
 help: ## this list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -45,6 +46,9 @@ coverage-core: build/coverage/dev ## report the lines of the core that its own t
 
 mutants: $(VENV)/dev ## change one operator of the core at a time, report which changes no test notices
 	@$(VENV)/bin/python tests/native/mutants.py $(MUTANTS)
+
+growth: $(VENV)/dev ## look for inputs that take time out of proportion to their size, with GROWTH="--rounds 50 --seed 0"
+	@$(VENV)/bin/python benchmarks/growth.py $(GROWTH)
 
 # Inputs that reach something new stay in build/fuzz/corpus; one that breaks something is left beside it, by name.
 fuzz: build/fuzz/fuzz_overlap ## give the sanitized core inputs that reach new places, for FUZZ=-max_total_time=60 seconds
