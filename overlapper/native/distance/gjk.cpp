@@ -1,5 +1,6 @@
 #include "distance/gjk.h"
 
+#include <limits>
 #include <vector>
 
 #include "geometry/rounding.h"
@@ -20,6 +21,18 @@ Distance mirrored(const Distance& d) { return {d.distance, d.gap, -d.normal, d.w
 
 DifferencePoint core_support(const Placed& a, const Placed& b, Vec3 direction) {
   return {a.core_support(direction), b.core_support(-direction)};
+}
+
+/// How far the origin is from the nearest facet of a tetrahedron around it.
+double depth_in(const Simplex& simplex) {
+  if (simplex.size < 4) return 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 4; ++i) {
+    const auto corner = [&](int k) { return simplex.corner[(i + k) % 4].difference(); };
+    const Vec3 normal = cross(corner(1) - corner(0), corner(2) - corner(0));
+    least = std::min(least, std::abs(dot(normal, corner(0))) / std::sqrt(norm2(normal)));
+  }
+  return least;
 }
 
 /// The sine of an angle between an axis and a direction: GJK knows that of a rim to half of the digits.
@@ -164,6 +177,7 @@ Distance distance(const Placed& a, const Placed& b) {
   const Vec3 along = unit(cores.simplex.nearest);
   const double gap_along = dot(along, core_support(a, b, -along).difference());
   result.normal = cores.origin_inside || gap_along <= 0 ? cores.normal : along;
+  if (cores.origin_inside) result.overlap = depth_in(cores.simplex);
   result.witness_a = cores.simplex.witness_a() - radius_a * result.normal;
   result.witness_b = cores.simplex.witness_b() + radius_b * result.normal;
   return result;

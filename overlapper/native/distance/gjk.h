@@ -16,6 +16,8 @@ struct Distance {
   double gap = 0;       ///< certified lower bound of the distance along `normal`
   Vec3 normal;          ///< unit, from b to a; {0, 0, 0} if the shapes' cores overlap
   Vec3 witness_a, witness_b;
+  /// m, of cores that overlap: at least so deep they are, but for the rounding of points.
+  double overlap = 0;
 };
 Distance distance(const Placed& a, const Placed& b);
 

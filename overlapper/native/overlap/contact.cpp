@@ -15,6 +15,22 @@
 namespace overlapper {
 namespace {
 
+double sum(Vec3 v) { return v.x + v.y + v.z; }
+
+/// No less than radius(), sooner.
+double extent(const Shape& shape) {
+  struct Visitor {
+    double operator()(const Sphere& s) const { return s.radius; }
+    double operator()(const Box& b) const { return sum(b.half_extents); }
+    double operator()(const Capsule& c) const { return c.radius + c.length; }
+    double operator()(const Cylinder& c) const { return c.radius + c.length; }
+    double operator()(const Hull& h) const { return h.data->radius; }
+    double operator()(const HalfSpace& h) const { return std::abs(h.plane.offset); }
+    double operator()(const RoundedHull& h) const { return h.core.data->radius + h.radius; }
+  };
+  return std::visit(Visitor{}, shape);
+}
+
 double up(double x) { return std::nextafter(x, std::numeric_limits<double>::infinity()); }
 
 Penetration parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint) {
@@ -42,7 +58,7 @@ Vec3 reversed(Vec3 v) { return Vec3{} - v; }
 }  // namespace
 
 bool in_doubt(double length, const Placed& a, const Placed& b) {
-  const double between = radius(a.shape) + radius(b.shape) + norm(a.pose.translation - b.pose.translation);
+  const double between = extent(a.shape) + extent(b.shape) + sum(abs(a.pose.translation - b.pose.translation));
   return rounding(reach(a, reach(b, between))) > kClear * length;
 }
 

@@ -441,7 +441,7 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
         const auto& [p, q] = pair;
         const Distance d = computed_of(pair, [&] { return distance(pair[0], pair[1]); });
         if (!in_doubt(d.gap, p, q)) return d.distance;
-        if (norm2(d.normal) > 0 && !in_doubt(-d.distance, p, q)) return 0.0;
+        if (!in_doubt(norm2(d.normal) > 0 ? -d.distance : d.overlap, p, q)) return 0.0;
         return contact_in_doubt(a, b).distance;
       },
       "a"_a.none(), "b"_a.none(),
@@ -456,8 +456,8 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
         const auto pair = relative_pair(a, b);
         const auto& [p, q] = pair;
         const double depth = computed_of(pair, [&] { return penetration(pair[0], pair[1]).depth; });
-        if (!in_doubt(-depth, p, q)) return 0.0;
-        return in_doubt(depth, p, q) || has_rims(p, q) ? contact_in_doubt(a, b).depth : depth;
+        if (in_doubt(std::abs(depth), p, q) || (depth > 0 && has_rims(p, q))) return contact_in_doubt(a, b).depth;
+        return std::max(0.0, depth);
       },
       "a"_a.none(), "b"_a.none(),
       nb::sig("def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | "

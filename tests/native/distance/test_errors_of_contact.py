@@ -11,7 +11,19 @@ from exact_distance import outside, root
 from numpy.testing import assert_allclose
 from strategies import directions, hull_points, quaternion, rotation
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
+from overlapper import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Hull,
+    Placed,
+    RoundedHull,
+    Sphere,
+    distance,
+    overlap,
+    penetration_depth,
+)
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 KINDS = ("sphere", "capsule", "cylinder", "box", "hull", "rounded hull")
@@ -187,15 +199,15 @@ def check_distance(a, b, share=1e-12):
     apart = exact.subtract(*witnesses)
     between = root(exact.dot(apart, apart))
     beside = max(beyond(body, point) for body, point in zip((a, b), witnesses, strict=True))
-    most, distance, error = between + 2 * beside, Fraction(answer.distance), Fraction(errors.distance)
+    most, stated, error = between + 2 * beside, Fraction(answer.distance), Fraction(errors.distance)
     bounded = [body for body in (a, b) if not isinstance(body.shape, HalfSpace)]
     size = sum(map(size_of, bounded)) + answer.distance
     world = max(float(np.abs(body.bounds).max()) for body in bounded) + size
     # Along the normal in doubles, which is off by its last bits, planes are a little nearer.
-    least = -way_out(a, b, answer.normal) if len(bounded) == 2 else distance - error
-    assert least - Fraction(1e-13 * size) <= distance + error
-    assert most >= distance - error
-    assert beside + max(between - distance - error, Fraction(0)) <= Fraction(errors.witnesses)
+    least = -way_out(a, b, answer.normal) if len(bounded) == 2 else stated - error
+    assert least - Fraction(1e-13 * size) <= stated + error
+    assert most >= stated - error
+    assert beside + max(between - stated - error, Fraction(0)) <= Fraction(errors.witnesses)
     assert error <= share * size
     assert errors.witnesses <= share * size + 1e-15 * world
     assert errors.depth == 0
@@ -214,6 +226,19 @@ def beyond(body, point):
         core = exact.hull(points_of(body))
         return max(outside(core, point) - Fraction(shape.radius), Fraction(0))
     return outside(exact.hull(points_of(body)) if isinstance(shape, (Box, Hull)) else body, point)
+
+
+@pytest.mark.parametrize("depth", [0.7, 1e-3, 1e-8, 1e-15, 0, -1e-15, -1e-8, -1e-3, -1])
+def test_functions_give_what_the_answer_gives(depth):
+    rng = np.random.default_rng(0)
+    for kind in KINDS:
+        for other in KINDS:
+            up = directions(rng, 1)[0]
+            a = Placed(shape_of(rng, kind), (0, 0, 0), quaternion(rng))
+            b = Placed(shape_of(rng, other), (0, 0, 0), quaternion(rng))
+            b = Placed(b.shape, up * float(support(a, up) + support(b, -up) - Fraction(depth)), b.orientation)
+            answer = overlap(a, b)
+            assert (distance(a, b), penetration_depth(a, b)) == (answer.distance, answer.depth)
 
 
 # Cylinders, in closed form
