@@ -15,6 +15,7 @@ inline constexpr double kLost = 0x1p-46;
 /// Directions in double-double, per sine of the angle that they were made from.
 inline constexpr double kLostWide = 0x1p-96;
 
+/// A corner about a point near the contact.
 struct NearCorner {
   Vec3 at;
   double lost;      ///< m: of dot products with it

