@@ -330,6 +330,12 @@ double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 
 
 }  // namespace
 
+std::optional<Mat3> inertia_of_round(const OverlappingBodies& overlapping) {
+  if (!choose(traits(overlapping.bodies)).tries(Way::kSlicing)) return std::nullopt;
+  const auto sliced = by_slices(overlapping);
+  return sliced ? sliced->inertia : std::nullopt;
+}
+
 MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
   const Arrangement& at = overlapping.at;
   const auto in_wide_arithmetic = [&] { return !overlapping.traced && overlapping.inside().wide_ball; };

@@ -126,6 +126,9 @@ struct OverlappingBodies {
 /// Owners are numbers of the bodies as given.
 Region finest_region(const OverlappingBodies& overlapping);
 
+/// The inertia of the round shapes themselves, of a pair that a closed form measures.
+std::optional<Mat3> inertia_of_round(const OverlappingBodies& overlapping);
+
 /// What measure_at_once() cannot measure well enough.
 MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping);
 

@@ -208,6 +208,7 @@ int Overlap::facets_touched() const {
 
 Mat3 Overlap::inertia() const {
   if (in_full().inertia) return *in_full().inertia;
+  if (const auto exact = inertia_of_round(overlapping_bodies())) return *exact;
   const MeasuresAndInertia of_polytope = measure(region(), bodies());
   const double share = in_full().measures.volume / of_polytope.measures.volume;
   const Mat3& i = *of_polytope.inertia;

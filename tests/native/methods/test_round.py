@@ -66,8 +66,7 @@ def assert_all_is_exact(a, b, found, far=0.0):
     assert found.area == pytest.approx(true.area, rel=1e-10)
     size = np.sqrt(np.trace(true.inertia) / true.volume)
     assert_allclose(found.centroid, true.centroid, rtol=0, atol=1e-10 * size + 4e-16 * (1 + far))
-    if found.way == "slicing":
-        assert_allclose(found.inertia, true.inertia, rtol=0, atol=1e-10 * np.trace(true.inertia))
+    assert_allclose(found.inertia, true.inertia, rtol=0, atol=1e-10 * np.trace(true.inertia))
     force = np.linalg.norm(true.gradient[:3])
     arm = size + np.linalg.norm(true.centroid - a.position) + far
     assert_allclose(found.gradient[0, :3], true.gradient[:3], rtol=0, atol=1e-10 * force)

@@ -1,5 +1,6 @@
 """The common part of bodies: closed forms, regular compounds, exact arithmetic, invariants and finite differences."""
 
+from fractions import Fraction
 from itertools import permutations
 
 import exact
@@ -75,8 +76,9 @@ def assert_is_a_closed_polytope(answer):
 # Closed forms
 
 
-def lens(r, s, d):
-    return np.pi * (r + s - d) ** 2 * (d * d + 2 * d * (r + s) - 3 * (r - s) ** 2) / (12 * d)
+def lens(*radii_and_distance):
+    r, s, d = map(Fraction, radii_and_distance)
+    return np.pi * float((r + s - d) ** 2 * (d * d + 2 * d * (r + s) - 3 * (r - s) ** 2) / (12 * d))
 
 
 def segment(r, h):

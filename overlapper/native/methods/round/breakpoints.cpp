@@ -160,8 +160,8 @@ class Settling {
   Settling(const Stack& stack, bool closely, std::vector<Interval>& intervals)
       : stack_(stack),
         beside_(closely ? 1e-13 : 1e-5),
-        inner_(closely               ? 4 * kMostInner
-               : stack.quadrics == 2 ? kMostInner
+        inner_(closely               ? kMostInner
+               : stack.quadrics == 2 ? 6
                                      : 2),
         intervals_(intervals),
         low_(stack.low),
@@ -182,8 +182,8 @@ class Settling {
   }
 
  private:
-  /// Of an interval, how many parts of it are looked at, if two quadrics may come and go within it.
-  static constexpr int kMostInner = 16;
+  /// Of an interval, how many parts of it are looked at at most.
+  static constexpr int kMostInner = 48;
   static constexpr double kPointlike = 1e-11;  ///< of the stack
   static constexpr int kMostEvents = 40;
 
@@ -191,20 +191,21 @@ class Settling {
 
   void append(double low, double high, const Outline& between) {
     if (between.empty()) return;
+    // Of a convex set there is no empty slice between others, but by rounding.
+    if (!intervals_.empty()) intervals_.back().high = low;
     // A corner and a circle, or three lines, meet in a value of t; rounding makes it an interval of its own.
-    if (high - low < kPointlike * (high_ - low_) && !intervals_.empty() && intervals_.back().high == low) {
+    if (high - low < kPointlike * (high_ - low_) && !intervals_.empty()) {
       intervals_.back().high = high;
       return;
     }
-    if (!intervals_.empty() && intervals_.back().high == low && intervals_.back().outline == between)
-      intervals_.back().high = high;
+    if (!intervals_.empty() && intervals_.back().outline == between) intervals_.back().high = high;
     else intervals_.push_back({low, high, between});
   }
 
   bool settle(double low, double high) {
     const double width = high - low;
     // The corners of a plane and two quadrics come and go between samples only if they are close together.
-    std::array<double, 4 * kMostInner + 2> t;
+    std::array<double, kMostInner + 2> t;
     t[0] = low + beside_ * width;
     for (int i = 1; i < inner_; ++i) t[i] = low + width * i / inner_;
     t[inner_] = high - beside_ * width;
@@ -213,7 +214,7 @@ class Settling {
       t[samples++] = inside_;
       std::sort(t.begin(), t.begin() + samples);
     }
-    std::array<Outline, 4 * kMostInner + 2> seen;
+    std::array<Outline, kMostInner + 2> seen;
     for (int i = 0; i < samples; ++i) seen[i] = at(t[i]);
     double from = low;
     for (int i = 0; i + 1 < samples; ++i) {

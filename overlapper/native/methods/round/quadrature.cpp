@@ -9,26 +9,39 @@ namespace overlapper::slicing {
 namespace {
 
 /// A node x < 0 of the rule of Gauss and Legendre with twenty nodes, θ = π/2 (1 + x); its mirror image has the same
-/// numbers, the last but one negated. Made with mpmath.
+/// numbers, those for odd coefficients negated. Made with mpmath.
 struct Node {
   double share;               ///< sin²(θ/2): of the interval, how much lies below
   double weight;              ///< of the slice there, for an interval of length one
   double sine;                ///< sin θ
   double last, last_but_one;  ///< what it gives to the coefficients 19 and 18 of the Legendre series
+  double tenth, ninth;        ///< likewise
 };
 constexpr std::array<Node, 10> kNodes{{
-    {2.9125011836602692e-5, 0.00014931545975041974, 0.01079336158391596, -0.021416031600054791, 0.041418332533339329},
-    {0.00080047156645094384, 0.0018036832407043526, 0.056562560469704602, 0.073905784380102392, -0.13873656589564789},
-    {0.0047439508469752285, 0.0067644309727544863, 0.13742555479002748, -0.14141296162008345, 0.25121397742423528},
-    {0.015881358827840478, 0.016353516719622385, 0.25003312796205107, 0.21644186508752798, -0.3536811352151889},
-    {0.039170373544543074, 0.03106164566633978, 0.38800028546857557, -0.29299971492323504, 0.42584085924972273},
-    {0.079504896271153461, 0.050225577761862857, 0.54105034050471344, 0.36579330002083763, -0.45308286683915951},
-    {0.14046330817633844, 0.071875659245456093, 0.69493414718949425, -0.43015043504117464, 0.42793355453058784},
-    {0.22306042564076279, 0.092919518105004433, 0.83259707458944275, 0.48211063670381045, -0.35085285124816943},
-    {0.32489037012850178, 0.10974017094932422, 0.93666774797954242, -0.51855508252321621, 0.23002220531294431},
-    {0.44004085488196592, 0.11910648187918097, 0.99278376480825779, 0.53732818115559507, -0.080075509852663748},
+    {2.9125011836602692e-5, 0.00014931545975041974, 0.01079336158391596, -0.021416031600054791, 0.041418332533339329,
+     0.12128237786003706, -0.11937908034964661},
+    {0.00080047156645094384, 0.0018036832407043526, 0.056562560469704602, 0.073905784380102392, -0.13873656589564789,
+     -0.084252230981265755, 0.0299883161974961},
+    {0.0047439508469752285, 0.0067644309727544863, 0.13742555479002748, -0.14141296162008345, 0.25121397742423528,
+     -0.22394445191677136, 0.23952959948397038},
+    {0.015881358827840478, 0.016353516719622385, 0.25003312796205107, 0.21644186508752798, -0.3536811352151889,
+     0.14556478637625199, 0.014926122863695763},
+    {0.039170373544543074, 0.03106164566633978, 0.38800028546857557, -0.29299971492323504, 0.42584085924972273,
+     0.27249009898101702, -0.30264365538440568},
+    {0.079504896271153461, 0.050225577761862857, 0.54105034050471344, 0.36579330002083763, -0.45308286683915951,
+     -0.1979093838205187, -0.090260186092919599},
+    {0.14046330817633844, 0.071875659245456093, 0.69493414718949425, -0.43015043504117464, 0.42793355453058784,
+     -0.29296872251053843, 0.32286908653152735},
+    {0.22306042564076279, 0.092919518105004433, 0.83259707458944275, 0.48211063670381045, -0.35085285124816943,
+     0.2415078446362778, 0.17451125550826214},
+    {0.32489037012850178, 0.10974017094932422, 0.93666774797954242, -0.51855508252321621, 0.23002220531294431,
+     0.29214655760977506, -0.3033496366166081},
+    {0.44004085488196592, 0.11910648187918097, 0.99278376480825779, 0.53732818115559507, -0.080075509852663748,
+     -0.27391687623426469, -0.25034997048389792},
 }};
 
+/// The relative errors of a rule that are not worth halving for, at first.
+constexpr double kVolumeError = 2e-14, kAreaError = 1e-12;
 /// The relative size at which the last coefficients of the series leave no error worth halving for: a rule of n nodes
 /// integrates the first 2 n terms, so that its error is as small as the square of the n-th.
 constexpr double kVolumeTail = 2e-9, kAreaTail = 1e-7;
@@ -36,14 +49,22 @@ constexpr int kMostHalvings = 48;
 /// Rules after which halving goes on for ever: where two surfaces touch along a line.
 constexpr int kMostRules = 300;
 
-/// The end of a Legendre series, from values at the nodes.
-struct Tail {
-  double last = 0, last_but_one = 0;
+/// Coefficients in the middle and at the end of a Legendre series, from values at the nodes.
+struct Series {
+  double last = 0, last_but_one = 0, tenth = 0, ninth = 0;
   void add(const Node& node, double low, double high) {
     last += node.last * (low - high);
     last_but_one += node.last_but_one * (low + high);
+    tenth += node.tenth * (low + high);
+    ninth += node.ninth * (low - high);
   }
-  double size() const { return std::max(std::abs(last), std::abs(last_but_one)); }
+  double tail() const { return std::max(std::abs(last), std::abs(last_but_one)); }
+  /// A rule of n nodes integrates the first 2 n terms. From the tenth to the twentieth, terms have become smaller by a
+  /// factor; to the fortieth, they do so twice again, and more if the integrand has no singularity nearby.
+  double error() const {
+    const double middle = std::max(std::abs(tenth), std::abs(ninth)), ratio = middle > 0 ? tail() / middle : 1;
+    return 30 * tail() * std::min(1.0, ratio * ratio);
+  }
 };
 
 bool integrate(const Stack& stack, const Outline& outline, double low, double high, double volume, double area,
@@ -51,7 +72,7 @@ bool integrate(const Stack& stack, const Outline& outline, double low, double hi
   if (++sum.rules > kMostRules) return false;
   const double width = high - low;
   Integrals here;
-  Tail of_volume, of_area;
+  Series of_volume, of_area;
   std::array<Sample, 20> samples;
   for (size_t i = 0; i < kNodes.size(); ++i) {
     const Node& node = kNodes[i];
@@ -66,13 +87,18 @@ bool integrate(const Stack& stack, const Outline& outline, double low, double hi
     samples[samples.size() - 1 - i] = {high - step, above.volume};
   }
   // The coefficients as volumes and areas; the error beyond the rule goes like the square of what is left.
-  const double tail = width * of_volume.size(), tail_area = width * of_area.size();
+  const double tail = width * of_volume.tail();
   const double whole = std::max(volume, here.volume), whole_area = std::max(area, here.area);
   // Of what rounding leaves, halving makes no less.
   const double rounding = 16 * DBL_EPSILON * here.blur / here.volume;
-  const bool rough = (strictness * tail > kVolumeTail * whole && tail > rounding * here.volume) ||
-                     (strictness * tail_area > kAreaTail * whole_area && tail_area > rounding * here.area);
-  if (rough && halvings < kMostHalvings && width > 1e-14 * (std::abs(low) + std::abs(high))) {
+  const auto rough = [&](const Series& series, double sum_here, double sum_whole, double limit, double limit_of_tail) {
+    const double end = width * series.tail();
+    if (end <= rounding * sum_here) return false;
+    return strictness > 0 ? strictness * end > limit_of_tail * sum_whole : width * series.error() > limit * sum_whole;
+  };
+  if ((rough(of_volume, here.volume, whole, kVolumeError, kVolumeTail) ||
+       rough(of_area, here.area, whole_area, kAreaError, kAreaTail)) &&
+      halvings < kMostHalvings && width > 1e-14 * (std::abs(low) + std::abs(high))) {
     const double middle = low + width / 2;
     return integrate(stack, outline, low, middle, whole, whole_area, strictness, halvings + 1, sum) &&
            integrate(stack, outline, middle, high, whole, whole_area, strictness, halvings + 1, sum);
@@ -80,7 +106,7 @@ bool integrate(const Stack& stack, const Outline& outline, double low, double hi
   sum.integrals.add(1, here);
   sum.samples.insert(sum.samples.end(), samples.begin(), samples.end());
   const double ratio = whole > 0 ? tail / whole : 0;
-  sum.error += whole * std::min(ratio, 30 * ratio * std::sqrt(ratio));
+  sum.error += strictness > 0 ? whole * std::min(ratio, 30 * ratio * std::sqrt(ratio)) : width * of_volume.error();
   return true;
 }
 

@@ -22,7 +22,8 @@ struct Sum {
 /// that with t = m − h cos θ it is analytic in θ, and rules of Gauss and Legendre converge geometrically; where the
 /// last terms of the Legendre series that the nodes give are not small, the interval is halved. `volume` is about that
 /// of the whole stack, to which errors are small; false if they do not become so. `strictness` is what to divide the
-/// usual limits of these terms by.
+/// usual limits of these terms by; if 0, terms in the middle of the series tell how much smaller those beyond its end
+/// are.
 bool integrate(const Stack& stack, const Interval& interval, double volume, double strictness, Sum& sum);
 
 /// Whether the volume agrees with the samples. The root of the area of slices of a convex set is concave (Brunn and

@@ -65,6 +65,10 @@ class Measuring {
     if (flat()) return true;
     prefer_faces();
     drop_around();
+    if (rounds_.size() == 1 && rounds_[0].ball && walls_.size() <= 1) {
+      add_cap(rounds_[0], walls_.empty() ? nullptr : &walls_[0]);
+      return true;
+    }
     return add_stack();
   }
 
@@ -135,6 +139,39 @@ class Measuring {
     }
   }
 
+  /// A ball that one plane cuts, or none: in closed form, about the point of the cap that is farthest from the plane.
+  void add_cap(const Round& ball, const Wall* wall) {
+    const double r = ball.radius;
+    const WideVector normal = wall ? wall->normal : wide(Vec3{0, 0, 1});
+    const double height =
+        wall ? (DoubleDouble{r} + wall->slack - dot(normal, ball.centre)).head : 2 * r;  // without cancellation
+    const Vec3 n = rounded(normal), tip = rounded(ball.centre - DoubleDouble{r} * normal);
+    const double h2 = height * height, h3 = h2 * height, pi = std::numbers::pi;
+    const double volume = pi * h2 * (r - height / 3), first = pi * h3 * (2 * r / 3 - height / 4);
+    const double along = pi * h3 * height * (r / 2 - height / 5);
+    const double across = pi / 4 * h3 * (4 * r * r / 3 - r * height + h2 / 5);
+    const double disc = wall ? pi * height * (2 * r - height) : 0;
+    totals.volume += volume;
+    totals.error += 32 * DBL_EPSILON * volume;
+    totals.area += 2 * pi * r * height + (wall && wall->owner != slicing::kCut ? disc : 0);
+    totals.border += 2 * pi * r * height + disc;
+    totals.first += volume * tip + first * n;
+    const auto second = [&](double p, double q, double u, double v) {
+      return volume * p * q + first * (p * v + q * u) + (along - across) * u * v;
+    };
+    totals.squares += {second(tip.x, tip.x, n.x, n.x) + across, second(tip.y, tip.y, n.y, n.y) + across,
+                       second(tip.z, tip.z, n.z, n.z) + across};
+    totals.products += {second(tip.y, tip.z, n.y, n.z), second(tip.z, tip.x, n.z, n.x), second(tip.x, tip.y, n.x, n.y)};
+    // The force on the ball acts along a line through its centre and the tip.
+    const Vec3 force = disc * n, moment = cross(tip, force);
+    const auto act = [&](int owner, double side) {
+      if (owner == 0) totals.pull += side * force, totals.moment += side * moment;
+      if (owner != slicing::kCut) totals.unbalanced += side * force;
+    };
+    act(ball.owner, -1);
+    if (wall) act(wall->owner, 1);
+  }
+
   /// Where the radical plane parts two balls, the common set is the part of either ball beyond it.
   bool add_balls(std::span<const Round> rounds, std::span<const Wall> walls) {
     const Round &a = rounds[0], &b = rounds[1];
@@ -169,7 +206,7 @@ class Measuring {
       about += (interval.high - interval.low) / 2 *
                slicing::measure(slicing::Slice(*stack, middle), interval.outline).volume;
     }
-    double open = integrate(*stack, about, 1);
+    double open = integrate(*stack, about, 0);
     std::swap(best_, sum_);
     if (open > kClosed * best_.integrals.volume && move_near(*stack)) return true;
     // The rules end where the volume is exact. Where areas are not yet, the surface does not close.
@@ -306,7 +343,7 @@ std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec
   RoundMeasures result;
   result.volume = totals.volume;
   result.volume_error =
-      totals.error + std::max(totals.open, missing(totals)) + (of_a.flatness + of_b.flatness) * totals.area;
+      totals.error + 2 * std::max(totals.open, missing(totals)) + (of_a.flatness + of_b.flatness) * totals.area;
   if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
   result.area = totals.area;
   const Vec3 centroid = totals.first / totals.volume;

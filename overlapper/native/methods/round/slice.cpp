@@ -61,15 +61,19 @@ struct Crossing {
   Point at(double s) const { return height * normal + s * direction; }
 };
 
-/// A convex polygon as the lines of its edges; corner i lies between edges i and i + 1.
+/// A convex polygon as the lines of its edges; corner i lies between edges i and i + 1. Nothing beyond its size is set.
 struct Polygon {
   std::array<int, kMostLines + 8> line;
-  std::array<Point, kMostLines + 8> corner;
+  std::array<double, kMostLines + 8> x, y;
   int size = 0;
+
+  Point corner(int i) const { return {x[i], y[i]}; }
+  void append(int edge, Point p) { line[size] = edge, x[size] = p.x, y[size] = p.y, ++size; }
 };
 
-/// Cuts off what lies beyond the line; false if nothing is left, and then by how much the nearest corner misses it.
-bool clip(Polygon& polygon, const Slice& slice, int line, double& missed) {
+/// Cuts off what lies beyond the line, with `spare` to work in; false if nothing is left, and then by how much the
+/// nearest corner misses it.
+bool clip(Polygon& polygon, Polygon& spare, const Slice& slice, int line, double& missed) {
   const Point normal = slice.stack.line[line].normal;
   const double side = slice.side(line);
   const int size = polygon.size;
@@ -77,7 +81,7 @@ bool clip(Polygon& polygon, const Slice& slice, int line, double& missed) {
   int count = 0;
   double most = -std::numeric_limits<double>::infinity();
   for (int i = 0; i < size; ++i) {
-    const double slack = side - dot(normal, polygon.corner[i]);
+    const double slack = side - dot(normal, polygon.corner(i));
     most = std::max(most, slack);
     kept[i] = slack >= 0;
     count += kept[i];
@@ -86,15 +90,20 @@ bool clip(Polygon& polygon, const Slice& slice, int line, double& missed) {
   missed = most;
   if (count == 0) return false;
   int first = 0;
-  while (!kept[first] || kept[(first + size - 1) % size]) ++first;
-  Polygon rest;
-  for (int i = 0; i <= count; ++i) rest.line[i] = polygon.line[(first + i) % size];
-  for (int i = 0; i < count; ++i) rest.corner[i] = polygon.corner[(first + i) % size];
-  rest.line[count + 1] = line;
-  rest.corner[count] = slice.corner(rest.line[count], line);
-  rest.corner[count + 1] = slice.corner(line, rest.line[0]);
-  rest.size = count + 2;
-  polygon = rest;
+  while (!kept[first] || kept[first > 0 ? first - 1 : size - 1]) ++first;
+  const auto wrapped = [size](int i) { return i < size ? i : i - size; };
+  spare.size = 0;
+  for (int i = 0; i < count; ++i) {
+    const int from = wrapped(first + i);
+    spare.append(polygon.line[from], polygon.corner(from));
+  }
+  const int leaves = polygon.line[wrapped(first + count)], enters = polygon.line[first];
+  spare.append(leaves, slice.corner(leaves, line));
+  spare.append(line, slice.corner(line, enters));
+  std::swap(polygon.size, spare.size);
+  std::copy_n(spare.line.begin(), polygon.size, polygon.line.begin());
+  std::copy_n(spare.x.begin(), polygon.size, polygon.x.begin());
+  std::copy_n(spare.y.begin(), polygon.size, polygon.y.begin());
   return true;
 }
 
@@ -111,8 +120,8 @@ void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
     const int line = polygon.line[i];
     const Crossing crossing(slice, line);
     centre_inside = centre_inside && dot(crossing.normal, slice.centre) <= crossing.height;
-    const double from = dot(crossing.direction, polygon.corner[(i + polygon.size - 1) % polygon.size]);
-    const double to = dot(crossing.direction, polygon.corner[i]);
+    const double from = dot(crossing.direction, polygon.corner(i > 0 ? i - 1 : polygon.size - 1));
+    const double to = dot(crossing.direction, polygon.corner(i));
     // Where three lines meet in a point, rounding may turn the edge round that they leave there.
     if (!(from < to)) continue;
     ++long_edges;
@@ -143,13 +152,12 @@ void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
 Outline outline(const Slice& slice) {
   const Stack& stack = slice.stack;
   Outline result;
-  Polygon polygon;
+  Polygon polygon, spare;
   // The last four lines form a square around everything.
-  polygon.size = 4;
-  for (int i = 0; i < 4; ++i) polygon.line[i] = stack.lines - 4 + i;
-  for (int i = 0; i < 4; ++i) polygon.corner[i] = slice.corner(polygon.line[i], polygon.line[(i + 1) % 4]);
+  const int square = stack.lines - 4;
+  for (int i = 0; i < 4; ++i) polygon.append(square + i, slice.corner(square + i, square + (i + 1) % 4));
   for (int i = 0; i < stack.lines - 4; ++i) {
-    if (clip(polygon, slice, i, result.missed)) continue;
+    if (clip(polygon, spare, slice, i, result.missed)) continue;
     result.failed = i;
     return result;
   }
@@ -234,7 +242,7 @@ void add_edge(const Slice& slice, int number, Point from, Point to, Integrals& s
   const Stack& stack = slice.stack;
   const Line& line = stack.line[number];
   const Point middle = 0.5 * (from + to);
-  const double length = std::hypot(to.x - from.x, to.y - from.y), t = slice.t;
+  const double length = norm(to - from), t = slice.t;
   const double weight = length / line.length;
   sum.correction += weight * (line.offset_tail - line.rate_tail * t - dot(line.normal_tail, middle));
   double terms = std::abs(line.offset) + std::abs(line.rate * t);
@@ -270,7 +278,7 @@ void add_arc(const Slice& slice, Point p, Point q, bool major_if_closed, Region2
   const Stack& stack = slice.stack;
   const Quadric& ball = stack.quadric[stack.ball];
   const Point chord = q - p, middle = 0.5 * (p + q);
-  const double length = std::hypot(chord.x, chord.y);
+  const double length = norm(chord);
   if (!(length > 0)) return;
   const Point across{chord.y / length, -chord.x / length};
   double distance = dot(across, middle - slice.centre);  // of the chord beyond the centre

@@ -16,6 +16,7 @@ inline Point operator+(Point a, Point b) { return {a.x + b.x, a.y + b.y}; }
 inline Point operator-(Point a, Point b) { return {a.x - b.x, a.y - b.y}; }
 inline Point operator*(double s, Point a) { return {s * a.x, s * a.y}; }
 inline double dot(Point a, Point b) { return a.x * b.x + a.y * b.y; }
+inline double norm(Point a) { return std::sqrt(dot(a, a)); }
 inline double cross(Point a, Point b) { return a.x * b.y - a.y * b.x; }
 
 /// How many lines may bound a slice; bodies with more planes than that near their common set have another way.
