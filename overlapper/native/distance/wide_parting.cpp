@@ -81,7 +81,7 @@ class PolytopeSearch {
   Ways ways;
   double lower = kInfinity;  ///< m: no way is shorter, if the cores have a common point
 
-  /// False if there are too many ridges to compare each with each.
+  /// False if there are too many ridges to compare each with each, or too many ways along which all corners are asked.
   bool run(Vec3 outward) {
     ways.measure(unit(wide(outward)));
     // Where the bodies part, a point of each is on the other, or as near as the way out is long.
@@ -96,6 +96,7 @@ class PolytopeSearch {
     for (int f = 0; f < static_cast<int>(b_.facets.size()); ++f)
       consider({0, Candidate::kFacetOfB, -1, f, 1}, -b_.facets[f].normal);
     consider_ridges();
+    if (corners_asked_ > kMostCornersAsked) return false;
     std::ranges::sort(candidates_, {}, &Candidate::least);
     for (const Candidate& candidate : candidates_) {
       cancellation_point();
@@ -125,6 +126,7 @@ class PolytopeSearch {
   }
 
   void consider(Candidate candidate, Vec3 direction) {
+    corners_asked_ += static_cast<double>(a_.corners.size() + b_.corners.size());
     candidate.least = a_.least_reach(direction) + b_.least_reach(-direction) - ways.lost();
     if (candidate.least <= way()) candidates_.push_back(candidate);
   }
@@ -141,6 +143,7 @@ class PolytopeSearch {
     std::vector<double> rises(b_.facets.size());
     for (int i = 0; i < static_cast<int>(a_.ridges.size()); ++i) {
       cancellation_point();
+      if (corners_asked_ > kMostCornersAsked) return;
       const NearRidge& ridge = a_.ridges[i];
       if (!near(ridge, b_)) continue;
       for (size_t f = 0; f < rises.size(); ++f) rises[f] = dot(b_.facets[f].normal, ridge.along);
@@ -188,6 +191,7 @@ class PolytopeSearch {
 
   NearPolytope a_, b_;
   std::vector<Candidate> candidates_;
+  double corners_asked_ = 0;
 };
 
 /// A cylinder, whose axis and rims are known in double-double.

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <unordered_map>
 
 #include "geometry/cancellation.h"
 #include "geometry/ridges.h"
@@ -139,15 +141,14 @@ class Sandwich {
   /// m², per facet: where a plane of another body, in the surface or just behind it, may be the outer one.
   std::vector<double> doubtful_among_planes() const {
     const std::vector<Seen> planes = planes_of_bodies();
-    std::vector<double> key;
+    std::unordered_map<int64_t, std::vector<const Seen*>> by_direction;
     double most = 0;
     for (const Seen& plane : planes) {
-      key.push_back(std::abs(plane.normal.x));
+      by_direction[cell_of(plane.normal, {})].push_back(&plane);
       most = std::max(most, plane.moved);
     }
     std::vector<double> areas;
     for (size_t f = 0; f < facets_.size(); ++f) {
-      cancellation_point();
       const Seen& facet = facets_[f];
       const auto ring = region_.polytope.facet(static_cast<int>(f));
       double around = 0;
@@ -156,16 +157,25 @@ class Sandwich {
       // Along a plane that is not nearly flush, slack grows by kNearlyFlush or more of the way from the facet's border.
       double doubtful = around * 2 * (facet.moved + most) / kNearlyFlush;
       const std::vector<Vec3> corners = polygon(f);
-      const double x = std::abs(facet.normal.x);
-      const auto first = std::ranges::lower_bound(key, x - kNearlyFlush);
-      for (size_t i = first - key.begin(); i < planes.size() && key[i] <= x + kNearlyFlush; ++i) {
-        const Seen& plane = planes[i];
-        const bool flush = norm2(cross(plane.normal, facet.normal)) <= kNearlyFlush * kNearlyFlush;
-        if (flush && plane.owner != facet.owner) doubtful += area_within(corners, plane, facet.moved + plane.moved);
+      for (int cell = 0; cell < 54; ++cell) {
+        const Vec3 step{cell % 3 - 1.0, cell / 3 % 3 - 1.0, cell / 9 % 3 - 1.0};
+        const auto found = by_direction.find(cell_of(cell < 27 ? facet.normal : -facet.normal, step));
+        if (found == by_direction.end()) continue;
+        for (const Seen* plane : found->second) {
+          const bool flush = norm2(cross(plane->normal, facet.normal)) <= kNearlyFlush * kNearlyFlush;
+          if (flush && plane->owner != facet.owner)
+            doubtful += area_within(corners, *plane, facet.moved + plane->moved);
+        }
       }
       areas.push_back(doubtful);
     }
     return areas;
+  }
+
+  /// Of the cube about the directions, cut into cells as wide as directions that count as nearly flush are apart.
+  static int64_t cell_of(Vec3 direction, Vec3 step) {
+    const auto place = [](double x, double by) { return static_cast<int64_t>(std::floor(x / kNearlyFlush) + by) + 64; };
+    return (place(direction.x, step.x) * 128 + place(direction.y, step.y)) * 128 + place(direction.z, step.z);
   }
 
   /// m², per facet: along the seam, or all of it where a smooth body is just behind the middle.
@@ -185,16 +195,27 @@ class Sandwich {
     return areas;
   }
 
-  /// Planes that may pass through the polytope's facets, by the size of the first coordinate of their normals.
+  /// Planes that may pass through the polytope's facets, each of them once: a facet of many corners has a triangle for
+  /// each, in one plane but for rounding.
   std::vector<Seen> planes_of_bodies() const {
     std::vector<Seen> planes;
+    std::unordered_map<int64_t, int> last_in_cell;
     double farthest = 0;
     for (Vec3 y : region_.polytope.vertices) farthest = std::max(farthest, norm(y));
     for (const WideDual& dual : wide_duals(bodies_, region_.reference, region_.frame, farthest)) {
       const double rounding = dual.slack * kLastRounding * std::max(1.0, norm(dual.point) * farthest);
+      const auto [last, first] = last_in_cell.try_emplace(cell_of(dual.normal, {}) * 64 + dual.owner % 64, -1);
+      if (!first) {
+        Seen& before = planes[last->second];
+        const double off = dual.slack * norm(dual.point - before.dual) * farthest;
+        if (before.owner == dual.owner && off <= rounding) {
+          before.moved = std::max(before.moved, rounding + off);
+          continue;
+        }
+      }
+      last->second = static_cast<int>(planes.size());
       planes.push_back({dual.point, dual.normal, dual.slack, rounding, dual.owner});
     }
-    std::ranges::sort(planes, {}, [](const Seen& plane) { return std::abs(plane.normal.x); });
     return planes;
   }
 
@@ -334,6 +355,8 @@ Errors errors_of_formula(const Measures& stated, const Region& drawn, std::span<
 }
 
 double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b) {
+  constexpr double kMostCompared = 1e7;
+  if (static_cast<double>(a.size()) * static_cast<double>(b.size()) > kMostCompared) return kInfinity;
   double farthest = 0;
   for (const auto& [from, to] : {std::pair(a, b), std::pair(b, a)}) {
     for (Vec3 p : from) {

@@ -58,7 +58,8 @@ Errors errors_beside(const StatedWithErrors& other, const Stated& stated);
 /// which the facets of the region tell.
 Errors errors_of_formula(const Measures& stated, const Region& drawn, std::span<const Placed> bodies);
 
-/// m: how far any of the points of one cloud is from the nearest of the other.
+/// m: how far any of the points of one cloud is from the nearest of the other; infinite where they are too many to be
+/// compared, each with each.
 double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b);
 
 /// The errors of whatever is stated of bodies whose common set is anything up to that volume.

@@ -111,3 +111,25 @@ def test_a_tolerance_that_is_not_kept_is_said_by_name():
     three = CUBE, Placed(CUBE, (1, 0, 0), (1, 2, 3, 4)), Placed(CUBE, (0, 1, 0))
     assert overlap(*three).converged and not overlap(*three, tolerance=1e-16).converged
     assert overlap(CUBE, Placed(CUBE, (2, 0, 0)), tolerance=1e-16).converged
+
+
+def prism(sides, low):
+    """Of height 1 on the unit circle."""
+    angle = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.vstack([np.column_stack([circle, np.full(sides, z)]) for z in (low, low + 1)])
+
+
+def test_two_lids_of_many_corners_in_one_plane_but_for_rounding_are_one_facet_that_is_shared():
+    found = overlap(Hull(prism(400, 0)), Hull(prism(400, 1 - 1e-6)))
+    walls = 1e-6 * 800 * np.sin(np.pi / 400)
+    assert found.errors.gradient[0, 0] == pytest.approx(walls, rel=1e-2)
+    assert found.errors.depth <= 1e-13
+
+
+def test_vertices_that_are_too_many_to_be_compared_are_bounded_by_the_bodies():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(4000, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    found = overlap(Hull(points), Placed(Hull(points), (1e-3, 0, 0)), method="paper")
+    assert found and 1 < found.errors.vertices < 4

@@ -1,7 +1,9 @@
 #include "methods/dual/wide_ball.h"
 
 #include <array>
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "methods/dual/basis.h"
 
@@ -60,16 +62,35 @@ WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const Own
     const WidePlane exactly = supporting(bodies[owner], wide(plane.normal));
     if (signed_distance(exactly, basis.ball().first).head > 0) enter({exactly, owner});
   }
+  const auto decided = [&] {
+    const bool deep = best.lower > margin && best.lower >= best.upper / 4;
+    const bool shallow = best.upper <= margin && best.lower >= -margin;
+    return deep || shallow || best.upper < -margin || best.upper - best.lower <= 4 * rounding;
+  };
+  /// Notes how far inside all bodies the ball's centre is, and returns the plane that is nearest to it, or passed.
+  const auto looked_at = [&](const WideVector& centre) {
+    const Owned<WidePlane> worst = tightest(bodies, centre);
+    const double slack = -signed_distance(worst.plane, centre).head - rounding;
+    if (slack > best.lower) best.lower = slack, best.centre = centre;
+    return worst;
+  };
   constexpr int kMaxRounds = 512;
   for (int round = 0; round < kMaxRounds; ++round) {
     const WideVector centre = basis.ball().first;
     best.upper = std::min(best.upper, basis.certified_radius(centre, reach + norm(centre).head) + rounding);
-    const Owned<WidePlane> worst = tightest(bodies, centre);
-    const double slack = -signed_distance(worst.plane, centre).head - rounding;
-    if (slack > best.lower) best.lower = slack, best.centre = centre;
-    const bool deep = best.lower > margin && best.lower >= best.upper / 4;
-    const bool shallow = best.upper <= margin && best.lower >= -margin;
-    if (deep || shallow || best.upper < -margin || best.upper - best.lower <= 4 * rounding) break;
+    const Owned<WidePlane> worst = looked_at(centre);
+    if (decided() || !enter(worst)) break;
+  }
+  if (decided() || !(best.upper > margin)) return best;
+  // Where many planes touch the largest ball, the simplex method may go round in circles. It does not among planes that
+  // are each moved out by another small part of the radius, and how far the ball of those is inside is asked of the
+  // bodies as they are.
+  basis = Basis(simplex);
+  double part = 0;
+  for (int round = 0; round < kMaxRounds && !decided(); ++round) {
+    Owned<WidePlane> worst = looked_at(basis.ball().first);
+    part = std::fmod(part + std::numbers::phi, 1.0);
+    worst.plane.offset = worst.plane.offset + DoubleDouble{0x1p-10 * best.upper * (1 + part)};
     if (!enter(worst)) break;
   }
   return best;
