@@ -486,9 +486,10 @@ class Overlap:
         m³, certified: the true volume is within volume ± volume_error.
 
         For polyhedra it bounds the rounding: every plane moved by 16 half-ulps of the coordinates' magnitude, times the
-        area. For smooth shapes it is the share of the volume between an outer and an inner polytope, plus that; or that
-        alone where a formula gives the measures: balls and ends of capsules with each other; a ball, capsule or cylinder that
-        at most one plane of a half-space, box or hull cuts. A pair that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
+        area. Where a formula gives the measures of a pair with a round body, it is that, too; where slices do, what is left of
+        the series over them, the rounding of their lines, and what area vectors, which sum to zero over a closed surface, leave
+        open. For others with smooth shapes it is the share of the volume between an outer and an inner polytope, plus that. A
+        pair that touches may hide a volume of rounding size. For method 'paper', which bounds nothing itself, it is the
         difference from what 'auto' finds, plus the error of that. 0 if separated.
         """
 
