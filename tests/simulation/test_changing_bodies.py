@@ -195,7 +195,7 @@ def test_a_body_that_comes_is_the_only_one_that_is_read(client, monkeypatch):
 def test_a_reset_simulation_is_read_afresh(client):
     box(client), box(client, position=[3, 0, 0])
     bodies = Bodies(client)
-    p.resetSimulation(client)
+    p.resetSimulation(physicsClientId=client)
     bodies.update()
     assert bodies.keys == [] and bodies.positions.shape == (0, 3) and bodies.overlaps() == []
     body(client, p.GEOM_SPHERE, radius=0.3)

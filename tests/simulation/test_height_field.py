@@ -196,7 +196,7 @@ def test_another_body_with_the_id_of_a_field_is_no_field(client, recorder):
     assert ball(client, [0, 0, 0]) == ground
     bodies.update()
     assert [type(shape) for shape in bodies.shapes] == [Sphere]
-    p.resetSimulation(client)
+    p.resetSimulation(physicsClientId=client)
     assert recorder.height_field(ground) is None
 
 

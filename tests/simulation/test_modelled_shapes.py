@@ -328,7 +328,7 @@ def test_links_without_an_id_are_counted_as_skipped(client):
     assert [key[1] for key in bodies.keys] == [-1]
     assert [each.body for each in bodies.skipped] == [-1]
     bodies.update()
-    p.resetSimulation(client)
+    p.resetSimulation(physicsClientId=client)
     bodies.update()
     assert bodies.keys == bodies.skipped == []
 
@@ -338,7 +338,7 @@ def test_what_load_bullet_brings_is_counted_as_skipped(client, tmp_path):
     p.loadURDF("cube.urdf", physicsClientId=client)
     path = str(tmp_path / "cube.bullet")
     p.saveBullet(path, physicsClientId=client)
-    p.resetSimulation(client)
+    p.resetSimulation(physicsClientId=client)
     with Recorder(client) as recorder:
         watched = Bodies(client, recorder=recorder)
         p.loadBullet(path, physicsClientId=client)
@@ -353,6 +353,6 @@ def test_what_load_bullet_brings_is_counted_as_skipped(client, tmp_path):
         assert bodies.keys == [(cube, -1, 0)] and [each.name for each in bodies.skipped] == ["2 bodies"]
         with pytest.warns(SkippedShapeWarning, match="2 bodies "):
             watched.update()
-        p.resetSimulation(client)
+        p.resetSimulation(physicsClientId=client)
         watched.update()
         assert watched.keys == watched.skipped == []

@@ -231,7 +231,7 @@ def test_what_was_noted_of_a_body_goes_as_pybullet_forgets_it(client, recorder, 
         anew(client, body, position)
     bodies.update()
     assert agree(client, bodies) == (set() if ids[1] == second else {((first, -1), (ids[1], -1))})
-    p.resetSimulation(client)
+    p.resetSimulation(physicsClientId=client)
     box(client), box(client, 1, [0.5, 0, 0])
     bodies.update()
     assert len(agree(client, bodies)) == 1
