@@ -334,8 +334,8 @@ std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec
       rounds.clear(), walls.clear();
       if (p.round >= 0) rounds.push_back(of_a.rounds[p.round]);
       if (q.round >= 0) rounds.push_back(of_b.rounds[q.round]);
-      walls.insert(walls.end(), &of_a.walls[0] + p.first_wall, &of_a.walls[0] + p.first_wall + p.walls);
-      walls.insert(walls.end(), &of_b.walls[0] + q.first_wall, &of_b.walls[0] + q.first_wall + q.walls);
+      walls.insert(walls.end(), of_a.walls.begin() + p.first_wall, of_a.walls.begin() + p.first_wall + p.walls);
+      walls.insert(walls.end(), of_b.walls.begin() + q.first_wall, of_b.walls.begin() + q.first_wall + q.walls);
       if (!measuring.add(rounds, walls)) return std::nullopt;
     }
   const Totals& totals = measuring.totals;
