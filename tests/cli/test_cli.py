@@ -424,7 +424,7 @@ LACKING = {
         "overlapper: the scene lacking.py cannot be read: the physics server of physicsClientId 0 could not hand over",
     ),
     "memory": (
-        "import overlapper.simulation as s; s.Bodies.overlaps = lambda *_, **__: bytes(1 << 62)",
+        "import overlapper.simulation as s; s.Bodies.overlaps = lambda *_, **__: (_ for _ in ()).throw(MemoryError())",
         "overlapper: there is not enough memory for this",
     ),
     "processes": (
