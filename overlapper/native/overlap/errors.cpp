@@ -99,6 +99,7 @@ class Sandwich {
   double shared_area() const {
     double sum = 0;
     for (size_t f = 0; f < facets_.size(); ++f) {
+      cancellation_point();
       const Vec3 direction = region_.frame.axes * middle(polygon(f));
       const double own = way_out(facets_[f].owner, direction);
       for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
@@ -149,6 +150,7 @@ class Sandwich {
     }
     std::vector<double> areas;
     for (size_t f = 0; f < facets_.size(); ++f) {
+      cancellation_point();
       const Seen& facet = facets_[f];
       const auto ring = region_.polytope.facet(static_cast<int>(f));
       double around = 0;
@@ -161,6 +163,7 @@ class Sandwich {
         const Vec3 step{cell % 3 - 1.0, cell / 3 % 3 - 1.0, cell / 9 % 3 - 1.0};
         const auto found = by_direction.find(cell_of(cell < 27 ? facet.normal : -facet.normal, step));
         if (found == by_direction.end()) continue;
+        cancellation_point(found->second.size());
         for (const Seen* plane : found->second) {
           const bool flush = norm2(cross(plane->normal, facet.normal)) <= kNearlyFlush * kNearlyFlush;
           if (flush && plane->owner != facet.owner)
