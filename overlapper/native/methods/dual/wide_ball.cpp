@@ -53,9 +53,10 @@ WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const Own
   Basis basis(simplex);
   WideBall best{{}, -kInfinity, kInfinity, {}};
   best.cuts.assign(simplex.begin(), simplex.end());
-  const auto enter = [&](const Owned<WidePlane>& cut) {
+  /// Takes a plane into the basis, moved out by so much.
+  const auto enter = [&](const Owned<WidePlane>& cut, double out = 0) {
     best.cuts.push_back(cut);
-    return basis.exchange(cut);
+    return basis.exchange({{cut.plane.normal, cut.plane.offset + DoubleDouble{out}}, cut.owner});
   };
   for (const auto& [plane, owner] : hints) {
     if (owner < 0 || !bounded(bodies[owner].shape)) continue;
@@ -88,10 +89,8 @@ WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const Own
   basis = Basis(simplex);
   double part = 0;
   for (int round = 0; round < kMaxRounds && !decided(); ++round) {
-    Owned<WidePlane> worst = looked_at(basis.ball().first);
     part = std::fmod(part + std::numbers::phi, 1.0);
-    worst.plane.offset = worst.plane.offset + DoubleDouble{0x1p-10 * best.upper * (1 + part)};
-    if (!enter(worst)) break;
+    if (!enter(looked_at(basis.ball().first), 0x1p-10 * best.upper * (1 + part))) break;
   }
   return best;
 }
