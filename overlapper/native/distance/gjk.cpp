@@ -158,7 +158,7 @@ Separation separate_cores(const Placed& a, const Placed& b) {
   // The best gap of all rounds: on a rim, those of single rounds scatter by more than this.
   const auto settled = [](double length, double, double best) { return length - best <= 4 * 0x1p-53 * length; };
   Separation cores = separate(support(-towards), support, settled);
-  const bool rims = std::holds_alternative<Cylinder>(a.shape) || std::holds_alternative<Cylinder>(b.shape);
+  const bool rims = has_rims(a.shape) || has_rims(b.shape);
   if (rims && !cores.origin_inside && cores.gap > 0 && !above_cap(a, b, cores)) sharpen(a, b, cores);
   return cores;
 }

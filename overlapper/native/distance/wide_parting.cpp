@@ -10,6 +10,7 @@
 #include "distance/penetration.h"
 #include "distance/wide_gap.h"
 #include "geometry/cancellation.h"
+#include "geometry/rounding.h"
 #include "geometry/thresholds.h"
 
 namespace overlapper {
@@ -36,10 +37,6 @@ Across across(const WideVector& u, const WideVector& v) {
   const WideVector about = unit(product);
   return {unit(about - dot(u, about) * u), sine, std::min(kLostWide / sine, kLostWide + sine)};
 }
-
-/// The least double that is surely no smaller than the sum, and the greatest that is no larger.
-double up(double x) { return std::nextafter(x, kInfinity); }
-double down(double x) { return std::nextafter(x, -kInfinity); }
 
 /// What is known of the ways along which A - B, of the cores, is left: directions point out of it.
 class Ways {
@@ -249,9 +246,9 @@ class RimSearch {
 
   void run(Vec3 outward, const WideVector& about) {
     ways.measure(unit(wide(outward)));
-    if (std::holds_alternative<Cylinder>(a_.shape) && std::holds_alternative<Cylinder>(b_.shape)) {
+    if (has_rims(a_.shape) && has_rims(b_.shape)) {
       of_cylinders(Rims(a_), Rims(b_));
-    } else if (std::holds_alternative<Cylinder>(a_.shape)) {
+    } else if (has_rims(a_.shape)) {
       of_polytope(Rims(a_), b_, 1, -outward, about);
     } else {
       of_polytope(Rims(b_), a_, -1, outward, about);
@@ -379,8 +376,6 @@ bool rims_meet_farther_out(const Rims& a, const Rims& b, double way) {
   return true;
 }
 
-bool has_rims(const WideBody& body) { return std::holds_alternative<Cylinder>(body.shape); }
-
 }  // namespace
 
 WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint) {
@@ -403,17 +398,17 @@ WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 
   if (norm2(gap.normal) > 0) {
     // GJK may not have ended on a rim, and the hint be better.
     Ways ways(wide_a, wide_b);
-    const bool rims = bounded(a.shape) && bounded(b.shape) && (has_rims(wide_a) || has_rims(wide_b));
+    const bool rims = bounded(a.shape) && bounded(b.shape) && (has_rims(a.shape) || has_rims(b.shape));
     if (rims) ways.measure(unit(wide(outward)));
     const double certified = rims ? std::max(gap.certified, -(ways.shortest() + radii).head) : gap.certified;
     return {-gap.distance, down(-std::max(gap.distance, gap.most) - lost), up(-certified + lost), gap.normal};
   }
   // Cores without an inside, or without a common point, are left at once by moving one of them to the other.
   const double touching = -(std::max(gap.distance, gap.most) + radii.head) - lost;
-  if (has_rims(wide_a) || has_rims(wide_b)) {
+  if (has_rims(a.shape) || has_rims(b.shape)) {
     RimSearch search(wide_a, wide_b);
     search.run(outward, gap.witness_a);
-    if (has_rims(wide_a) && has_rims(wide_b)) {
+    if (has_rims(a.shape) && has_rims(b.shape)) {
       const EnclosedDepth enclosed = enclosed_depth(a, b);
       const double coarse = enclosed.lower;
       search.ways.measure(unit(wide(between_rims(a, b, -enclosed.depth.normal))));

@@ -5,6 +5,12 @@
 
 namespace overlapper {
 
+double farthest_vertex(const Polytope& polytope) {
+  double farthest = 0;
+  for (Vec3 y : polytope.vertices) farthest = std::max(farthest, norm(y));
+  return farthest;
+}
+
 Polytope polar_dual(const ExpandingHull& hull) {
   Polytope polytope;
   std::vector<int> vertex_of(hull.facets.size(), -1);

@@ -24,6 +24,9 @@ struct Polytope {
   }
 };
 
+/// How far the vertex is from the origin that is farthest from it.
+double farthest_vertex(const Polytope& polytope);
+
 /// The dual point normal / (offset - dot(normal, origin)) of a plane that has `origin` strictly inside.
 inline Vec3 polar_dual(const Plane& plane, Vec3 origin) { return plane.normal / -signed_distance(plane, origin); }
 

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cmath>
+#include <limits>
+
 /// \file
 /// Words of error, each with one meaning throughout the core.
 ///
@@ -15,6 +18,10 @@
 /// - *certain*, *sure*: of a sign or a status, beyond doubt.
 /// - *certified*, *lower*, *upper*: bounds that hold whatever rounding did.
 namespace overlapper {
+
+/// The least double that is surely no smaller than a number rounded once, and the greatest that is no larger.
+inline double up(double x) { return std::nextafter(x, std::numeric_limits<double>::infinity()); }
+inline double down(double x) { return std::nextafter(x, -std::numeric_limits<double>::infinity()); }
 
 /// Rounding to be expected in sums of coordinates of that size: a rotation, a translation and a dot product make about
 /// 16 roundings of at most half an ulp.

@@ -254,9 +254,7 @@ double touching_volume(std::span<const Placed> bodies, const DeepestBall& ball) 
   const double inradius = std::max(0.0, ball.upper) + ball.rounding;
   for (const Placed& body : bodies) {
     if (!bounded(body.shape)) continue;
-    const Bounds box = bounds(body);
-    const Vec3 side = box.upper - box.lower;
-    least = std::min(least, 2 * inradius * (side.x * side.y + side.y * side.z + side.z * side.x));
+    least = std::min(least, inradius * surface(bounds(body)));
   }
   return least;
 }
@@ -308,10 +306,6 @@ MeasuresAndInertia by_region(const Region& region, std::span<const Placed> bodie
   MeasuresAndInertia answer = measure(region, bodies);
   answer.measures.way = way;
   return answer;
-}
-
-bool polyhedral(std::span<const Placed> bodies) {
-  return std::ranges::none_of(bodies, [](const Placed& body) { return smooth(body.shape); });
 }
 
 /// The region about the middle of the largest ball that double-doubles find, if there is one: the point about which

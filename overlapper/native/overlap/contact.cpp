@@ -31,8 +31,6 @@ double extent(const Shape& shape) {
   return std::visit(Visitor{}, shape);
 }
 
-double up(double x) { return std::nextafter(x, std::numeric_limits<double>::infinity()); }
-
 Penetration parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint) {
   const WideParting way = wide_parting(a, b, reference, hint);
   return {way.depth, way.normal};
@@ -63,8 +61,7 @@ bool in_doubt(double length, const Placed& a, const Placed& b) {
 }
 
 bool has_rims(const Placed& a, const Placed& b) {
-  const bool rims = std::holds_alternative<Cylinder>(a.shape) || std::holds_alternative<Cylinder>(b.shape);
-  return rims && bounded(a.shape) && bounded(b.shape);
+  return (has_rims(a.shape) || has_rims(b.shape)) && bounded(a.shape) && bounded(b.shape);
 }
 
 Penetration penetration_in_order(const Placed& a, const Placed& b) {

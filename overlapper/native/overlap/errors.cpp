@@ -59,8 +59,7 @@ double misfit(const Polytope& p, const Ridges& ridges) {
 class Sandwich {
  public:
   Sandwich(const Region& region, std::span<const Placed> bodies)
-      : region_(region), bodies_(bodies), ridges_(region.polytope) {
-    polyhedral_ = std::ranges::none_of(bodies, [](const Placed& body) { return smooth(body.shape); });
+      : region_(region), bodies_(bodies), ridges_(region.polytope), polyhedral_(polyhedral(bodies)) {
     for (const Placed& body : bodies) relative_.push_back(body.seen_from(region.reference));
     const Polytope& p = region.polytope;
     for (Vec3 y : p.vertices) corners_.push_back(region.frame.axes * y);
@@ -203,10 +202,9 @@ class Sandwich {
   std::vector<Seen> planes_of_bodies() const {
     std::vector<Seen> planes;
     std::unordered_map<int64_t, int> last_in_cell;
-    double farthest = 0;
-    for (Vec3 y : region_.polytope.vertices) farthest = std::max(farthest, norm(y));
+    const double farthest = farthest_vertex(region_.polytope);
     for (const WideDual& dual : wide_duals(bodies_, region_.reference, region_.frame, farthest)) {
-      const double rounding = dual.slack * kLastRounding * std::max(1.0, norm(dual.point) * farthest);
+      const double rounding = rounding_of_dual(dual.slack, dual.point, farthest);
       const auto [last, first] = last_in_cell.try_emplace(cell_of(dual.normal, {}) * 64 + dual.owner % 64, -1);
       if (!first) {
         Seen& before = planes[last->second];
@@ -253,9 +251,9 @@ class Sandwich {
   const Region& region_;
   std::span<const Placed> bodies_;
   Ridges ridges_;
-  std::vector<Placed> relative_;  ///< about the region's reference
   bool polyhedral_;
-  std::vector<Vec3> corners_;  ///< m, about the frame's origin
+  std::vector<Placed> relative_;  ///< about the region's reference
+  std::vector<Vec3> corners_;     ///< m, about the frame's origin
   std::vector<Seen> facets_;
   double moved_ = 0;   ///< of planes, by rounding, relative to their slack
   double pulled_ = 0;  ///< of vertices, into smooth shapes
@@ -291,8 +289,7 @@ Room room(std::span<const Placed> bodies) {
     const Bounds box = bounds(body);
     const Vec3 side = box.upper - box.lower;
     if (!(norm(side) < least.diameter)) continue;
-    const double surface = 2 * (side.x * side.y + side.y * side.z + side.z * side.x);
-    least = {norm(side), surface, box.lower + side / 2};
+    least = {norm(side), surface(box), box.lower + side / 2};
   }
   return least;
 }

@@ -186,6 +186,8 @@ Vec3 centroid(const Shape& shape) {
 
 bool bounded(const Shape& shape) { return !std::holds_alternative<HalfSpace>(shape); }
 
+bool has_rims(const Shape& shape) { return std::holds_alternative<Cylinder>(shape); }
+
 bool smooth(const Shape& shape) {
   return std::holds_alternative<Sphere>(shape) || std::holds_alternative<Capsule>(shape) ||
          std::holds_alternative<Cylinder>(shape) || std::holds_alternative<RoundedHull>(shape);
@@ -290,6 +292,15 @@ Bounds bounds(const Placed& placed) {
   }
   const auto reach = [&](int i, double side) { return placed.support(side * axis(i))[i]; };
   return {{reach(0, -1), reach(1, -1), reach(2, -1)}, {reach(0, 1), reach(1, 1), reach(2, 1)}};
+}
+
+double surface(const Bounds& box) {
+  const Vec3 side = box.upper - box.lower;
+  return 2 * (side.x * side.y + side.y * side.z + side.z * side.x);
+}
+
+bool polyhedral(std::span<const Placed> bodies) {
+  return std::ranges::none_of(bodies, [](const Placed& body) { return smooth(body.shape); });
 }
 
 double radius(const Shape& shape) {

@@ -112,6 +112,9 @@ bool bounded(const Shape& shape);
 /// rounded hull.
 bool smooth(const Shape& shape);
 
+/// True for a cylinder, whose caps have round borders.
+bool has_rims(const Shape& shape);
+
 /// All facet planes of a polytope; for a smooth shape a few of its tangent planes that already bound it. About the
 /// shape's origin.
 void append_planes(const Shape& shape, std::vector<Plane>& planes);
@@ -165,5 +168,10 @@ struct Bounds {
 };
 /// The box around a placed shape, from six supports; infinite for a half-space.
 Bounds bounds(const Placed& placed);
+/// m², of a box.
+double surface(const Bounds& box);
+
+/// True if none of the bodies is smooth.
+bool polyhedral(std::span<const Placed> bodies);
 
 }  // namespace overlapper

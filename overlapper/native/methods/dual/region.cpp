@@ -79,20 +79,9 @@ struct Growth {
   }
 };
 
-double farthest_vertex(const Polytope& polytope) {
-  double farthest = 0;
-  for (Vec3 y : polytope.vertices) farthest = std::max(farthest, norm(y));
-  return farthest;
-}
-
 /// How far a polytope may shrink about its origin for the volume to be right to the fraction `tolerance`: by s it loses
 /// less than 3 s of its volume, of which measure() leaves 7/12 in doubt; rounding has the rest.
 double shrinking_within(double tolerance) { return 0.56 * tolerance; }
-
-/// A dual point rounded once moves its plane, as seen from the origin, by an ulp at the distance of the vertices.
-double rounding_of_dual(double slack, Vec3 dual, double farthest) {
-  return slack * kLastRounding * std::max(1.0, norm(dual) * farthest);
-}
 
 /// The region's reference and frame, for one about `reference`.
 void set_frame(Region& region, const Frame& frame, Vec3 reference) {

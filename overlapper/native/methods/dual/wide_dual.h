@@ -11,6 +11,11 @@ namespace overlapper {
 /// Rounding, relative, where only the last steps are in doubles and all before them in double-double: four ulps.
 inline constexpr double kLastRounding = 8 * 0x1p-53;
 
+/// m: a dual point rounded once moves its plane, as seen from the origin, by an ulp at the distance of the vertices.
+inline double rounding_of_dual(double slack, Vec3 dual, double farthest) {
+  return slack * kLastRounding * std::max(1.0, norm(dual) * farthest);
+}
+
 /// The dual point of a body's plane in the coordinates of a frame, each coordinate right to an ulp of the point's
 /// length.
 struct WideDual {
