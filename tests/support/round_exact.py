@@ -1,4 +1,4 @@
-"""What a ball, a cylinder or a capsule shares with a polyhedron, to forty digits, by another route than the core's.
+"""What a ball, a cylinder or a capsule shares with a polyhedron, to twenty digits, by another route than the core's.
 
 Slices are orthogonal to the round body's own axis, so that each is a polygon cut by a disc about the origin; its area,
 moments and borders have closed forms. These are integrated between all values at which a corner of the common part
@@ -18,7 +18,8 @@ from overlapper import Capsule, Placed, Sphere
 
 Point = tuple[arb, arb]
 ZERO, HALF = arb(0), arb(1) / 2
-AGREED = 1e-20  # of the volume and of the area
+NODES, FEWER = 24, 16  # of a rule, and of the one that it is compared with
+AGREED = 1e-15  # of the volume and of the area, by rules of which the finer is then right to some 1e-22
 SLIVER = 1e-35  # of the size: rounding in sixty digits makes less
 
 
@@ -272,7 +273,7 @@ class Piece:
         return total
 
     def over(self, low: arb, high: arb, whole: list[arb], halvings: int = 0) -> list[arb]:
-        fine, coarse = self.rule(low, high, 40), self.rule(low, high, 28)
+        fine, coarse = self.rule(low, high, NODES), self.rule(low, high, FEWER)
         whole = [max(w, f, key=lambda v: v.mid()) for w, f in zip(whole, fine[:2])]
         if halvings > 60 or all(abs(f - c) <= AGREED * w for f, c, w in zip(fine, coarse, whole)):
             return fine

@@ -25,7 +25,7 @@ ctx.dps = 60
 Vector = tuple[arb, arb, arb]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
 FINE, COARSE = np.polynomial.legendre.leggauss(24), np.polynomial.legendre.leggauss(16)
-STEPS = 48  # of a bisection
+STEPS = 48  # of a bisection; many at once are done by four of them at a time
 AGREED = 2e-14
 SAMPLES = 720  # of a circle: an arc between two of them is lost, of which the fifth power counts
 
@@ -295,15 +295,12 @@ class Rays:
         for _ in range(8):
             if not len(at):
                 return
-            p, q, then = before.copy(), after.copy(), np.full(len(at), -1)
-            then = self.exits(q, z)[2]
-            for _ in range(STEPS):
-                middle = (p + q) / 2
-                found = self.exits(middle, z)[2]
-                same = found == here
-                p = np.where(same, middle, p)
-                q = np.where(same, q, middle)
-                then = np.where(same, then, found)
+            p, q, then = before, after, self.exits(after, z)[2]
+            for _ in range(STEPS // 4):
+                tried = np.column_stack([p[:, None] + (q - p)[:, None] * np.arange(16) / 16, q])
+                found = np.column_stack([self.exits(tried[:, 1:-1].ravel(), z)[2].reshape(-1, 15), then])
+                rows, first = np.arange(len(at)), (found != here[:, None]).argmax(1)
+                p, q, then = tried[rows, first], tried[rows, first + 1], found[rows, first]
             yield from q
             end = self.exits(after, z)[2]
             more = then != end
