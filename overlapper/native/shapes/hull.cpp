@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cfloat>
-#include <cstdint>
 #include <limits>
 #include <string>
-#include <unordered_map>
 
 #include "geometry/cancellation.h"
 #include "geometry/expanding_hull.h"
@@ -72,31 +70,48 @@ Vec3 lossless_origin(Vec3 lower, Vec3 upper) {
 struct CoplanarRegions {
   const ExpandingHull& hull;
   double rounding;
-  std::vector<int> region;  ///< per triangle of the hull, -1 for removed ones
-  std::vector<int> first;   ///< per region: its largest triangle
+  std::vector<int> region;   ///< per triangle of the hull, -1 for removed ones
+  std::vector<int> first;    ///< per region: its largest triangle
+  std::vector<Vec3> normal;  ///< unit, per triangle of the hull
 
-  Plane plane_of(int triangle) const {
-    const auto& [a, b, c] = hull.facets[triangle].vertex;
-    const Vec3 normal = unit(accurate_normal(hull.points[a], hull.points[b], hull.points[c]));
-    return {normal, dot(normal, hull.points[a])};
+  void find_normals() {
+    for (const ExpandingHull::Facet& facet : hull.facets) {
+      cancellation_point();
+      const auto& [a, b, c] = facet.vertex;
+      normal.push_back(facet.removed() ? Vec3{}
+                                       : unit(accurate_normal(hull.points[a], hull.points[b], hull.points[c])));
+    }
   }
 
-  void grow(int triangle) {
+  Plane plane_of(int triangle) const {
+    return {normal[triangle], dot(normal[triangle], hull.points[hull.facets[triangle].vertex[0]])};
+  }
+
+  bool lies_in(const Plane& plane, int triangle) const {
+    for (int v : hull.facets[triangle].vertex)
+      if (!(std::abs(signed_distance(plane, hull.points[v])) <= rounding)) return false;
+    // The far side of a plate thinner than rounding is another facet.
+    return dot(normal[triangle], plane.normal) >= 0;
+  }
+
+  bool alone(int triangle) const {
+    const Plane plane = plane_of(triangle);
+    return std::ranges::none_of(hull.facets[triangle].neighbour, [&](int other) { return lies_in(plane, other); });
+  }
+
+  void grow(int triangle, bool alone) {
     const int id = static_cast<int>(first.size());
     first.push_back(triangle);
+    region[triangle] = id;
+    if (alone) return;
     const Plane plane = plane_of(triangle);
     std::vector<int> stack{triangle};
-    region[triangle] = id;
     while (!stack.empty()) {
       const int t = stack.back();
       stack.pop_back();
       cancellation_point();
       for (int other : hull.facets[t].neighbour) {
-        if (region[other] >= 0) continue;
-        // The far side of a plate thinner than rounding is another facet.
-        bool flat = dot(plane_of(other).normal, plane.normal) >= 0;
-        for (int v : hull.facets[other].vertex) flat &= std::abs(signed_distance(plane, hull.points[v])) <= rounding;
-        if (!flat) continue;
+        if (region[other] >= 0 || !lies_in(plane, other)) continue;
         region[other] = id;
         stack.push_back(other);
       }
@@ -105,59 +120,96 @@ struct CoplanarRegions {
 };
 
 CoplanarRegions merge_coplanar(const ExpandingHull& hull, double rounding) {
-  CoplanarRegions regions{hull, rounding, std::vector<int>(hull.facets.size(), -1), {}};
-  std::vector<int> by_area;
-  for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t)
-    if (!hull.facets[t].removed()) by_area.push_back(t);
-  std::sort(by_area.begin(), by_area.end(), [&](int a, int b) {
+  CoplanarRegions regions{hull, rounding, std::vector<int>(hull.facets.size(), -1), {}, {}};
+  regions.find_normals();
+  // Triangles lie in memory as the hull has grown, each near others that it borders on; by area they do not. What needs
+  // their surroundings is asked of them first.
+  struct Seed {
+    double area;
+    int triangle;
+    bool alone;
+  };
+  std::vector<Seed> by_area;
+  for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t) {
     cancellation_point();
-    return norm2(hull.facets[a].normal) > norm2(hull.facets[b].normal);
-  });
-  for (int t : by_area)
-    if (regions.region[t] < 0) regions.grow(t);
+    if (!hull.facets[t].removed()) by_area.push_back({norm2(hull.facets[t].normal), t, regions.alone(t)});
+  }
+  std::sort(by_area.begin(), by_area.end(), [](const Seed& a, const Seed& b) { return a.area > b.area; });
+  for (const Seed& seed : by_area)
+    if (regions.region[seed.triangle] < 0) regions.grow(seed.triangle, seed.alone);
   return regions;
 }
 
-/// The directed ridges that leave each region, chained into one loop of point indices per region.
-std::vector<std::vector<int>> region_loops(const CoplanarRegions& regions) {
-  const ExpandingHull& hull = regions.hull;
-  struct Ridge {
-    int from, to;
-  };
-  std::vector<std::vector<Ridge>> border(regions.first.size());
-  for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t) {
-    if (hull.facets[t].removed()) continue;
-    cancellation_point();
-    for (int i = 0; i < 3; ++i)
-      if (regions.region[hull.facets[t].neighbour[i]] != regions.region[t])
-        border[regions.region[t]].push_back({hull.facets[t].vertex[i], hull.facets[t].vertex[(i + 1) % 3]});
+/// Closed lines of point indices, one after the other.
+struct Loops {
+  std::vector<int> start{0}, point;
+
+  int size() const { return static_cast<int>(start.size()) - 1; }
+  std::span<const int> operator[](int i) const {
+    return std::span(point).subspan(start[i], start[i + 1] - start[i]);
   }
-  std::vector<std::vector<int>> loops(border.size());
+  void end() { start.push_back(static_cast<int>(point.size())); }
+};
+
+/// The directed ridges that leave each region, chained into one loop of point indices per region.
+Loops region_loops(const CoplanarRegions& regions) {
+  const ExpandingHull& hull = regions.hull;
+  const int count = static_cast<int>(regions.first.size());
+  std::vector<int> begin(count + 1, 0), member;
+  for (int r : regions.region)
+    if (r >= 0) ++begin[r + 1];
+  for (int r = 0; r < count; ++r) begin[r + 1] += begin[r];
+  member.resize(begin[count]);
+  std::vector<int> filled(begin.begin(), begin.end() - 1);
+  for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t)
+    if (regions.region[t] >= 0) member[filled[regions.region[t]]++] = t;
+
+  Loops loops;
+  loops.point.reserve(3 * static_cast<size_t>(count));
+  loops.start.reserve(count + 1);
   std::vector<int> next(hull.points.size(), -1);
-  for (int r = 0; r < static_cast<int>(border.size()); ++r) {
+  for (int r = 0; r < count; ++r) {
     cancellation_point();
-    if (border[r].empty()) continue;
-    for (const Ridge& ridge : border[r]) next[ridge.from] = ridge.to;
-    const int begin = border[r][0].from;
-    int v = begin;
-    do {
-      loops[r].push_back(v);
+    if (begin[r + 1] - begin[r] == 1) {
+      const auto& corners = hull.facets[member[begin[r]]].vertex;
+      loops.point.insert(loops.point.end(), corners.begin(), corners.end());
+      loops.end();
+      continue;
+    }
+    int first = -1, ridges = 0;
+    for (int m = begin[r]; m < begin[r + 1]; ++m) {
+      cancellation_point();
+      const ExpandingHull::Facet& facet = hull.facets[member[m]];
+      for (int i = 0; i < 3; ++i) {
+        if (regions.region[facet.neighbour[i]] == r) continue;
+        next[facet.vertex[i]] = facet.vertex[(i + 1) % 3];
+        if (ridges++ == 0) first = facet.vertex[i];
+      }
+    }
+    for (int v = first, chained = 0; chained < ridges; ++chained) {
+      loops.point.push_back(v);
       v = next[v];
-    } while (v != begin && loops[r].size() < border[r].size());
+      if (v == first) break;
+    }
+    loops.end();
   }
   return loops;
 }
 
 /// Points in the middle of an edge lie on two facets only: they are no vertices of the solid.
-void drop_edge_points(std::vector<std::vector<int>>& loops, int points) {
+void drop_edge_points(Loops& loops, int points) {
   std::vector<int> facets_at(points, 0);
-  for (const auto& loop : loops)
-    for (int v : loop) ++facets_at[v];
-  for (auto& loop : loops) {
+  for (int v : loops.point) ++facets_at[v];
+  int kept = 0;
+  for (int i = 0, from = 0; i < loops.size(); ++i) {
     cancellation_point();
-    std::erase_if(loop, [&](int v) { return facets_at[v] < 3; });
-    if (loop.size() < 3) loop.clear();
+    const int begin = kept, to = loops.start[i + 1];
+    for (; from < to; ++from)
+      if (facets_at[loops.point[from]] >= 3) loops.point[kept++] = loops.point[from];
+    if (kept - begin < 3) kept = begin;
+    loops.start[i + 1] = kept;
   }
+  loops.point.resize(kept);
 }
 
 /// Newell's normal of a polygon, taken about its first corner; the offset is that of its outermost corner.
@@ -195,16 +247,17 @@ std::vector<std::array<int, 3>> exact_corners(const CoplanarRegions& regions) {
   return corners;
 }
 
-HullData hull_data(const CoplanarRegions& regions, const std::vector<std::vector<int>>& loops, Vec3 origin,
-                   std::vector<int>* source) {
+HullData hull_data(const CoplanarRegions& regions, const Loops& loops, Vec3 origin, std::vector<int>* source) {
   const ExpandingHull& hull = regions.hull;
   HullData data;
   data.origin = origin;
   std::vector<int> index(hull.points.size(), -1);
-  for (const auto& loop : loops) {
+  data.ring.reserve(loops.point.size());
+  data.ring_start.reserve(loops.start.size());
+  for (int i = 0; i < loops.size(); ++i) {
     cancellation_point();
-    if (loop.empty()) continue;
-    for (int p : loop) {
+    if (loops[i].empty()) continue;
+    for (int p : loops[i]) {
       if (index[p] < 0) {
         index[p] = static_cast<int>(data.vertices.size());
         data.vertices.push_back(hull.points[p]);
@@ -230,7 +283,8 @@ HullData hull_data(const CoplanarRegions& regions, const std::vector<std::vector
     data.triangles.push_back(triangle);
   }
   const std::vector<std::array<int, 3>> exact = exact_corners(regions);
-  for (int r = 0; r < static_cast<int>(loops.size()); ++r) {
+  data.facet_corners.reserve(data.ring_start.size() - 1), data.planes.reserve(data.ring_start.size() - 1);
+  for (int r = 0; r < loops.size(); ++r) {
     if (loops[r].empty()) continue;
     cancellation_point();
     const auto& [a, b, c] = exact[r];
@@ -240,7 +294,9 @@ HullData hull_data(const CoplanarRegions& regions, const std::vector<std::vector
   return data;
 }
 
-std::vector<Edge> edges_of(const HullData& data) {
+/// `across[i]` becomes the facet beside that of ring[i], across the edge that begins there; -1 if there are no edges.
+std::vector<Edge> edges_of(const HullData& data, std::vector<int>& across) {
+  across.assign(data.ring.size(), -1);
   struct Side {
     int from, to, facet, number;
   };
@@ -266,11 +322,14 @@ std::vector<Edge> edges_of(const HullData& data) {
     });
   }
   std::vector<Edge> edges;
+  edges.reserve(sides.size() / 2);
   for (size_t i = 0; i < sides.size(); i += 2) {
     const bool paired = i + 1 < sides.size() && sides[i].from == sides[i + 1].to && sides[i].to == sides[i + 1].from;
     if (!paired || (i + 2 < sides.size() && ends(sides[i + 2]) == ends(sides[i]))) return {};
     edges.push_back({sides[i].from, sides[i].to, sides[i].facet, sides[i + 1].facet});
   }
+  for (size_t i = 0; i < sides.size(); i += 2)
+    across[sides[i].number] = sides[i + 1].facet, across[sides[i + 1].number] = sides[i].facet;
   return edges;
 }
 
@@ -305,22 +364,14 @@ double rise_beside(const HullData& data, const Plane& across, std::span<const in
 namespace {
 
 /// The largest rise_beside() over all edges.
-double rise_over_edges(const HullData& data, double rounding) {
-  const auto side = [](int from, int to) { return static_cast<std::uint64_t>(from) << 32 | static_cast<unsigned>(to); };
-  std::unordered_map<std::uint64_t, int> across;
-  for (const Edge& e : data.edges) {
-    cancellation_point();
-    across[side(e.from, e.to)] = e.right, across[side(e.to, e.from)] = e.left;
-  }
+double rise_over_edges(const HullData& data, std::span<const int> across, double rounding) {
   double highest = 0;
   for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
     cancellation_point();
     const auto ring = data.facet(f);
-    for (size_t i = 0; i < ring.size(); ++i) {
-      const auto found = across.find(side(ring[i], ring[(i + 1) % ring.size()]));
-      if (found != across.end())
-        highest = std::max(highest, rise_beside(data, data.planes[found->second], ring, i, rounding));
-    }
+    for (size_t i = 0; i < ring.size(); ++i)
+      if (const int beside = across[data.ring_start[f] + i]; beside >= 0)
+        highest = std::max(highest, rise_beside(data, data.planes[beside], ring, i, rounding));
   }
   return highest;
 }
@@ -328,21 +379,28 @@ double rise_over_edges(const HullData& data, double rounding) {
 }  // namespace
 
 void complete(HullData& data) {
-  data.edges = edges_of(data);
-  std::vector<std::vector<int>> around(data.vertices.size());
+  std::vector<int> across;
+  data.edges = edges_of(data, across);
+  const int vertices = static_cast<int>(data.vertices.size());
+  std::vector<int> start(vertices + 1, 0), around(data.ring.size());
+  for (int v : data.ring) ++start[v + 1];
+  for (int v = 0; v < vertices; ++v) start[v + 1] += start[v];
+  std::vector<int> filled(start.begin(), start.end() - 1);
   for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
     cancellation_point();
     for (int v : data.facet(f)) {
-      around[v].push_back(f);
+      around[filled[v]++] = f;
       data.flatness = std::max(data.flatness, -signed_distance(data.planes[f], data.vertices[v]));
     }
   }
-  for (const auto& facets : around) {
+  data.facets_meet.reserve(vertices);
+  for (int v = 0; v < vertices; ++v) {
     cancellation_point();
-    data.facets_meet.push_back(well_spread(facets, data.planes));
+    data.facets_meet.push_back(well_spread(std::span(around).subspan(start[v], start[v + 1] - start[v]), data.planes));
   }
   for (Vec3 v : data.vertices) data.radius = std::max(data.radius, norm(v));
-  data.flatness = std::max(data.flatness, rise_over_edges(data, 256 * DBL_EPSILON * data.radius + 4 * data.flatness));
+  const double rounding = 256 * DBL_EPSILON * data.radius + 4 * data.flatness;
+  data.flatness = std::max(data.flatness, rise_over_edges(data, across, rounding));
 }
 
 namespace {
@@ -357,7 +415,7 @@ std::shared_ptr<HullData> merged(const ExpandingHull& hull, Vec3 origin, std::ve
   // a plane through three of them misses a fourth by up to about eight of those.
   const double rounding = 16 * DBL_EPSILON * extent;
   const CoplanarRegions regions = merge_coplanar(hull, rounding);
-  std::vector<std::vector<int>> loops = region_loops(regions);
+  Loops loops = region_loops(regions);
   drop_edge_points(loops, static_cast<int>(hull.points.size()));
   auto data = std::make_shared<HullData>(hull_data(regions, loops, origin, source));
   if (data->planes.size() < 4) return nullptr;
