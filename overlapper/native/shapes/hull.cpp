@@ -145,9 +145,7 @@ struct Loops {
   std::vector<int> start{0}, point;
 
   int size() const { return static_cast<int>(start.size()) - 1; }
-  std::span<const int> operator[](int i) const {
-    return std::span(point).subspan(start[i], start[i + 1] - start[i]);
-  }
+  std::span<const int> operator[](int i) const { return std::span(point).subspan(start[i], start[i + 1] - start[i]); }
   void end() { start.push_back(static_cast<int>(point.size())); }
 };
 

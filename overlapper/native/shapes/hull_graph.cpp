@@ -87,13 +87,23 @@ int steepest(const std::vector<NeighbourFan>& fans, const std::vector<int>& fan_
                                     [&](int place) { return slope(fan.neighbour[place]) * fan.inverse[place]; })];
 }
 
-/// `shortcut(top, height)` is the only neighbour to look at, or -1 if all are.
-template <class Value, class Neighbours, class Shortcut>
-int climb(int start, double slack, int elements, Value value, Neighbours neighbours, Shortcut shortcut,
-          double& height) {
+/// Steps after which a climb leaves the rest to a tree, if there is one.
+constexpr int kMostSteps = 2;
+/// Steps from a cell of a map to the next that are not worth a tree.
+constexpr int kUsualSteps = 8;
+
+/// `shortcut(top, height)` is the only neighbour to look at, or -1 if all are; `leap(top, height)` an element higher
+/// up, from wherever, or the same one. `steps` is counted up.
+template <class Value, class Neighbours, class Shortcut, class Leap>
+int climb(int start, double slack, int elements, Value value, Neighbours neighbours, Shortcut shortcut, Leap leap,
+          double& height, int& steps) {
   int top = start;
   height = value(top);
-  while (true) {
+  for (int left = kMostSteps;; --left) {
+    if (left == 0) {
+      top = leap(top, height);
+      height = value(top);
+    }
     int higher = -1;
     bool level = false;
     const double here = height;
@@ -111,7 +121,15 @@ int climb(int start, double slack, int elements, Value value, Neighbours neighbo
     }
     if (higher < 0) return top;
     top = higher;
+    ++steps;
   }
+}
+
+/// What climb() leaps by, where better elements lie beyond the plane that `aim(height)` gives.
+template <class Aim, class Value>
+auto leap_in(const PointTree& tree, Aim aim, Value value) {
+  return
+      [&tree, aim, value](int top, double height) { return tree.empty() ? top : tree.better(top, height, aim, value); };
 }
 
 template <class Value>
@@ -240,27 +258,76 @@ void make_fans(const HullData& hull, HullGraph& graph) {
   }
 }
 
+int farthest_vertex_from(const HullData& hull, const HullGraph& graph, Vec3 direction, int start, int& steps) {
+  const double size = graph.circumradius * std::sqrt(norm2(direction));
+  // About the centroid, where coordinates are as small as they get.
+  const auto value = [&](int v) { return dot(hull.vertices[v] - hull.centroid, direction); };
+  const auto shortcut = [&](int top, double) {
+    return steepest(graph.vertex_fans, graph.fan_of_vertex, top,
+                    [&](int v) { return dot(hull.vertices[v] - hull.vertices[top], direction); });
+  };
+  const auto aim = [&](double height) { return PointTree::Beyond{direction, height}; };
+  double height;
+  return climb(start, rounding_of_dot(size), static_cast<int>(hull.vertices.size()), value, vertex_neighbours(graph),
+               shortcut, leap_in(graph.vertex_tree, aim, value), height, steps);
+}
+
+int facet_towards_from(const HullData& hull, const HullGraph& graph, Vec3 from_centroid, double& gauge, int start,
+                       int& steps) {
+  const double size = std::sqrt(norm2(from_centroid)) / graph.inradius;
+  const auto value = [&](int f) { return dot(graph.dual[f], from_centroid); };
+  const auto shortcut = [&](int top, double here) {
+    return steepest(graph.facet_fans, graph.fan_of_facet, top, facet_slope(hull, hull.centroid, from_centroid, here));
+  };
+  const auto aim = [&](double height) { return PointTree::Beyond{from_centroid, height}; };
+  return climb(start, rounding_of_dot(size), static_cast<int>(graph.dual.size()), value, facet_neighbours(graph, hull),
+               shortcut, leap_in(graph.facet_tree, aim, value), gauge, steps);
+}
+
+/// The map of so many elements by `nearest(direction, start, steps)`; `plant()` once ways from cell to cell are long.
+template <class Nearest, class Plant>
+DirectionMap filled(int elements, Nearest nearest, Plant plant) {
+  const auto fill = [&](DirectionMap& map, double allowed) {
+    int element = 0;
+    for (int cell = 0; cell < map.cells(); ++cell) {
+      cancellation_point();
+      int steps = 0;
+      map.set(cell, element = nearest(map.centre(cell), element, steps));
+      allowed += kUsualSteps - steps;
+      if (allowed < 0) return false;
+    }
+    return true;
+  };
+  DirectionMap map(elements);
+  // The way to the first cell, and on a body as long as it is wide, from the end of a row of cells to the next.
+  if (fill(map, 4 * std::sqrt(elements))) return map;
+  plant();
+  map = DirectionMap(elements / 16);
+  fill(map, std::numeric_limits<double>::infinity());
+  return map;
+}
+
 void fill_maps(const HullData& hull, HullGraph& graph) {
   const int vertices = static_cast<int>(hull.vertices.size()), facets = static_cast<int>(hull.planes.size());
-  if (vertices > kMostScanned) {
-    DirectionMap map(vertices);
-    int v = 0;
-    for (int cell = 0; cell < map.cells(); ++cell) {
-      cancellation_point();
-      map.set(cell, v = graph.farthest_vertex(hull, map.centre(cell), v));
-    }
-    graph.vertex_near = std::move(map);
-  }
-  if (facets > kMostScanned) {
-    DirectionMap map(facets);
-    int f = 0;
-    double gauge;
-    for (int cell = 0; cell < map.cells(); ++cell) {
-      cancellation_point();
-      map.set(cell, f = graph.facet_towards(hull, hull.centroid + map.centre(cell), gauge, f));
-    }
-    graph.facet_near = std::move(map);
-  }
+  if (vertices > kMostScanned)
+    graph.vertex_near = filled(
+        vertices,
+        [&](Vec3 direction, int start, int& steps) {
+          return farthest_vertex_from(hull, graph, direction, start, steps);
+        },
+        [&] {
+          std::vector<Vec3> points;
+          for (Vec3 v : hull.vertices) points.push_back(v - hull.centroid);
+          graph.vertex_tree = PointTree(points);
+        });
+  if (facets > kMostScanned)
+    graph.facet_near = filled(
+        facets,
+        [&](Vec3 direction, int start, int& steps) {
+          double gauge;
+          return facet_towards_from(hull, graph, direction, gauge, start, steps);
+        },
+        [&] { graph.facet_tree = PointTree(graph.dual); });
 }
 
 }  // namespace
@@ -299,17 +366,8 @@ int HullGraph::farthest_vertex(const HullData& hull, Vec3 direction) const {
 }
 
 int HullGraph::farthest_vertex(const HullData& hull, Vec3 direction, int start) const {
-  const double size = circumradius * std::sqrt(norm2(direction));
-  double height;
-  // About the centroid, where coordinates are as small as they get.
-  return climb(
-      start, rounding_of_dot(size), static_cast<int>(hull.vertices.size()),
-      [&](int v) { return dot(hull.vertices[v] - hull.centroid, direction); }, vertex_neighbours(*this),
-      [&](int top, double) {
-        return steepest(vertex_fans, fan_of_vertex, top,
-                        [&](int v) { return dot(hull.vertices[v] - hull.vertices[top], direction); });
-      },
-      height);
+  int steps = 0;
+  return farthest_vertex_from(hull, *this, direction, start, steps);
 }
 
 int HullGraph::facet_towards(const HullData& hull, Vec3 point, double& gauge) const {
@@ -320,15 +378,8 @@ int HullGraph::facet_towards(const HullData& hull, Vec3 point, double& gauge) co
 }
 
 int HullGraph::facet_towards(const HullData& hull, Vec3 point, double& gauge, int start) const {
-  const Vec3 from_centroid = point - hull.centroid;
-  const double size = std::sqrt(norm2(from_centroid)) / inradius;
-  return climb(
-      start, rounding_of_dot(size), static_cast<int>(dual.size()), [&](int f) { return dot(dual[f], from_centroid); },
-      facet_neighbours(*this, hull),
-      [&](int top, double here) {
-        return steepest(facet_fans, fan_of_facet, top, facet_slope(hull, hull.centroid, from_centroid, here));
-      },
-      gauge);
+  int steps = 0;
+  return facet_towards_from(hull, *this, point - hull.centroid, gauge, start, steps);
 }
 
 int HullGraph::ray_exit(const HullData& hull, Vec3 origin, Vec3 direction, double& rate) const {
@@ -351,12 +402,16 @@ int HullGraph::ray_exit(const HullData& hull, Vec3 origin, Vec3 direction, doubl
   const auto shortcut = [&](int top, double here) {
     return steepest(facet_fans, fan_of_facet, top, facet_slope(hull, origin, direction, here));
   };
-  const int first = climb(start, 0, facets, value, facet_neighbours(*this, hull), shortcut, rate);
+  // Of the polar dual about the centroid, rates above one are points beyond a plane as well.
+  const Vec3 from_centroid = origin - hull.centroid;
+  const auto aim = [&](double above) { return PointTree::Beyond{direction + above * from_centroid, above}; };
+  const auto leap = leap_in(facet_tree, aim, value);
+  int steps = 0;
+  const int first = climb(start, 0, facets, value, facet_neighbours(*this, hull), shortcut, leap, rate, steps);
   // Rates near that of the exit have slacks that are rounded alike.
   const double slack = -signed_distance(hull.planes[first], origin);
-  const double rounding =
-      rounding_of_dot(circumradius + norm(origin - hull.centroid)) / std::max(slack, inradius * 0x1p-40);
-  return climb(first, rate * rounding, facets, value, facet_neighbours(*this, hull), shortcut, rate);
+  const double rounding = rounding_of_dot(circumradius + norm(from_centroid)) / std::max(slack, inradius * 0x1p-40);
+  return climb(first, rate * rounding, facets, value, facet_neighbours(*this, hull), shortcut, leap, rate, steps);
 }
 
 std::shared_ptr<const HullGraph> graph_of(const HullData& hull) {

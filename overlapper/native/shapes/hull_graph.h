@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "geometry/vec.h"
+#include "shapes/point_tree.h"
 
 namespace overlapper {
 
@@ -56,6 +57,9 @@ struct HullGraph {
   /// for none; empty if there is none at all.
   std::vector<NeighbourFan> vertex_fans, facet_fans;
   std::vector<int> fan_of_vertex, fan_of_facet;
+  /// Of vertices, and of dual points, about the centroid, where neighbours are many steps from what lies beside in the
+  /// map, as around a rim, and a climb would take as many as the root of their number; empty where it does not.
+  PointTree vertex_tree, facet_tree;
 
   /// Number of a farthest vertex along `direction`.
   int farthest_vertex(const HullData& hull, Vec3 direction) const;
