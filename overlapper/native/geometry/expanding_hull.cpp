@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -62,14 +63,57 @@ int ExpandingHull::make_facet(int a, int b, int c) {
   facet.normal = cross(u, v);
   facet.normal_rounding = {std::abs(u.y * v.z) + std::abs(u.z * v.y), std::abs(u.z * v.x) + std::abs(u.x * v.z),
                            std::abs(u.x * v.y) + std::abs(u.y * v.x)};
+  if (!vacant_.empty()) {
+    const int number = vacant_.back();
+    vacant_.pop_back();
+    facets[number] = facet;
+    visited_[number] = 0;
+    born_[number] = made_++;
+    return number;
+  }
   facets.push_back(facet);
   visited_.push_back(0);
+  if (!born_.empty()) born_.push_back(made_++);
   return static_cast<int>(facets.size()) - 1;
+}
+
+void ExpandingHull::vacate_removed() {
+  if (facets.size() < kLeastReused) return;
+  if (born_.empty()) {
+    made_ = static_cast<int>(facets.size());
+    born_.resize(facets.size());
+    std::iota(born_.begin(), born_.end(), 0);
+  }
+  vacant_.insert(vacant_.end(), removed_.begin(), removed_.end());
+}
+
+void ExpandingHull::order_by_birth() {
+  if (born_.empty()) return;
+  struct Place {
+    int born, from;
+  };
+  std::vector<Place> order;
+  for (int f = 0; f < static_cast<int>(facets.size()); ++f)
+    if (!facets[f].removed()) order.push_back({born_[f], f});
+  std::sort(order.begin(), order.end(), [](const Place& a, const Place& b) { return a.born < b.born; });
+  std::vector<int> number(facets.size(), -1);
+  for (int i = 0; i < static_cast<int>(order.size()); ++i) number[order[i].from] = i;
+  std::vector<Facet> ordered;
+  ordered.reserve(order.size());
+  for (const Place& place : order) {
+    cancellation_point();
+    ordered.push_back(facets[place.from]);
+    for (int& other : ordered.back().neighbour) other = number[other];
+  }
+  facets = std::move(ordered);
+  visited_.assign(facets.size(), 0);
+  for (int& facet : cone_) facet = number[facet];
+  removed_.clear(), vacant_.clear(), born_.clear();
 }
 
 bool ExpandingHull::start() {
   facets.clear();
-  visited_.clear();
+  visited_.clear(), vacant_.clear(), born_.clear();
   visit_ = 0;
   double largest = 0;
   for (Vec3 p : points) largest = std::max(largest, max_component(abs(p)));
@@ -92,7 +136,7 @@ bool ExpandingHull::start() {
 
 bool ExpandingHull::assemble(std::span<const std::array<int, 3>> triangles) {
   facets.clear();
-  visited_.clear();
+  visited_.clear(), vacant_.clear(), born_.clear();
   struct Side {
     int low, high, facet, number;
   };
@@ -338,8 +382,11 @@ bool ExpandingHull::build(std::span<const double> negligible) {
     }
     insert(apex, facet);
     hand_on_to_cone(apex);
+    vacate_removed();
+    // A number of a facet that is gone may wait for its turn still, and have become another's: that has had its own.
     pending.insert(pending.end(), cone_.begin(), cone_.end());
   }
+  order_by_birth();
   return true;
 }
 

@@ -86,8 +86,17 @@ class ExpandingHull {
   bool rises_above(int facet, int p, double fraction);
   void collect_visible(int p, int seen);
   void link_cone(int p);
+  /// Lets the facets removed by the last insert() be others, which no one outside may notice.
+  void vacate_removed();
+  /// If others have taken the place of facets: as if none had, but without gaps.
+  void order_by_birth();
+
+  static constexpr size_t kLeastReused = 1024;  ///< facets, before which caches hold the removed ones as well
 
   std::vector<int> cone_, fan_, removed_, stack_, cone_start_, next_conflict_, visited_;
+  std::vector<int> vacant_,
+      born_;  ///< numbers of facets; per facet, how many have been made before, once one is vacant
+  int made_ = 0;
   struct HorizonRidge {
     int from, to, outside;
   };
