@@ -99,24 +99,42 @@ class Measuring {
   /// m: nearer than that, walls of the same direction lie in one plane.
   double coincident() const { return 1e-24 * extent; }
 
-  /// Whether two walls face each other in one plane, so that there is nothing between them.
-  bool flat() const {
-    for (size_t i = 0; i < walls_.size(); ++i)
-      for (size_t j = i + 1; j < walls_.size(); ++j)
-        if (norm2(rounded(walls_[i].normal + walls_[j].normal)) < 1e-48 &&
-            (walls_[i].slack + walls_[j].slack).head < coincident())
-          return true;
+  /// Calls `use(i, j)` with every two different walls whose normals may be opposite, for `side` -1, or equal, for 1:
+  /// both ways round, and until it returns true. Of many walls, those next to each other along a line that no body
+  /// prefers.
+  template <class Use>
+  bool any_two(double side, Use use) {
+    constexpr Vec3 kAcross{0.3141, 0.5926, 0.7417};
+    constexpr double kEqual = 1e-12;  // beyond the rounding of these lengths
+    by_length_.clear();
+    for (int i = 0; i < static_cast<int>(walls_.size()); ++i)
+      by_length_.push_back({dot(kAcross, rounded(walls_[i].normal)), i});
+    std::ranges::sort(by_length_);
+    for (const auto& [length, i] : by_length_) {
+      const std::pair<double, int> least{side * length - kEqual, -1};
+      for (auto other = std::ranges::lower_bound(by_length_, least);
+           other != by_length_.end() && other->first <= side * length + kEqual; ++other)
+        if (other->second != i && use(walls_[i], walls_[other->second])) return true;
+    }
     return false;
+  }
+
+  /// Whether two walls face each other in one plane, so that there is nothing between them.
+  bool flat() {
+    return any_two(-1, [&](const Wall& a, const Wall& b) {
+      return norm2(rounded(a.normal + b.normal)) < 1e-48 && (a.slack + b.slack).head < coincident();
+    });
   }
 
   /// A face in the plane of a cut is all that lies there: beyond the cut, the next piece is flat.
   void prefer_faces() {
-    std::erase_if(walls_, [&](const Wall& cut) {
-      return cut.owner == slicing::kCut && std::ranges::any_of(walls_, [&](const Wall& face) {
-               return face.owner != slicing::kCut && norm2(rounded(face.normal - cut.normal)) < 1e-48 &&
-                      std::abs((face.slack - cut.slack).head) < coincident();
-             });
+    any_two(1, [&](Wall& cut, const Wall& face) {
+      if (cut.owner == slicing::kCut && face.owner != slicing::kCut &&
+          norm2(rounded(face.normal - cut.normal)) < 1e-48 && std::abs((face.slack - cut.slack).head) < coincident())
+        cut.owner = kSuperseded;
+      return false;
     });
+    std::erase_if(walls_, [](const Wall& wall) { return wall.owner == kSuperseded; });
   }
 
   /// A cylinder that holds the other round leaves all of it, and where it touches that from outside along a line,
@@ -290,7 +308,9 @@ class Measuring {
   }
 
   std::vector<Round> rounds_;
+  static constexpr int kSuperseded = -1;  ///< the owner of a wall that is to go
   std::vector<Wall> walls_, with_radical_;
+  std::vector<std::pair<double, int>> by_length_;  ///< walls, by what their normals are along a line
   std::vector<slicing::Interval> intervals_;
   slicing::Sum sum_, best_;
   Vec3 offset_;         ///< of the point that the pieces are about, from the point inside
