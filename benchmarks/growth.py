@@ -27,6 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 from watched import Watched
 
+import overlapper
+from overlapper import Hull, Placed, RoundedHull, Sphere, distance, overlap
+
 TIME_LIMIT = 20.0  # s, for three answers of one size; a larger one is not asked for after a tenth of it
 WORTH_TIMING = 0.1  # s, of the largest size, below which an exponent says little
 MOST_EXPONENT = 1.6
@@ -136,7 +139,13 @@ FAMILIES: dict[str, Callable[[int, np.random.Generator], Points]] = {
     if each is not circle
 }  # fmt: skip
 
-QUESTIONS = ("hull", "volume", "depth", "vertices", "errors", "distance", "paper", "ball")
+ROUND: dict[str, Callable[[float], Any]] = {
+    "ball": lambda extent: overlapper.Sphere(extent / 2),
+    "capsule": lambda extent: overlapper.Capsule(extent / 4, extent / 2),
+    "cylinder": lambda extent: overlapper.Cylinder(extent / 3, extent / 2),
+    "small_ball": lambda extent: overlapper.Sphere(extent / 50),
+}
+QUESTIONS = ("hull", "volume", "depth", "vertices", "errors", "distance", "paper", "rounded", *ROUND)
 
 
 @dataclass(frozen=True)
@@ -159,8 +168,6 @@ class Input:
 
 def seconds(given: Input, n: int) -> tuple[float, int]:
     """Processor time of one answer, and of how many facets. Only what is asked is timed, not what it is asked of."""
-    from overlapper import Hull, Placed, Sphere, distance, overlap
-
     points = given.points(n)
     start = time.process_time()
     body = Hull(points)
@@ -176,8 +183,12 @@ def seconds(given: Input, n: int) -> tuple[float, int]:
             distance(body, Placed(body, (2 * extent, 0.1 * extent, 0), given.turn))
         elif given.ask == "paper":
             overlap(body, other, method="paper")
-        elif given.ask == "ball":
-            assert overlap(body, Placed(Sphere(extent / 2), given.away)).volume_error >= 0
+        elif given.ask == "rounded":
+            rounded = Placed(RoundedHull(points, extent / 100), (extent, 0, 0), given.turn)
+            start = time.process_time()
+            assert overlap(Sphere(extent / 2), rounded).volume_error >= 0
+        elif given.ask in ROUND:
+            assert overlap(body, Placed(ROUND[given.ask](extent), given.away, given.turn)).volume_error >= 0
         else:
             getattr(common, given.ask)
     return time.process_time() - start, len(body.triangles)

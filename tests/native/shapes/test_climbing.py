@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from families import icosphere
 
-from overlapper import HalfSpace, Hull, Placed, distance
+from overlapper import HalfSpace, Hull, Placed, distance, overlap
 
 
 def prism(sides, height=1.0):
@@ -46,7 +46,10 @@ MANY = {
     "cone": cone(300),
     "two cones": np.vstack([cone(300), [[0, 0, -1]]]),
     "flat cone": cone(300) * [1, 1, 1e-9],
+    "cone of 5000 sides": cone(5000),
     "moment curve": np.linspace(0, 1, 300)[:, None] ** [1, 2, 3],
+    "trigonometric curve": np.array([[np.cos(t), np.sin(t), np.cos(2 * t)] for t in 2 * np.pi * np.arange(900) / 900]),
+    "two arcs": np.vstack([[[t, 0, t**2 - 3], [0, t, 3 - t**2]] for t in np.linspace(-1, 1, 800)]),
     "grid on a cube": np.array(list(np.ndindex(7, 7, 7)), float) - 3,
 }
 
@@ -61,3 +64,17 @@ def test_climbing_reaches_the_lowest_corner(points):
         ground = HalfSpace(normal, -2 * np.abs(corners).max())
         lowest = (corners @ ground.normal).min() - ground.offset
         assert distance(Placed(hull), ground) == pytest.approx(lowest, rel=1e-15)
+
+
+@pytest.mark.parametrize("points", MANY.values(), ids=MANY)
+def test_climbing_finds_the_facets_around_a_smaller_copy(points):
+    hull = Hull(points)
+    middle = np.asarray(hull.centroid)
+    inner = Placed(Hull((np.asarray(hull.vertices) - middle) * 0.75), middle)
+    common = overlap(hull, inner)
+    assert common.volume == pytest.approx(0.75**3 * hull.volume, rel=1e-9)
+    # Pushed out half of the way to its border, it stays inside; twice as far, it does not.
+    corner = np.asarray(hull.vertices)[0]
+    for share, whole in ((0.12, True), (0.5, False)):
+        moved = overlap(hull, Placed(inner.shape, middle + share * (corner - middle)))
+        assert (moved.volume == pytest.approx(inner.shape.volume, rel=1e-9)) == whole
