@@ -10,8 +10,8 @@
 
 namespace overlapper {
 
-/// Points in boxes within boxes: a best one of them in a time like the logarithm of their number, wherever they lie,
-/// if few come near it.
+/// Points in boxes within boxes: a good one of them, and the best in a time like the logarithm of their number, if few
+/// come near it.
 class PointTree {
  public:
   PointTree() = default;
@@ -25,15 +25,15 @@ class PointTree {
 
   bool empty() const { return nodes_.empty(); }
 
-  /// The number of a point whose `value(number)` is the largest, if it is larger than that of `best`, which `height`
-  /// is; `best` otherwise. Points that are better than `height` lie beyond the plane `aim(height)`.
+  /// The number of a point whose `value(number)` is larger than that of `best`, which `height` is, the largest unless
+  /// too many come near it; `best` if none is found. Those larger than `height` lie beyond the plane `aim(height)`.
   template <class Aim, class Value>
   int better(int best, double height, Aim aim, Value value) const {
     std::array<int, kMostDepth> waiting;
     int count = 0;
     waiting[count++] = 0;
     Beyond above = aim(height);
-    while (count > 0) {
+    for (int opened = 0; count > 0 && opened < kMostOpened; ++opened) {
       const int at = waiting[--count];
       const Node& node = nodes_[at];
       if (!(most(node, above.direction) > above.level)) continue;
@@ -57,6 +57,9 @@ class PointTree {
 
  private:
   static constexpr int kLeaf = 8;
+  /// Boxes looked into: of round bodies, and around rims, fewer hold something better. Along a slender body that lies
+  /// across the axes, all do.
+  static constexpr int kMostOpened = 128;
   static constexpr int kMostDepth = 64;  ///< nodes that wait: one for each halving
 
   struct Entry {
@@ -73,7 +76,7 @@ class PointTree {
     return std::max(node.lower.x * d.x, node.upper.x * d.x) + std::max(node.lower.y * d.y, node.upper.y * d.y) +
            std::max(node.lower.z * d.z, node.upper.z * d.z);
   }
-  int grow(int begin, int end);
+  int grow(int begin, int end, Vec3 scale);
 
   std::vector<Node> nodes_;
   std::vector<Entry> entries_;  ///< those of a box side by side
