@@ -232,7 +232,8 @@ class ParquetTable:
         self._schema = pyarrow.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()], metadata)
         self._place, self._empty = path, True
         self._folder = claim(path, folder=True)
-        self._begun = self._folder / ".unfinished"  # readers pass over a name with a dot
+        # Beside the folder, whose every file some readers take for a part of the table: a kill may leave half of one.
+        self._begun = self._folder.with_name(f".{self._folder.name}")
         self._count = 0
         self._last = self._schema.empty_table()
         try:
@@ -272,6 +273,7 @@ class ParquetTable:
         shutil.rmtree(self._folder, ignore_errors=True)  # all of it is in the table
 
     def leave(self) -> Path | None:
+        self._begun.unlink(missing_ok=True)
         if self._empty:
             shutil.rmtree(self._folder)
         return None if self._empty else self._folder

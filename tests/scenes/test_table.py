@@ -1,5 +1,6 @@
 """Tables come back as they were written, also in pandas and polars, and a killed run leaves what it had finished."""
 
+import os
 import re
 import sqlite3
 import subprocess
@@ -123,6 +124,16 @@ def test_a_killed_run_leaves_every_step_it_had_finished(tmp_path, ending):
         # It may have had time for one more than it could tell of.
         assert steps[: 3 * finished] == [step for step in range(1, finished + 1) for _ in range(3)]
         assert len(steps) <= 3 * (finished + 1)
+
+
+def test_a_part_that_a_kill_has_cut_is_not_in_the_table(tmp_path, monkeypatch):
+    table = TABLES[".parquet"](tmp_path / "run.parquet", {})
+    table.write(Cubes().rows(1))
+    monkeypatch.setattr(os, "replace", lambda *_: sys.exit("killed"))
+    with pytest.raises(SystemExit):
+        table.write(Cubes().rows(2))
+    for read in [read_table, *READERS[".parquet"]]:
+        assert len(read(tmp_path / "run.unfinished.parquet")) == len(Cubes().rows(1))
 
 
 def test_a_line_that_a_kill_has_cut_is_not_read(tmp_path):
