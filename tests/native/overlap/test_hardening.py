@@ -284,7 +284,7 @@ def growth_over(pairs):
             common = overlap(bodies[i % 97], Hull(points[i % 89]), tolerance=0.3, method=method)
             bits([common.volume, common.volume_error, common.gradient, common.vertices, common.patch, common.normal])
 
-    soak(2000)
+    soak(1000)
     before = resident()
     soak(pairs)
     return resident() - before
@@ -292,7 +292,7 @@ def growth_over(pairs):
 
 def test_memory_is_flat_over_many_pairs(monkeypatch):
     set_sanitizer(monkeypatch, "quarantine_size_mb=1")  # it would keep what is freed, to recognise its use
-    pairs = 20_000
+    pairs = 8_000
     assert in_another_process("spawn", growth_over, pairs) < 200 * pairs  # an overlap alone has more bytes than that
 
 

@@ -94,7 +94,7 @@ def test_a_pickled_hull_is_the_same_to_the_last_number_of_a_facet(seed):
 
 
 def test_arrays_may_change_while_a_batch_works_on_them():
-    pairs = np.tile(np.array([0, 1], np.int32), (100_000, 1))
+    pairs = np.tile(np.array([0, 1], np.int32), (40_000, 1))
     positions, orientations = (array.copy() for array in POSES)
     done = threading.Event()
 

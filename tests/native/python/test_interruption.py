@@ -27,12 +27,16 @@ def clump(count):
     return [Placed(ROUND[0], rng.normal(size=3) * 1e-3, rng.normal(size=4)) for _ in range(count)]
 
 
-ROUND = []  # the hull of a ball of many points, in the process that asks
+ROUND = []  # the hull of a ball of many points, in the process that is interrupted
 
 
-def hull():
-    points = ball(300_000)
+def hull(count=300_000):
+    points = ball(count)
     return lambda: Hull(points)
+
+
+def smaller_hull():
+    return hull(80_000)
 
 
 def rounded_hull():
@@ -104,9 +108,19 @@ JOBS = [
 ]  # fmt: skip
 
 
+def prepare():
+    ROUND.append(Hull(ball(50_000)))
+
+
+@pytest.fixture(scope="module")
+def another_process():
+    """One for all tests: what they start with takes longer than what they ask."""
+    with multiprocessing.get_context("spawn").Pool(1, prepare) as pool:
+        yield lambda function, *arguments: pool.apply_async(function, arguments).get(timeout=HANG)
+
+
 def presses(job):
     """Seconds of the processor from Ctrl-C to the exception at several moments, and whether another answer is right."""
-    ROUND.append(Hull(ball(50_000)))
     late = []
     for moment in (0.02, 0.1, 0.3, 0.7):
         work = job()
@@ -129,9 +143,8 @@ def presses(job):
 
 
 @pytest.mark.parametrize("job", JOBS)
-def test_ctrl_c_is_answered_within_a_second(job):
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        late, right = pool.apply_async(presses, (job,)).get(timeout=HANG)
+def test_ctrl_c_is_answered_within_a_second(another_process, job):
+    late, right = another_process(presses, job)
     assert late
     assert max(late) < 1
     assert right
@@ -139,7 +152,6 @@ def test_ctrl_c_is_answered_within_a_second(job):
 
 def handled():
     """What a long answer is if a signal handler computes something meanwhile, and what it is alone."""
-    ROUND.append(Hull(ball(30_000)))
     found = []
     alone = overlap(*clump(2)).volume
     signal.signal(signal.SIGALRM, lambda *_: found.append(overlap(*clump(2)).volume))
@@ -149,9 +161,8 @@ def handled():
     return volume, overlap(a, b, c).volume, found, alone
 
 
-def test_a_signal_handler_may_compute_while_something_else_is_computed():
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        volume, again, found, alone = pool.apply_async(handled).get(timeout=HANG)
+def test_a_signal_handler_may_compute_while_something_else_is_computed(another_process):
+    volume, again, found, alone = another_process(handled)
     assert volume == again
     assert found == [alone]
 
@@ -174,6 +185,5 @@ def beats(job):
     return count[0] / spent
 
 
-def test_other_threads_run_while_a_hull_is_made():
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        assert pool.apply_async(beats, (hull,)).get(timeout=HANG) > 10
+def test_other_threads_run_while_a_hull_is_made(another_process):
+    assert another_process(beats, smaller_hull) > 10
