@@ -194,8 +194,13 @@ class Settling {
     // Of a convex set there is no empty slice between others, but by rounding.
     if (!intervals_.empty()) intervals_.back().high = low;
     // A corner and a circle, or three lines, meet in a value of t; rounding makes it an interval of its own.
-    if (high - low < kPointlike * (high_ - low_) && !intervals_.empty()) {
+    const double pointlike = kPointlike * (high_ - low_);
+    if (high - low < pointlike && !intervals_.empty()) {
       intervals_.back().high = high;
+      return;
+    }
+    if (intervals_.size() == 1 && intervals_[0].high - intervals_[0].low < pointlike) {
+      intervals_[0] = {intervals_[0].low, high, between};
       return;
     }
     if (!intervals_.empty() && intervals_.back().outline == between) intervals_.back().high = high;
