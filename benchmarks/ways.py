@@ -93,7 +93,7 @@ TYPICAL = {
         (Placed(Capsule(0.3, 1), (0.3, 0.2, 0.5), TURN), Placed(CUBE)), "slicing"
     ),
     "a rounded hull of 80 facets and a box": Typical(
-        (Placed(RoundedHull(icosphere(1), 0.05)), Placed(CUBE, (0.9, 0.3, 0.4), TURN)), "dual hull"
+        (Placed(RoundedHull(icosphere(1), 0.05)), Placed(CUBE, (0.9, 0.3, 0.4), TURN)), "slicing"
     ),
     "a box stacked on another, flush, 1 µm deep": Typical(
         (Placed(CUBE), Placed(CUBE, (0, 0, 1 - 1e-6))), "wide dual hull"

@@ -35,11 +35,14 @@ def moved(body, shift):
     return Placed(body.shape, np.array(body.position) + shift, body.orientation)
 
 
-def sunk(rng, first, second, depth):
-    """Two bodies of these kinds, `depth` deep in one another but for rounding."""
-    a, b = somewhere(rng, first), somewhere(rng, second)
+def sink(a, b, depth):
+    """Two bodies moved along their normal until they are `depth` deep in one another, but for rounding."""
     found = overlap(a, b)
     return moved(a, (found.depth - depth if found else -found.distance - depth) * np.array(found.normal)), b
+
+
+def sunk(rng, first, second, depth):
+    return sink(somewhere(rng, first), somewhere(rng, second), depth)
 
 
 def lens(a, b):
@@ -267,3 +270,30 @@ def test_shapes_that_coincide_are_measured_truly():
         exactly, nearly = overlap(a, b), overlap(a, moved(b, (1e-9, 2e-9, -1e-9)))
         error = exactly.volume_error + nearly.volume_error + 3e-9 * (exactly.area + nearly.area)
         assert abs(exactly.volume - nearly.volume) <= error
+
+
+@pytest.mark.parametrize("depth", [0.3, 1e-2, 1e-4, 1e-7])
+@pytest.mark.parametrize("margin", [0.5, 1e-3])
+def test_a_rounded_hull_of_many_facets_shares_with_a_box_what_its_halves_do(depth, margin):
+    rng = np.random.default_rng(5)
+    rounded = Placed(RoundedHull(rng.normal(size=(40, 3)), margin), rng.normal(size=3), quaternion(rng))
+    for _ in range(4):
+        box = Placed(Box([3, 2, 1]), (8, 0, 0), quaternion(rng))
+        a, b = sink(rounded, box, depth)
+        (x, y, z, w), size = b.orientation, np.dot(b.orientation, b.orientation)
+        along = np.array([1 - 2 * (y * y + z * z) / size, 2 * (x * y + w * z) / size, 2 * (x * z - w * y) / size])
+        whole = overlap(a, b)
+        halves = [
+            overlap(a, Placed(Box([1.5, 2, 1]), b.position + side * 1.5 * along, b.orientation)) for side in (-1, 1)
+        ]
+        assert whole.way == "slicing" and whole.volume_error <= 1e-11 * whole.volume
+        rounding = 1e-15 * 8 * whole.area  # of where the halves are
+        assert whole.volume == pytest.approx(sum(half.volume for half in halves), rel=EXACT, abs=rounding)
+
+
+def test_meshes_that_meet_within_their_margins_are_measured_to_eleven_digits():
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        one, other = (Placed(RoundedHull(rng.normal(size=(30, 3)) * 0.05, 1e-3), (x, 0, 0)) for x in (0, 0.5))
+        found = overlap(*sink(one, other, 2e-4))
+        assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume

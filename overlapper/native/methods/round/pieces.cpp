@@ -6,6 +6,8 @@
 namespace overlapper::slicing {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 /// How far a shape reaches from its own origin; of a half-space, how far its plane is.
 double reach(const Shape& shape) {
   struct Visitor {
@@ -23,8 +25,10 @@ double reach(const Shape& shape) {
 /// A body in double-double, and the cutter of it.
 class Cutter {
  public:
-  Cutter(const Placed& body, const Placed& other, int owner, Vec3 reference, const WideVector& inside, Pieces& result)
+  Cutter(const Placed& body, const Placed& other, const Enclosure* common, int owner, Vec3 reference,
+         const WideVector& inside, Pieces& result)
       : other_(other),
+        common_(common),
         owner_(owner),
         inside_(rounded(inside)),
         rotation_(wide_rotation(body.orientation)),
@@ -96,12 +100,46 @@ class Cutter {
     begin();
     for (int f = 0; f < facets(core); ++f) facet_wall(core, f, 0, kCut);
     end();
-    for (int f = 0; f < facets(core); ++f) prism(core, f, hull.radius);
-    for (const Edge& edge : core.edges) edge_wedge(core, edge, hull.radius);
-    for (int v = 0; v < static_cast<int>(core.vertices.size()); ++v) vertex_wedge(core, v, hull.radius);
+    const Bounds near = local_bounds(hull.radius);
+    for (int f = 0; f < facets(core); ++f)
+      if (meets(near, core.vertices, core.facet(f))) prism(core, f, hull.radius);
+    thread_local std::vector<std::pair<int, int>> beside;
+    beside.clear();
+    for (const Edge& edge : core.edges) {
+      const std::array<int, 2> ends{edge.from, edge.to};
+      if (!meets(near, core.vertices, ends)) continue;
+      edge_wedge(core, edge, hull.radius);
+      for (const int i : {0, 1})
+        if (meets(near, core.vertices, std::span(ends).subspan(i, 1))) beside.push_back({ends[i], ends[1 - i]});
+    }
+    std::ranges::sort(beside);
+    for (size_t i = 0, end; i < beside.size(); i = end) {
+      for (end = i + 1; end < beside.size() && beside[end].first == beside[i].first;) ++end;
+      vertex_wedge(core, std::span(beside).subspan(i, end - i), hull.radius);
+    }
   }
 
  private:
+  /// In the body's own coordinates, what encloses the common set, and so much more.
+  Bounds local_bounds(double more) const {
+    if (!common_) return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+    Bounds box{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
+    const Mat3 rotation = rounded(rotation_);
+    const Vec3 origin = rounded(origin_), wider = (more + margin_) * Vec3{1, 1, 1};
+    for (const Enclosure::Corner& corner : common_->corners) {
+      const Vec3 at = apply_transposed(rotation, corner.at - origin);
+      box = {min(box.lower, at), max(box.upper, at)};
+    }
+    return {box.lower - wider, box.upper + wider};
+  }
+
+  static bool meets(const Bounds& box, const std::vector<Vec3>& vertices, std::span<const int> some) {
+    Vec3 lower = vertices[some[0]], upper = lower;
+    for (const int v : some.subspan(1)) lower = min(lower, vertices[v]), upper = max(upper, vertices[v]);
+    return lower.x <= box.upper.x && lower.y <= box.upper.y && lower.z <= box.upper.z && upper.x >= box.lower.x &&
+           upper.y >= box.lower.y && upper.z >= box.lower.z;
+  }
+
   static int facets(const HullData& hull) { return static_cast<int>(hull.planes.size()); }
 
   static double unexact(const HullData& hull) {
@@ -142,7 +180,12 @@ class Cutter {
     const DoubleDouble slack = local_offset + dot(normal, origin_);
     const Vec3 n = rounded(normal);
     const double here = dot(n, inside_) + slack.head;
-    if (bounded(other_.shape)) {
+    if (common_) {
+      if (common_->least(n) > slack.head + margin_) {
+        empty_ = true;
+        return;
+      }
+    } else if (bounded(other_.shape)) {
       if (dot(n, other_.support(n)) < here - margin_) return;
       if (dot(n, other_.support(-n)) > here + margin_) {
         empty_ = true;
@@ -206,18 +249,17 @@ class Cutter {
     end();
   }
 
-  void vertex_wedge(const HullData& hull, int v, double radius) {
+  /// Of a vertex and each of those it shares an edge with.
+  void vertex_wedge(const HullData& hull, std::span<const std::pair<int, int>> beside, double radius) {
+    const Vec3 vertex = hull.vertices[beside[0].first];
     begin();
-    ball(wide(hull.vertices[v]), radius);
-    for (const Edge& edge : hull.edges) {
-      if (edge.from != v && edge.to != v) continue;
-      const int beside = edge.from == v ? edge.to : edge.from;
-      wall_through(unit(wide_difference(hull.vertices[beside], hull.vertices[v])), hull.vertices[v]);
-    }
+    ball(wide(vertex), radius);
+    for (const auto& [_, other] : beside) wall_through(unit(wide_difference(hull.vertices[other], vertex)), vertex);
     end();
   }
 
   const Placed& other_;
+  const Enclosure* common_;
   int owner_;
   Vec3 inside_;
   WideMatrix rotation_;
@@ -235,8 +277,33 @@ double extent(const Placed& body, Vec3 point) {
   return norm(body.pose.translation - point) + reach(body.shape);
 }
 
-void cut(const Placed& body, const Placed& other, int owner, Vec3 reference, const WideVector& inside, Pieces& result) {
-  Cutter cutter(body, other, owner, reference, inside, result);
+void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result) {
+  const Bounds p = bounds(a), q = bounds(b);
+  const Vec3 lower = max(p.lower, q.lower) - inside, upper = min(p.upper, q.upper) - inside;
+  const Vec3 size = max(abs(lower), abs(upper));
+  const double margin = 1e-12 * (norm(size) + norm(inside) + norm(a.pose.translation) + norm(b.pose.translation));
+  const Vec3 wider = margin * Vec3{1, 1, 1};
+  result.become_box(lower - wider, upper + wider);
+  for (const Placed* body : {&a, &b}) {
+    const Vec3 origin = body->pose.translation - inside;
+    const auto cut = [&](const Plane& plane, double more) {
+      const Vec3 normal = body->pose.rotation * plane.normal;
+      result.cut({normal, plane.offset + dot(normal, origin) + more + margin, kNoWall});
+    };
+    if (const HullData* hull = polytope_of(body->shape)) {
+      const double more = core_radius(body->shape) + hull->flatness;
+      for (const Plane& plane : hull->planes) cut(plane, more);
+    } else if (const Box* box = std::get_if<Box>(&body->shape)) {
+      for (int f = 0; f < 6; ++f) cut(side(*box, f), 0);
+    } else if (const HalfSpace* half = std::get_if<HalfSpace>(&body->shape)) {
+      cut(half->plane, 0);
+    }
+  }
+}
+
+void cut(const Placed& body, const Placed& other, const Enclosure* common, int owner, Vec3 reference,
+         const WideVector& inside, Pieces& result) {
+  Cutter cutter(body, other, common, owner, reference, inside, result);
   std::visit([&](const auto& shape) { cutter(shape); }, body.shape);
 }
 

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "geometry/wide_pose.h"
+#include "methods/round/enclosure.h"
 #include "methods/round/slice.h"
 #include "shapes/shape.h"
 
@@ -44,11 +45,17 @@ struct Pieces {
 /// How far from a point a body reaches at most.
 double extent(const Placed& body, Vec3 point);
 
-/// Cuts a body; pieces and walls that `other` does not reach are left out. Bodies about a reference, which lies at
-/// `reference` in the world; what is cut is about the point `inside`, of the same coordinates as the bodies.
+/// A polytope around the common set of two bodies of which one is bounded, about the point `inside`: what planes of
+/// both leave of a box, and a little more.
+void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result);
+
+/// Cuts a body; pieces and walls that `other` does not reach are left out, and so are pieces outside of what encloses
+/// the common set, if that is known. Bodies about a reference, which lies at `reference` in the world; what is cut is
+/// about the point `inside`, of the same coordinates as the bodies.
 ///
 /// A capsule is a cylinder and two half balls; a rounded hull is its core, a prism on every facet, a wedge of a
 /// cylinder along every edge, and a wedge of a ball at every vertex.
-void cut(const Placed& body, const Placed& other, int owner, Vec3 reference, const WideVector& inside, Pieces& result);
+void cut(const Placed& body, const Placed& other, const Enclosure* common, int owner, Vec3 reference,
+         const WideVector& inside, Pieces& result);
 
 }  // namespace overlapper::slicing

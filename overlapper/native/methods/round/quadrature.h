@@ -21,15 +21,15 @@ struct Sum {
 /// Integrates over one interval. At its ends a slice is a series in the square root of what t is away from them, so
 /// that with t = m − h cos θ it is analytic in θ, and rules of Gauss and Legendre converge geometrically; where the
 /// last terms of the Legendre series that the nodes give are not small, the interval is halved. `volume` is about that
-/// of the whole stack, to which errors are small; false if they do not become so. `strictness` is what to divide the
-/// usual limits of these terms by; if 0, terms in the middle of the series tell how much smaller those beyond its end
-/// are.
-bool integrate(const Stack& stack, const Interval& interval, double volume, double strictness, Sum& sum);
+/// of all that is measured and `area` what is known of its area, to which errors are small; false if they do not become
+/// so. `strictness` is what to divide the usual limits of these terms by; if 0, terms in the middle of the series tell
+/// how much smaller those beyond its end are.
+bool integrate(const Stack& stack, const Interval& interval, double volume, double area, double strictness, Sum& sum);
 
-/// Whether the volume agrees with the samples. The root of the area of slices of a convex set is concave (Brunn and
-/// Minkowski), so that chords between samples bound the volume from below, and chords drawn out beyond them from above:
-/// no wrong outline and no value of t missed passes unless what it makes is smaller than the gap, about a hundredth.
-/// Thins the samples out.
-bool within_chords(Sum& sum);
+/// Whether the volume between two values of t agrees with the samples. The root of the area of slices of a convex set
+/// is concave (Brunn and Minkowski), so that chords between samples bound the volume from below, and chords drawn out
+/// beyond them from above: no wrong outline and no value of t missed passes unless what it makes is smaller than the
+/// gap, about a hundredth. Thins the samples out.
+bool within_chords(double begin, double end, Sum& sum);
 
 }  // namespace overlapper::slicing

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <vector>
 
+#include "methods/round/culling.h"
 #include "methods/round/quadrature.h"
 #include "methods/round/stack.h"
 
@@ -16,6 +17,8 @@ using slicing::Wall;
 
 /// The fraction of a volume that may stay open before rules are made finer.
 constexpr double kClosed = 1e-12;
+/// The fraction of a volume up to which the rounding of a polytope's corners does not matter.
+constexpr double kSure = 2e-13;
 /// Sums of area vectors are right to this fraction of the area.
 constexpr double kSummation = 16 * DBL_EPSILON;
 
@@ -27,6 +30,12 @@ struct Totals {
   Vec3 first, pull, moment;
   Vec3 squares, products;  ///< as in slicing::Integrals
   Vec3 unbalanced;         ///< the sum of both bodies' area vectors: zero if no piece is missing
+
+  void add(const Totals& piece) {
+    volume += piece.volume, error += piece.error, area += piece.area, border += piece.border, open += piece.open;
+    first += piece.first, pull += piece.pull, moment += piece.moment;
+    squares += piece.squares, products += piece.products, unbalanced += piece.unbalanced;
+  }
 };
 
 /// ∫ X Xᵀ dV of coordinates (x, y, t) and of their integral `first`, in the world, about a point `offset` before them.
@@ -69,11 +78,13 @@ class Measuring {
       add_cap(rounds_[0], walls_.empty() ? nullptr : &walls_[0]);
       return true;
     }
-    return add_stack();
+    return (rounds_.empty() && common && add_polytope()) || add_stack();
   }
 
   Totals totals;
-  double extent = 0;  ///< m: no point of the common set is farther from the one inside
+  double extent = 0;                           ///< m: no point of the common set is farther from the one inside
+  const slicing::Enclosure* common = nullptr;  ///< what lies outside of that belongs to no piece
+  slicing::Enclosure::Box box;                 ///< around what is added, if the common set is enclosed
 
  private:
   /// 1 if a wall leaves nothing of one of the rounds, -1 if it leaves all of one, beyond rounding.
@@ -166,6 +177,7 @@ class Measuring {
     const Vec3 n = rounded(normal), tip = rounded(ball.centre - DoubleDouble{r} * normal);
     const double h2 = height * height, h3 = h2 * height, pi = std::numbers::pi;
     const double volume = pi * h2 * (r - height / 3), first = pi * h3 * (2 * r / 3 - height / 4);
+    if (outside(tip + first / volume * n)) return;
     const double along = pi * h3 * height * (r / 2 - height / 5);
     const double across = pi / 4 * h3 * (4 * r * r / 3 - r * height + h2 / 5);
     const double disc = wall ? pi * height * (2 * r - height) : 0;
@@ -188,6 +200,47 @@ class Measuring {
     };
     act(ball.owner, -1);
     if (wall) act(wall->owner, 1);
+  }
+
+  /// Pieces that only planes bound, corner by corner in doubles; false, and nothing is added, if these are not sure of
+  /// it to a fraction of the whole that matters. No tetrahedron is negative, but by rounding.
+  bool add_polytope() {
+    const Vec3 wider = 0.1 * (box.upper - box.lower);
+    polytope_.become_box(box.lower - wider, box.upper + wider);
+    for (size_t i = 0; i < walls_.size(); ++i)
+      if (!polytope_.cut({rounded(walls_[i].normal), walls_[i].slack.head, static_cast<int>(i)})) return false;
+    Totals piece;
+    const Vec3 apex = polytope_.corners[0].at;
+    bool closed = true;
+    polytope_.for_faces([&](int wall, std::span<const Vec3> ring) {
+      if (wall == slicing::kNoWall) {
+        closed = false;
+        return;
+      }
+      Vec3 force, moment;
+      for (size_t i = 2; i < ring.size(); ++i) {
+        const Vec3 a = ring[0], b = ring[i - 1], c = ring[i], triangle = 0.5 * cross(b - a, c - a);
+        force += triangle, moment += cross((a + b + c) / 3, triangle);
+        const double tetrahedron = dot(a - apex, triangle) / 3;
+        const Vec3 sum = apex + a + b + c;
+        piece.volume += tetrahedron;
+        piece.first += tetrahedron / 4 * sum;
+        for (const Vec3 p : {apex, a, b, c, sum}) {
+          piece.squares += tetrahedron / 20 * Vec3{p.x * p.x, p.y * p.y, p.z * p.z};
+          piece.products += tetrahedron / 20 * Vec3{p.y * p.z, p.z * p.x, p.x * p.y};
+        }
+      }
+      const double area = norm(force);
+      const int owner = walls_[wall].owner;
+      piece.border += area;
+      if (owner != slicing::kCut) piece.area += area, piece.unbalanced += force;
+      if (owner == 0) piece.pull += force, piece.moment += moment;
+    });
+    // Every cut moves corners by some roundings of the box's numbers.
+    piece.error = 16 * DBL_EPSILON * norm(max(abs(box.lower), abs(box.upper))) * piece.border;
+    if (!closed || !(piece.error <= kSure * (totals.volume + piece.volume))) return false;
+    if (!outside(piece.first / piece.volume)) totals.add(piece);
+    return true;
   }
 
   /// Where the radical plane parts two balls, the common set is the part of either ball beyond it.
@@ -213,6 +266,10 @@ class Measuring {
     return add(std::span(&b, 1), with);
   }
 
+  /// Whether that is the centroid of something that shares nothing with what encloses the common set: pieces whose
+  /// walls leave something there are convex, and reach no farther.
+  bool outside(Vec3 centroid) const { return common && !common->contains(centroid + offset_); }
+
   bool add_stack() {
     const std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent);
     if (!stack || !slicing::find_intervals(*stack, false, intervals_)) return false;
@@ -226,16 +283,19 @@ class Measuring {
     }
     double open = integrate(*stack, about, 0);
     std::swap(best_, sum_);
-    if (open > kClosed * best_.integrals.volume && move_near(*stack)) return true;
+    const auto closed = [&] { return open <= kClosed * (totals.volume + best_.integrals.volume); };
+    if (!closed() && move_near(*stack)) return true;
     // The rules end where the volume is exact. Where areas are not yet, the surface does not close.
-    if (open > kClosed * best_.integrals.volume && !slicing::find_intervals(*stack, true, intervals_)) return false;
-    for (double strictness = 1; strictness < 1e9 && open > kClosed * best_.integrals.volume; strictness *= 1e3) {
+    if (!closed() && !slicing::find_intervals(*stack, true, intervals_)) return false;
+    for (double strictness = 1; strictness < 1e9 && !closed(); strictness *= 1e3) {
       const double less = integrate(*stack, about, strictness);
       if (!(less < open / 2) && strictness > 1) break;
       if (!(less < open)) continue;
       open = less;
       std::swap(best_, sum_);
     }
+    const Vec3 mean = best_.integrals.first / best_.integrals.volume;
+    if (outside(mean.x * stack->l + mean.y * stack->m + mean.z * stack->t)) return true;
     totals.open += open;
     add_sum(*stack, best_);
     return true;
@@ -265,17 +325,17 @@ class Measuring {
   double integrate(const slicing::Stack& stack, double about, double strictness) {
     slicing::Sum& sum = sum_;
     sum.integrals = {}, sum.error = 0, sum.rules = 0, sum.samples.clear();
-    const double whole = std::max(about, totals.volume);
+    const double whole = totals.volume + about;
     bool sound = true;
     for (const slicing::Interval& interval : intervals_)
-      sound = sound && slicing::integrate(stack, interval, whole, strictness, sum);
+      sound = sound && slicing::integrate(stack, interval, whole, totals.area, strictness, sum);
     const slicing::Interval &lowest = intervals_.front(), &highest = intervals_.back();
     if (stack.low_plane && lowest.low == stack.low)
       slicing::add_face(*stack.low_plane, slicing::Slice(stack, lowest.low), lowest.outline, sum.integrals);
     if (stack.high_plane && highest.high == stack.high)
       slicing::add_face(*stack.high_plane, slicing::Slice(stack, highest.high), highest.outline, sum.integrals);
     // A piece for which that does not hold is worth its size as an error. It may be rounding alone.
-    if (!sound || !(sum.integrals.volume > 0) || !slicing::within_chords(sum))
+    if (!sound || !(sum.integrals.volume > 0) || !slicing::within_chords(lowest.low, highest.high, sum))
       return 8 * std::abs(about) + std::abs(sum.integrals.volume);
     return open_part(stack, sum.integrals);
   }
@@ -311,6 +371,7 @@ class Measuring {
   static constexpr int kSuperseded = -1;  ///< the owner of a wall that is to go
   std::vector<Wall> walls_, with_radical_;
   std::vector<std::pair<double, int>> by_length_;  ///< walls, by what their normals are along a line
+  slicing::Enclosure polytope_;
   std::vector<slicing::Interval> intervals_;
   slicing::Sum sum_, best_;
   Vec3 offset_;         ///< of the point that the pieces are about, from the point inside
@@ -345,19 +406,34 @@ std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec
   of_a.clear(), of_b.clear();
   measuring.totals = {};
   measuring.extent = std::min(slicing::extent(a, rounded(inside)), slicing::extent(b, rounded(inside)));
-  slicing::cut(a, b, 0, reference, inside, of_a);
-  slicing::cut(b, a, 1, reference, inside, of_b);
+  // Of many pieces, few lie near the common set.
+  thread_local slicing::Enclosure around;
+  thread_local slicing::Culling culling;
+  const bool many = std::holds_alternative<RoundedHull>(a.shape) || std::holds_alternative<RoundedHull>(b.shape);
+  if (many) slicing::enclose(a, b, rounded(inside), around);
+  measuring.common = many ? &around : nullptr;
+  slicing::cut(a, b, measuring.common, 0, reference, inside, of_a);
+  slicing::cut(b, a, measuring.common, 1, reference, inside, of_b);
+  if (many) culling.look_at(of_a, of_b, around);
   thread_local std::vector<Round> rounds;
   thread_local std::vector<Wall> walls;
-  for (const slicing::Piece& p : of_a.pieces)
-    for (const slicing::Piece& q : of_b.pieces) {
-      rounds.clear(), walls.clear();
-      if (p.round >= 0) rounds.push_back(of_a.rounds[p.round]);
-      if (q.round >= 0) rounds.push_back(of_b.rounds[q.round]);
-      walls.insert(walls.end(), of_a.walls.begin() + p.first_wall, of_a.walls.begin() + p.first_wall + p.walls);
-      walls.insert(walls.end(), of_b.walls.begin() + q.first_wall, of_b.walls.begin() + q.first_wall + q.walls);
-      if (!measuring.add(rounds, walls)) return std::nullopt;
-    }
+  // Pieces without rounds first: others then need to be exact only to a fraction of what these hold.
+  for (const int round_ones : {0, 1, 2})
+    for (int i = 0; i < static_cast<int>(of_a.pieces.size()); ++i)
+      for (int j = 0; j < static_cast<int>(of_b.pieces.size()); ++j) {
+        const slicing::Piece &p = of_a.pieces[i], &q = of_b.pieces[j];
+        if ((p.round >= 0) + (q.round >= 0) != round_ones) continue;
+        rounds.clear(), walls.clear();
+        if (many) {
+          if (!culling.meet(i, j, walls, measuring.box)) continue;
+        } else {
+          walls.insert(walls.end(), of_a.walls.begin() + p.first_wall, of_a.walls.begin() + p.first_wall + p.walls);
+          walls.insert(walls.end(), of_b.walls.begin() + q.first_wall, of_b.walls.begin() + q.first_wall + q.walls);
+        }
+        if (p.round >= 0) rounds.push_back(of_a.rounds[p.round]);
+        if (q.round >= 0) rounds.push_back(of_b.rounds[q.round]);
+        if (!measuring.add(rounds, walls)) return std::nullopt;
+      }
   const Totals& totals = measuring.totals;
   if (!(totals.volume > 0)) return std::nullopt;
   RoundMeasures result;

@@ -1,0 +1,106 @@
+#include "methods/round/enclosure.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace overlapper::slicing {
+
+void Enclosure::become_box(Vec3 lower, Vec3 upper) {
+  faces = {{{-1, 0, 0}, -lower.x, kNoWall}, {{1, 0, 0}, upper.x, kNoWall},   {{0, -1, 0}, -lower.y, kNoWall},
+           {{0, 1, 0}, upper.y, kNoWall},   {{0, 0, -1}, -lower.z, kNoWall}, {{0, 0, 1}, upper.z, kNoWall}};
+  corners.clear();
+  for (int i = 0; i < 8; ++i) {
+    const int x = i & 1, y = i >> 1 & 1, z = i >> 2;
+    Corner corner{{x ? upper.x : lower.x, y ? upper.y : lower.y, z ? upper.z : lower.z},
+                  {i ^ 1, i ^ 2, i ^ 4},
+                  {4 + z, x, 2 + y}};
+    // Seen from outside, the edges along x, y and z follow each other one way at a corner and the other way at the
+    // next.
+    if ((x + y + z) % 2 == 0) std::swap(corner.beside[1], corner.beside[2]), corner.face = {2 + y, x, 4 + z};
+    corners.push_back(corner);
+  }
+}
+
+bool Enclosure::cut(const Face& face) {
+  thread_local std::vector<double> left;
+  thread_local std::vector<int> place;
+  const int before = static_cast<int>(corners.size());
+  left.resize(before);
+  int kept = 0;
+  for (int i = 0; i < before; ++i) {
+    left[i] = face.slack - dot(face.normal, corners[i].at);
+    kept += left[i] >= 0;
+  }
+  if (kept == before) return true;
+  if (kept == 0) return false;
+  const int number = static_cast<int>(faces.size());
+  faces.push_back(face);
+  for (int i = 0; i < before; ++i) {
+    if (!(left[i] >= 0)) continue;
+    for (int k = 0; k < 3; ++k) {
+      const Corner inner = corners[i];
+      const int outer = inner.beside[k];
+      if (outer >= before || left[outer] >= 0) continue;
+      const double share = left[i] / (left[i] - left[outer]);
+      corners[i].beside[k] = static_cast<int>(corners.size());
+      corners.push_back({inner.at + share * (corners[outer].at - inner.at),
+                         {i, -1, -1},
+                         {inner.face[(k + 2) % 3], number, inner.face[k]}});
+    }
+  }
+  // Along each face that was cut, from the corner where its border comes back inside to that where it has left.
+  const int all = static_cast<int>(corners.size());
+  for (int start = before; start < all; ++start) {
+    int from = start, to = corners[start].beside[0];
+    while (to < before) {
+      const auto& beside = corners[to].beside;
+      const int k = beside[0] == from ? 0 : beside[1] == from ? 1 : 2;
+      from = to;
+      to = beside[(k + 1) % 3];
+    }
+    corners[start].beside[2] = to;
+    corners[to].beside[1] = start;
+  }
+  place.resize(all);
+  int next = 0;
+  for (int i = 0; i < all; ++i)
+    if (i >= before || left[i] >= 0) place[i] = next++;
+  for (int i = 0; i < all; ++i) {
+    if (i < before && !(left[i] >= 0)) continue;
+    Corner corner = corners[i];
+    for (int& j : corner.beside) j = place[j];
+    corners[place[i]] = corner;
+  }
+  corners.resize(next);
+  return true;
+}
+
+bool Enclosure::contains(Vec3 point) const {
+  return std::ranges::all_of(faces, [&](const Face& face) { return dot(face.normal, point) <= face.slack; });
+}
+
+Enclosure::Box Enclosure::box() const {
+  Box box{corners[0].at, corners[0].at};
+  for (const Corner& corner : corners) box = {min(box.lower, corner.at), max(box.upper, corner.at)};
+  return box;
+}
+
+double Enclosure::least(Vec3 direction) const {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Corner& corner : corners) least = std::min(least, dot(direction, corner.at));
+  return least;
+}
+
+Vec3 Enclosure::middle() const {
+  Vec3 sum;
+  for (const Corner& corner : corners) sum += corner.at;
+  return sum / static_cast<double>(corners.size());
+}
+
+double Enclosure::extent() const {
+  double extent = 0;
+  for (const Corner& corner : corners) extent = std::max(extent, norm(corner.at));
+  return extent;
+}
+
+}  // namespace overlapper::slicing

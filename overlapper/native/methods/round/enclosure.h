@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "geometry/vec.h"
+
+namespace overlapper::slicing {
+
+/// A convex polytope in doubles, by its corners, each with three edges and three faces. Planes cut it after Powell and
+/// Abel (2015), who place every new corner on an edge, so that none is farther out than rounding.
+struct Enclosure {
+  /// { X : dot(normal, X) <= slack }, and the number of the wall that it stands for, or none.
+  struct Face {
+    Vec3 normal;
+    double slack;
+    int wall;
+  };
+  struct Corner {
+    Vec3 at;
+    std::array<int, 3> beside;  ///< the corners at the other ends of its edges, counter-clockwise from outside
+    std::array<int, 3> face;    ///< between an edge and the next
+  };
+  struct Box {
+    Vec3 lower, upper;
+  };
+  std::vector<Face> faces;  ///< all that have cut it, of which further ones may have left nothing
+  std::vector<Corner> corners;
+
+  void become_box(Vec3 lower, Vec3 upper);
+  /// False if the face leaves nothing, and then the polytope is as it was.
+  bool cut(const Face& face);
+
+  /// Calls use(wall, ring) for each face that is left, its corners counter-clockwise from outside.
+  template <class Use>
+  void for_faces(Use use) const;
+
+  bool contains(Vec3 point) const;
+  Box box() const;
+  /// Of dot(direction, X) over the polytope.
+  double least(Vec3 direction) const;
+  double most(Vec3 direction) const { return -least(-direction); }
+  Vec3 middle() const;
+  double extent() const;  ///< no corner is farther from the origin
+};
+
+inline constexpr int kNoWall = -1;
+
+template <class Use>
+void Enclosure::for_faces(Use use) const {
+  thread_local std::vector<Vec3> ring;
+  thread_local std::vector<std::array<bool, 3>> seen;
+  seen.assign(corners.size(), {});
+  for (size_t first = 0; first < corners.size(); ++first)
+    for (int k = 0; k < 3; ++k) {
+      if (seen[first][k]) continue;
+      ring.clear();
+      int from = static_cast<int>(first), along = k;
+      do {
+        ring.push_back(corners[from].at);
+        seen[from][along] = true;
+        const int to = corners[from].beside[along];
+        const auto& back = corners[to].beside;
+        along = ((back[0] == from ? 0 : back[1] == from ? 1 : 2) + 2) % 3;
+        from = to;
+      } while (!seen[from][along]);
+      use(faces[corners[first].face[k]].wall, ring);
+    }
+}
+
+}  // namespace overlapper::slicing
