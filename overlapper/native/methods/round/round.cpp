@@ -307,8 +307,9 @@ class Measuring {
     const slicing::Integrals& s = best_.integrals;
     const Vec3 mean = s.first / s.volume;
     const double spread = (s.squares.x + s.squares.y + s.squares.z) / s.volume - norm2(mean);
-    if (moved_ || !(norm2(mean) > 25 * spread)) return false;
-    offset_ = mean.x * stack.l + mean.y * stack.m + mean.z * stack.t;
+    const Vec3 offset = mean.x * stack.l + mean.y * stack.m + mean.z * stack.t;
+    if (moved_ || !(norm2(mean) > 25 * spread) || !(norm(offset) <= extent)) return false;
+    offset_ = offset;
     for (Round& r : rounds_) r.centre = r.centre - wide(offset_);
     for (Wall& wall : walls_) wall.slack = wall.slack - dot(wall.normal, wide(offset_));
     const double usual = extent;
@@ -438,9 +439,9 @@ std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec
   if (!(totals.volume > 0)) return std::nullopt;
   RoundMeasures result;
   result.volume = totals.volume;
-  result.volume_error =
-      totals.error + 2 * std::max(totals.open, missing(totals)) + (of_a.flatness + of_b.flatness) * totals.area;
+  result.volume_error = totals.error + 2 * std::max(totals.open, missing(totals));
   if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
+  result.volume_error += (of_a.flatness + of_b.flatness) * totals.area;
   result.area = totals.area;
   const Vec3 centroid = totals.first / totals.volume;
   result.centroid = rounded(inside) + centroid;

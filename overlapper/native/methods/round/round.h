@@ -20,8 +20,8 @@ struct RoundMeasures {
 
 /// Measures a pair that overlaps: pairs of spheres, capsules, cylinders and rounded hulls with each other and with
 /// boxes, hulls and half-spaces. `inside` is a point of the common set, as deep inside as can be told; bodies and it
-/// are about the reference. Nothing if the error stated would be larger than 1e-8 of the volume, or if the pair is
-/// none of these.
+/// are about the reference. Nothing if the error would be larger than 1e-8 of the volume, not counting by how much
+/// facets are not flat, or if the pair is none of these.
 ///
 /// Every body is cut into pieces that planes leave of a ball or a cylinder, or of nothing round. Slices orthogonal to
 /// the axes of cylinders are convex polygons cut by one disc at most, and what they hold is integrated between the
