@@ -5,11 +5,13 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <unordered_map>
 
 #include "geometry/cancellation.h"
 #include "geometry/ridges.h"
 #include "methods/dual/wide_dual.h"
+#include "overlap/dual_tree.h"
 
 namespace overlapper {
 namespace {
@@ -30,6 +32,84 @@ struct Seen {
   int owner;
 
   double slack_at(Vec3 y) const { return slack * (1 - dot(dual, y)); }
+};
+
+/// The planes of other bodies that pass by a facet, found in trees.
+class OthersNear {
+ public:
+  OthersNear(std::vector<Seen> planes, std::span<const Seen> facets, int bodies)
+      : planes_(std::move(planes)), bodies_(bodies) {
+    double facet_moved = 0;
+    for (const Seen& facet : facets) facet_moved = std::max(facet_moved, facet.moved);
+    std::vector<std::vector<DualTree::Entry>> of_body(bodies);
+    for (size_t i = 0; i < planes_.size(); ++i) {
+      const Seen& plane = planes_[i];
+      most_moved_ = std::max(most_moved_, plane.moved);
+      // Moved inwards as far as it may be off: slack_at(y) <= distance where the dual point of that reaches y.
+      const double left = 1 - (facet_moved + plane.moved) / plane.slack;
+      if (!(plane.slack > 0 && left >= 0.5)) {
+        everywhere_.push_back(static_cast<int>(i));
+        continue;
+      }
+      const Vec3 point = plane.dual / left;
+      largest_ = std::max(largest_, norm(point));
+      of_body[plane.owner].push_back({point, static_cast<int>(i)});
+    }
+    halve(of_body, 0, bodies);
+  }
+
+  double most_moved() const { return most_moved_; }
+
+  /// Calls `visit(plane, corners)` for the planes, but those of `owner`, that may be as near to some corners of the
+  /// polygon as both may have moved, until `visit` is false.
+  template <class Visit>
+  void visit(int owner, const std::vector<Vec3>& polygon, Visit visit) const {
+    std::vector<int> all(polygon.size());
+    std::iota(all.begin(), all.end(), 0);
+    for (int i : everywhere_)
+      if (planes_[i].owner != owner && !visit(planes_[i], std::span<const int>(all))) return;
+    double farthest = 0;
+    for (Vec3 corner : polygon) farthest = std::max(farthest, norm(corner));
+    const double level = 1 - 64 * DBL_EPSILON * std::max(1.0, largest_ * farthest);
+    for (int at = 0, begin = 0, end = bodies_; end - begin > 1;) {
+      const Halves& here = halves_[at];
+      const int middle = begin + (end - begin) / 2;
+      const bool first = owner < middle;
+      const DualTree& others = first ? here.second : here.first;
+      if (!others.reaching(polygon, level, [&](int i, std::span<const int> near) { return visit(planes_[i], near); }))
+        return;
+      at = first ? here.within_first : here.within_second;
+      (first ? end : begin) = middle;
+    }
+  }
+
+ private:
+  /// The planes of the first half of some bodies and those of the second, so that those of all bodies but one are in as
+  /// many trees as bodies can be halved.
+  struct Halves {
+    DualTree first, second;
+    int within_first, within_second;
+  };
+
+  int halve(const std::vector<std::vector<DualTree::Entry>>& of_body, int begin, int end) {
+    if (end - begin < 2) return -1;
+    const int middle = begin + (end - begin) / 2, at = static_cast<int>(halves_.size());
+    const auto tree = [&](int from, int to) {
+      std::vector<DualTree::Entry> entries;
+      for (int i = from; i < to; ++i) entries.insert(entries.end(), of_body[i].begin(), of_body[i].end());
+      return DualTree(std::move(entries));
+    };
+    halves_.push_back({tree(begin, middle), tree(middle, end), -1, -1});
+    const int within_first = halve(of_body, begin, middle), within_second = halve(of_body, middle, end);
+    halves_[at].within_first = within_first, halves_[at].within_second = within_second;
+    return at;
+  }
+
+  std::vector<Seen> planes_;
+  std::vector<Halves> halves_;
+  std::vector<int> everywhere_;  ///< planes that may be off by so much that no polygon is far from them
+  int bodies_;
+  double most_moved_ = 0, largest_ = 0;
 };
 
 /// Relative to their distance from within, surfaces nearer to each other than that are taken for one.
@@ -138,15 +218,10 @@ class Sandwich {
     return -signed_distance(plane, region_.frame.origin) / dot(plane.normal, direction);
   }
 
-  /// m², per facet: where a plane of another body, in the surface or just behind it, may be the outer one.
+  /// m², per facet: where a plane of another body, in the surface or just behind it, may be the outer one. No more is
+  /// looked for once that is all of the facet.
   std::vector<double> doubtful_among_planes() const {
-    const std::vector<Seen> planes = planes_of_bodies();
-    std::unordered_map<int64_t, std::vector<const Seen*>> by_direction;
-    double most = 0;
-    for (const Seen& plane : planes) {
-      by_direction[cell_of(plane.normal, {})].push_back(&plane);
-      most = std::max(most, plane.moved);
-    }
+    const OthersNear near(planes_of_bodies(), facets_, static_cast<int>(bodies_.size()));
     std::vector<double> areas;
     for (size_t f = 0; f < facets_.size(); ++f) {
       cancellation_point();
@@ -156,19 +231,14 @@ class Sandwich {
       for (size_t i = 0; i < ring.size(); ++i)
         around += norm(corners_[ring[i]] - corners_[ring[(i + 1) % ring.size()]]);
       // Along a plane that is not nearly flush, slack grows by kNearlyFlush or more of the way from the facet's border.
-      double doubtful = around * 2 * (facet.moved + most) / kNearlyFlush;
+      double doubtful = around * 2 * (facet.moved + near.most_moved()) / kNearlyFlush;
+      const double all = area(f);
       const std::vector<Vec3> corners = polygon(f);
-      for (int cell = 0; cell < 54; ++cell) {
-        const Vec3 step{cell % 3 - 1.0, cell / 3 % 3 - 1.0, cell / 9 % 3 - 1.0};
-        const auto found = by_direction.find(cell_of(cell < 27 ? facet.normal : -facet.normal, step));
-        if (found == by_direction.end()) continue;
-        cancellation_point(found->second.size());
-        for (const Seen* plane : found->second) {
-          const bool flush = norm2(cross(plane->normal, facet.normal)) <= kNearlyFlush * kNearlyFlush;
-          if (flush && plane->owner != facet.owner)
-            doubtful += area_within(corners, *plane, facet.moved + plane->moved);
-        }
-      }
+      near.visit(facet.owner, corners, [&](const Seen& plane, std::span<const int> near_corners) {
+        const bool flush = norm2(cross(plane.normal, facet.normal)) <= kNearlyFlush * kNearlyFlush;
+        if (flush) doubtful += area_within(corners, near_corners, plane, facet.moved + plane.moved);
+        return !(doubtful >= all);
+      });
       areas.push_back(doubtful);
     }
     return areas;
@@ -220,15 +290,29 @@ class Sandwich {
     return planes;
   }
 
-  /// m²: of a polygon in the frame, where the plane is no farther than that.
   double area_within(const std::vector<Vec3>& polygon, const Seen& plane, double distance) const {
+    std::vector<int> all(polygon.size());
+    std::iota(all.begin(), all.end(), 0);
+    return area_within(polygon, all, plane, distance);
+  }
+
+  /// m²: of a polygon in the frame, where the plane is no farther than that, as it may be from the corners `near` only;
+  /// these in order.
+  double area_within(const std::vector<Vec3>& polygon, std::span<const int> near, const Seen& plane,
+                     double distance) const {
     std::vector<Vec3> kept;
-    for (size_t i = 0; i < polygon.size(); ++i) {
-      const Vec3 from = polygon[i], to = polygon[(i + 1) % polygon.size()];
+    const int corners = static_cast<int>(polygon.size());
+    const auto keep_from = [&](int corner) {
+      const Vec3 from = polygon[corner], to = polygon[(corner + 1) % corners];
       const double before = plane.slack_at(from) - distance, after = plane.slack_at(to) - distance;
       if (before <= 0) kept.push_back(from);
       if ((before < 0) != (after < 0)) kept.push_back(from + before / (before - after) * (to - from));
+    };
+    for (size_t i = 0; i < near.size(); ++i) {
+      if (near[i] > 0 && (i == 0 || near[i - 1] < near[i] - 1)) keep_from(near[i] - 1);
+      keep_from(near[i]);
     }
+    if (near.front() == 0 && near.back() < corners - 1) keep_from(corners - 1);
     double area = 0;
     for (size_t i = 1; i + 1 < kept.size(); ++i) {
       const Mat3& axes = region_.frame.axes;
