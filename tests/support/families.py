@@ -737,6 +737,39 @@ def rounded_hulls(rng):
     return Case(where, depth, (Placed(body), lower), 2 * rounded_slab(sides, r, h / 2))
 
 
+def flush_round(rng):
+    """Two bodies about one axis, one of them round, that share surfaces, or do but for rounding. What they have in
+    common is the smaller, or the part of it up to a plane in which a capsule becomes a half ball."""
+    r, h = rng.integers(4, 49, 2) / 32 if rng.random() < 0.5 else rng.uniform(0.1, 1.5, 2)
+    sides = rng.uniform(0.2, 2, 3)
+    cylinder, ball = pi * r * r * 2 * h, 4 / 3 * pi * r**3
+    rounded = RoundedHull(CORNERS * sides / 2, r)
+    of_rounded = sides.prod() + 2 * r * sum(sides[i] * sides[i - 1] for i in range(3)) + pi * r**2 * sides.sum() + ball
+    pairs = {
+        "a ball twice": (Sphere(r), Sphere(r), ball),
+        "a capsule twice": (Capsule(r, 2 * h), Capsule(r, 2 * h), cylinder + ball),
+        "a cylinder twice": (Cylinder(r, 2 * h), Cylinder(r, 2 * h), cylinder),
+        "a rounded box twice": (rounded, rounded, of_rounded),
+        "capsule in cylinder": (Capsule(r, 2 * h), Cylinder(r, 2 * (h + r)), cylinder + ball),
+        "cylinder in capsule": (Cylinder(r, 2 * h), Capsule(r, 2 * h), cylinder),
+        "cylinder in box": (Cylinder(r, 2 * h), Box([r, r, h]), cylinder),
+        "capsule in box": (Capsule(r, 2 * h), Box([r, r, h + r]), cylinder + ball),
+        "capsule between lids": (Capsule(r, 2 * h), Box([r, r, h]), cylinder),
+        "capsule to where it is a ball": (Capsule(r, 2 * h), HalfSpace([0, 0, 1], h), cylinder + ball / 2),
+        "the half ball of a capsule": (Capsule(r, 2 * h), HalfSpace([0, 0, 1], -h), ball / 2),
+        "ball in capsule": (Sphere(r), Capsule(r, 2 * h), ball),
+        "core of a rounded box": (Box(sides / 2), rounded, sides.prod()),
+        "rounded box in box": (rounded, Box(sides / 2 + r), of_rounded),
+    }
+    way = str(rng.choice(list(pairs)))
+    *shapes, volume = pairs[way]
+    where = rng.normal(size=3) if rng.random() < 0.5 else np.zeros(3)
+    turn = quaternion(rng) if rng.random() < 0.5 else rng.integers(1, 5, 4) * rng.choice([-0.25, 0.25], 4)
+    again = float(rng.choice([-1.0, 0.5, 1.0, 2.0]))  # the same orientation
+    bodies = (Placed(shapes[0], where, turn), Placed(shapes[1], where, turn * again))
+    return Case(way, 0.0, bodies if rng.random() < 0.5 else bodies[::-1], float(volume))
+
+
 def rounded_slab(sides, r, h):
     """The volume of what a rounded box has below the height h <= r above its lowest plane: a slab of cuboid, and its
     rims, over quarters of a disc."""
@@ -764,7 +797,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
-        round_contacts, rounded_hulls,
+        round_contacts, rounded_hulls, flush_round,
     )
 }  # fmt: skip
 

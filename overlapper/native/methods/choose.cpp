@@ -278,30 +278,6 @@ std::optional<Measures> by_formula(const OverlappingBodies& overlapping, double 
   return measures;
 }
 
-/// Of the round shapes themselves, whatever the tolerance.
-std::optional<MeasuresAndInertia> by_slices(const OverlappingBodies& overlapping) {
-  const Arrangement& at = overlapping.at;
-  const Inside& found = overlapping.inside();
-  const WideVector inside = found.wide_ball ? found.wide_ball->centre : wide(found.ball.centre);
-  const auto sliced = measure_round(at.relative[0], at.relative[1], at.reference, inside);
-  if (!sliced) return std::nullopt;
-  MeasuresAndInertia answer;
-  Measures& m = answer.measures;
-  m.status = Status::kOverlapping;
-  m.way = Way::kSlicing;
-  m.facets_touched = sliced->facets_touched;
-  m.volume = sliced->volume, m.volume_error = sliced->volume_error, m.area = sliced->area;
-  m.centroid = at.reference + sliced->centroid;
-  for (int i = 0; i < 2; ++i) {
-    const double side = i == 0 ? 1 : -1;
-    const int body = at.order[i];
-    m.pulls[body] =
-        about({side * sliced->pull.force, side * sliced->pull.moment}, at.reference, overlapping.bodies[body].position);
-  }
-  answer.inertia = sliced->inertia;
-  return answer;
-}
-
 MeasuresAndInertia by_region(const Region& region, std::span<const Placed> bodies, Way way) {
   MeasuresAndInertia answer = measure(region, bodies);
   answer.measures.way = way;
@@ -324,10 +300,28 @@ double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 
 
 }  // namespace
 
-std::optional<Mat3> inertia_of_round(const OverlappingBodies& overlapping) {
+std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping) {
   if (!choose(traits(overlapping.bodies)).tries(Way::kSlicing)) return std::nullopt;
-  const auto sliced = by_slices(overlapping);
-  return sliced ? sliced->inertia : std::nullopt;
+  const Arrangement& at = overlapping.at;
+  const Inside& found = overlapping.inside();
+  const WideVector inside = found.wide_ball ? found.wide_ball->centre : wide(found.ball.centre);
+  const auto round = measure_round(at.relative[0], at.relative[1], at.reference, inside);
+  if (!round) return std::nullopt;
+  MeasuresAndInertia answer;
+  Measures& m = answer.measures;
+  m.status = Status::kOverlapping;
+  m.way = Way::kSlicing;
+  m.facets_touched = round->facets_touched;
+  m.volume = round->volume, m.volume_error = round->volume_error, m.area = round->area;
+  m.centroid = at.reference + round->centroid;
+  for (int i = 0; i < 2; ++i) {
+    const double side = i == 0 ? 1 : -1;
+    const int body = at.order[i];
+    m.pulls[body] =
+        about({side * round->pull.force, side * round->pull.moment}, at.reference, overlapping.bodies[body].position);
+  }
+  answer.inertia = round->inertia;
+  return answer;
 }
 
 MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
@@ -339,7 +333,7 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
   MeasuresAndInertia kept;
   auto formula = choice.tries(Way::kClosedForm) && !in_doubt ? by_formula(overlapping, finest) : std::nullopt;
   if (choice.tries(Way::kSlicing) && !(formula && formula->volume_error <= kEnough * formula->volume))
-    if (auto sliced = by_slices(overlapping)) return std::move(*sliced);
+    if (const auto& sliced = overlapping.sliced()) return *sliced;
   if (in_doubt) return by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);
   if (formula) kept.measures = std::move(*formula);
   else kept = by_region(overlapping.region(), overlapping.bodies, overlapping.traced ? Way::kTracing : Way::kDual);

@@ -121,13 +121,15 @@ struct OverlappingBodies {
   std::function<const Search&()> search;
   std::function<const Inside&()> inside;
   std::function<const Region&()> region;  ///< owners are numbers of `bodies`
+  std::function<const std::optional<MeasuresAndInertia>&()> sliced;
 };
 /// The region of bodies that overlap as right as any way makes it: of polyhedra, with planes placed in double-doubles.
 /// Owners are numbers of the bodies as given.
 Region finest_region(const OverlappingBodies& overlapping);
 
-/// The inertia of the round shapes themselves, of a pair that a closed form measures.
-std::optional<Mat3> inertia_of_round(const OverlappingBodies& overlapping);
+/// By slices of the round shapes themselves, whatever the tolerance. Nothing for bodies that have another way, or where
+/// slicing gives up.
+std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping);
 
 /// What measure_at_once() cannot measure well enough.
 MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping);

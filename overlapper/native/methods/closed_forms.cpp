@@ -132,7 +132,9 @@ void integrate(double from, double width, Integrand integrand) {
 }
 
 /// The angle θ at which y = −r cos θ has risen from −r by `risen`.
-double angle_at(double r, double risen) { return std::atan2(std::sqrt(risen * (2 * r - risen)), r - risen); }
+double angle_at(double r, double risen) {
+  return std::atan2(std::sqrt(std::max(0.0, risen * (2 * r - risen))), r - risen);
+}
 
 /// angle_at(r, risen + more) − angle_at(r, risen), without cancellation.
 double angle_between(double r, double risen, double more) {
@@ -158,7 +160,7 @@ CylinderPart cylinder_below(double r, double h, double sine, double cosine, doub
   const double enter = t - sine * h + cosine * r, leave = t + sine * h + cosine * r;
   if (leave <= 0) return result;
   const double across = 2 * r * cosine;
-  const double full = enter <= 0 ? 0 : enter >= across ? kPi : angle_at(r, enter / cosine);
+  const double full = enter >= across ? kPi : enter <= 0 ? 0 : angle_at(r, enter / cosine);
   integrate(0, full, [&](double angle, double, double weight) {
     const double y = -r * std::cos(angle), chord = 2 * r * std::sin(angle) * r * std::sin(angle);
     const double volume = weight * 2 * h * chord;
@@ -175,11 +177,14 @@ CylinderPart cylinder_below(double r, double h, double sine, double cosine, doub
   const bool open = leave >= across;
   if (sine == 0) {
     // The cut is parallel to the axis: a rectangle.
-    part.flat_area = 4 * h * std::sqrt(start * (2 * r - start));
+    part.flat_area = 4 * h * std::sqrt(std::max(0.0, start * (2 * r - start)));
     part.flat_moment.y = part.flat_area * (start - r);
     return result;
   }
-  const double width = open ? kPi - full : angle_between(r, start, (enter <= 0 ? leave : 2 * sine * h) / cosine);
+  // Where rounding alone has kept the cut from the far side, nothing is left, and the formula for it is 0 / 0.
+  const double rest = kPi - full;
+  const double width =
+      open ? rest : std::min(rest, angle_between(r, start, (enter <= 0 ? leave : 2 * sine * h) / cosine));
   integrate(full, width, [&](double angle, double advance, double weight) {
     const double y = -r * std::cos(angle), chord = 2 * r * std::sin(angle) * r * std::sin(angle);
     const double risen = 2 * r * std::sin(angle - advance / 2) * std::sin(advance / 2);

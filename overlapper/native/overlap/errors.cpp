@@ -120,7 +120,8 @@ constexpr double kShared = 1e-10;
 /// Corners lie on their planes, and inside the planes next to those, but for so much; then the closed surface that they
 /// span lies between the polytope so much smaller and so much larger. Where planes nearly coincide, a corner may be
 /// anywhere along their line, and the surface is none the worse for it.
-double misfit(const Polytope& p, const Ridges& ridges) {
+double misfit(const Polytope& p) {
+  const Ridges ridges(p);
   const auto off = [&](int facet, int vertex) { return dot(p.dual[facet], p.vertices[vertex]) - 1; };
   double worst = 0, product = 0;
   for (int f = 0; f < p.facets(); ++f) {
@@ -139,7 +140,7 @@ double misfit(const Polytope& p, const Ridges& ridges) {
 class Sandwich {
  public:
   Sandwich(const Region& region, std::span<const Placed> bodies)
-      : region_(region), bodies_(bodies), ridges_(region.polytope), polyhedral_(polyhedral(bodies)) {
+      : region_(region), bodies_(bodies), polyhedral_(polyhedral(bodies)) {
     for (const Placed& body : bodies) relative_.push_back(body.seen_from(region.reference));
     const Polytope& p = region.polytope;
     for (Vec3 y : p.vertices) corners_.push_back(region.frame.axes * y);
@@ -164,7 +165,7 @@ class Sandwich {
   }
 
   /// m: by the placing of corners, and by the movement of planes.
-  double vertices() const { return (misfit(region_.polytope, ridges_) + outer() - inner()) * radius({}); }
+  double vertices() const { return (misfit(region_.polytope) + outer() - inner()) * radius({}); }
 
   /// m²: how much of the surface may belong to another body than it is said to.
   double doubtful_area() const {
@@ -252,6 +253,7 @@ class Sandwich {
 
   /// m², per facet: along the seam, or all of it where a smooth body is just behind the middle.
   std::vector<double> doubtful_beside_smooth() const {
+    const Ridges ridges(region_.polytope);
     std::vector<double> areas;
     for (size_t f = 0; f < facets_.size(); ++f) {
       cancellation_point();
@@ -259,7 +261,7 @@ class Sandwich {
       double doubtful = beside_smooth(corners, facets_[f]) ? kInfinity : 0;
       const auto ring = region_.polytope.facet(static_cast<int>(f));
       for (size_t i = 0; i < ring.size(); ++i) {
-        const Seen& plane = facets_[ridges_.left_of(ring[(i + 1) % ring.size()], ring[i])];
+        const Seen& plane = facets_[ridges.left_of(ring[(i + 1) % ring.size()], ring[i])];
         if (plane.owner != facets_[f].owner) doubtful += area_within(corners, plane, facets_[f].moved + plane.moved);
       }
       areas.push_back(doubtful);
@@ -334,7 +336,6 @@ class Sandwich {
 
   const Region& region_;
   std::span<const Placed> bodies_;
-  Ridges ridges_;
   bool polyhedral_;
   std::vector<Placed> relative_;  ///< about the region's reference
   std::vector<Vec3> corners_;     ///< m, about the frame's origin
@@ -431,11 +432,16 @@ Errors errors_of_formula(const Measures& stated, const Region& drawn, std::span<
   errors.volume = stated.volume_error;
   errors.area = relative * stated.area;
   errors.centroid = relative * diameter + 4 * DBL_EPSILON * norm(stated.centroid);
-  errors.inertia = relative * stated.volume * diameter * diameter;
   const double force = errors.area + Sandwich(drawn, bodies).shared_area();
   for (const Placed& body : bodies)
     errors.gradient.push_back({force, force * (norm(stated.centroid - body.position) + diameter)});
   return errors;
+}
+
+double error_of_sliced_inertia(const MeasuresAndInertia& sliced) {
+  const Mat3& i = *sliced.inertia;
+  const double trace = i.row0.x + i.row1.y + i.row2.z;
+  return 4 * sliced.measures.volume_error / sliced.measures.volume * 45 / 4 * trace;
 }
 
 double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b) {

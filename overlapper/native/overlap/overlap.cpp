@@ -71,6 +71,10 @@ const Region& Overlap::region() const {
   return lazy().region.get([this] { return region_of_overlap(); });
 }
 
+const std::optional<MeasuresAndInertia>& Overlap::sliced() const {
+  return lazy().sliced.get([this] { return overlapper::sliced(overlapping_bodies()); });
+}
+
 const MeasuresAndInertia& Overlap::in_full() const {
   return lazy().in_full.get([this] { return measured_in_full(); });
 }
@@ -110,7 +114,8 @@ OverlappingBodies Overlap::overlapping_bodies() const {
           traced(),
           [this]() -> const Search& { return search(); },
           [this]() -> const Inside& { return inside(); },
-          [this]() -> const Region& { return region(); }};
+          [this]() -> const Region& { return region(); },
+          [this]() -> const std::optional<MeasuresAndInertia>& { return sliced(); }};
 }
 
 MeasuresAndInertia Overlap::measured_in_full() const {
@@ -169,12 +174,12 @@ Errors Overlap::errors_of_measures() const {
   if (!(volume_error() < volume())) return errors_of_anything(volume_error(), bodies());
   const bool integrated = way() == Way::kClosedForm || way() == Way::kSlicing;
   Errors errors;
-  if (!integrated || !in_full().inertia)
-    errors = errors_beside(measured_with_errors(finest_region(), bodies()), stated());
-  if (integrated) {
-    const double of_polytope = errors.inertia;
-    errors = errors_of_formula(measures(), drawn(), bodies());
-    if (!in_full().inertia) errors.inertia = of_polytope;
+  if (integrated) errors = errors_of_formula(measures(), drawn(), bodies());
+  if (integrated && sliced()) errors.inertia = error_of_sliced_inertia(*sliced());
+  else {
+    const Errors of_polytope = errors_beside(measured_with_errors(finest_region(), bodies()), stated());
+    if (integrated) errors.inertia = of_polytope.inertia;
+    else errors = of_polytope;
   }
   errors.volume = volume_error();
   errors.vertices = error_of_vertices(drawn(), boundary(), bodies());
@@ -208,7 +213,7 @@ int Overlap::facets_touched() const {
 
 Mat3 Overlap::inertia() const {
   if (in_full().inertia) return *in_full().inertia;
-  if (const auto exact = inertia_of_round(overlapping_bodies())) return *exact;
+  if (sliced()) return *sliced()->inertia;
   const MeasuresAndInertia of_polytope = measure(region(), bodies());
   const double share = in_full().measures.volume / of_polytope.measures.volume;
   const Mat3& i = *of_polytope.inertia;

@@ -54,7 +54,7 @@ class Overlap {
   /// The polytope of the common set; only for overlapping bodies, as are the next three.
   const Region& region() const;
   const Measures& measures() const;
-  /// Inertia tensor about the centroid, unit density; by the polytope where the measures have closed forms.
+  /// Inertia tensor about the centroid, unit density; by slices where the measures have closed forms.
   Mat3 inertia() const;
   const Boundary& boundary() const;
 
@@ -80,6 +80,7 @@ class Overlap {
     Once<Search> search;
     Once<Inside> inside;
     Once<Region> region;
+    Once<std::optional<MeasuresAndInertia>> sliced;
     Once<MeasuresAndInertia> in_full;
     Once<Boundary> boundary;
     Once<Contact> contact;
@@ -93,6 +94,7 @@ class Overlap {
   const Arrangement& arrangement() const;
   const Search& search() const;
   const Inside& inside() const;
+  const std::optional<MeasuresAndInertia>& sliced() const;
   const MeasuresAndInertia& in_full() const;
   Region region_of_overlap() const;
   OverlappingBodies overlapping_bodies() const;

@@ -111,6 +111,7 @@ def test_inertia_of_a_closed_form_is_that_of_the_round_shapes():
     ball = overlap(Sphere(1), HalfSpace([0, 0, 1], 2), tolerance=1e-3)
     assert ball.way == "closed form"
     assert_allclose(ball.inertia, 8 / 15 * np.pi * np.eye(3), rtol=1e-14, atol=1e-14)
+    assert np.abs(ball.inertia - 8 / 15 * np.pi * np.eye(3)).max() <= ball.errors.inertia <= 1e-11 * ball.volume
     half = overlap(Sphere(1), HalfSpace([0, 0, 1], 0))
     # About the centre of the ball, half of its own.
     shift = half.volume * (9 / 64) * np.diag([1, 1, 0])

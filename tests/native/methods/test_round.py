@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from families import make
 from flint import arb
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -297,3 +298,19 @@ def test_meshes_that_meet_within_their_margins_are_measured_to_eleven_digits():
         one, other = (Placed(RoundedHull(rng.normal(size=(30, 3)) * 0.05, 1e-3), (x, 0, 0)) for x in (0, 0.5))
         found = overlap(*sink(one, other, 2e-4))
         assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume
+
+
+@pytest.mark.parametrize("first_seed", range(0, 2000, 500))
+def test_surfaces_that_nothing_but_rounding_parts_are_measured_truly(first_seed):
+    for seed in range(first_seed, first_seed + 500):
+        case, rng = make("flush_round", seed), np.random.default_rng(seed)
+        a, b = case.bodies
+        shift, turn = 10.0 ** rng.uniform(-19, -9, 2) * rng.integers(0, 2, 2)
+        shift, turn = shift * rng.normal(size=3) * rng.integers(0, 2, 3), turn * rng.normal(size=4)
+        turned = Placed(b.shape, b.position + shift, np.array(b.given_orientation) + turn)
+        found = overlap(a, turned, tolerance=1e-2)
+        sizes = [np.linalg.norm(np.ptp(body.bounds, axis=0)) for body in (a, b) if np.isfinite(body.bounds).all()]
+        way = np.linalg.norm(turned.position - b.position) + 4 * min(sizes) * np.linalg.norm(turn)
+        moved_by = found.volume_error + (way + 1e-15 * min(sizes)) * 6 * min(sizes) ** 2
+        assert found
+        assert abs(found.volume - case.closed_form) <= moved_by, (seed, a, turned)

@@ -72,7 +72,7 @@ class Measuring {
       if (cuts == 0) walls_.push_back(wall);
     }
     if (flat()) return true;
-    prefer_faces();
+    drop_repeated();
     drop_around();
     if (rounds_.size() == 1 && rounds_[0].ball && walls_.size() <= 1) {
       add_cap(rounds_[0], walls_.empty() ? nullptr : &walls_[0]);
@@ -137,12 +137,15 @@ class Measuring {
     });
   }
 
-  /// A face in the plane of a cut is all that lies there: beyond the cut, the next piece is flat.
-  void prefer_faces() {
-    any_two(1, [&](Wall& cut, const Wall& face) {
-      if (cut.owner == slicing::kCut && face.owner != slicing::kCut &&
-          norm2(rounded(face.normal - cut.normal)) < 1e-48 && std::abs((face.slack - cut.slack).head) < coincident())
-        cut.owner = kSuperseded;
+  /// One wall per plane: two lines that are one cross nowhere, or, by rounding, anywhere. A face is kept rather than a
+  /// cut, beyond which the next piece is flat, and of two faces that of the first body.
+  void drop_repeated() {
+    any_two(1, [&](Wall& wall, const Wall& other) {
+      if (wall.owner == kSuperseded || other.owner == kSuperseded) return false;
+      const bool cut = wall.owner == slicing::kCut, other_is_cut = other.owner == slicing::kCut;
+      if ((cut == other_is_cut ? &other < &wall : cut) && norm2(rounded(other.normal - wall.normal)) < 1e-48 &&
+          std::abs((other.slack - wall.slack).head) < coincident())
+        wall.owner = kSuperseded;
       return false;
     });
     std::erase_if(walls_, [](const Wall& wall) { return wall.owner == kSuperseded; });

@@ -1,6 +1,7 @@
 #include "methods/round/slice.h"
 
 #include <algorithm>
+#include <cfloat>
 #include <numbers>
 
 #include "methods/round/segment.h"
@@ -71,10 +72,22 @@ struct Polygon {
   void append(int edge, Point p) { line[size] = edge, x[size] = p.x, y[size] = p.y, ++size; }
 };
 
+/// Whether two lines of one direction cross at no place but one that rounding has made up: anywhere on the two, or
+/// beyond the edge from p to q, although the other line has these on either side.
+bool along_one_another(const Slice& slice, int edge, int other, Point p, Point q) {
+  const Point a = slice.stack.line[edge].normal, b = slice.stack.line[other].normal;
+  const double one = a.x * b.y, two = a.y * b.x, off = std::abs(one - two);
+  if (!(off <= 32 * DBL_EPSILON * dot(a, b))) return false;
+  if (off <= 32 * DBL_EPSILON * (std::abs(one) + std::abs(two))) return true;
+  const double along = dot(slice.corner(edge, other) - p, q - p);
+  return !(along >= 0 && along <= dot(q - p, q - p));
+}
+
 /// Cuts off what lies beyond the line, with `spare` to work in; false if nothing is left, and then by how much the
 /// nearest corner misses it.
 bool clip(Polygon& polygon, Polygon& spare, const Slice& slice, int line, double& missed) {
-  const Point normal = slice.stack.line[line].normal;
+  const Stack& stack = slice.stack;
+  const Point normal = stack.line[line].normal;
   const double side = slice.side(line);
   const int size = polygon.size;
   std::array<bool, kMostLines + 8> kept;
@@ -92,6 +105,17 @@ bool clip(Polygon& polygon, Polygon& spare, const Slice& slice, int line, double
   int first = 0;
   while (!kept[first] || kept[first > 0 ? first - 1 : size - 1]) ++first;
   const auto wrapped = [size](int i) { return i < size ? i : i - size; };
+  // Of two lines of one direction the nearer is all that counts, whatever rounding says of the other's corners.
+  const auto farther = [&](int edge) {
+    return slice.side(edge) * stack.line[line].length > side * stack.line[edge].length;
+  };
+  for (const bool last : {true, false}) {
+    const int to = last ? wrapped(first + count) : first, edge = polygon.line[to];
+    if (!along_one_another(slice, edge, line, polygon.corner(to > 0 ? to - 1 : size - 1), polygon.corner(to))) continue;
+    if (!farther(edge)) return true;
+    if (--count == 0) return false;
+    if (!last) first = wrapped(first + 1);
+  }
   spare.size = 0;
   for (int i = 0; i < count; ++i) {
     const int from = wrapped(first + i);
@@ -110,16 +134,20 @@ bool clip(Polygon& polygon, Polygon& spare, const Slice& slice, int line, double
 /// Of a chord: a corner no farther inside of the circle may lie on it.
 constexpr double kBesideCircle = 1e-6;
 
+/// Of the radius: how far the centre is inside of lines that leave the whole disc, but for rounding. That their chords
+/// meet no edge is not enough: of a polygon that is nothing but rounding, none does.
+constexpr double kBeyondCircle = 0.999;
+
 /// The outline of polygon and disc.
 void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
   std::array<int, kMostLines + 8> position;
   std::array<double, kMostLines + 8> before, after;  // of the chord, what lies outside of the piece
   int long_edges = 0;
-  bool centre_inside = true;
+  bool holds_disc = slice.radius > 0;
   for (int i = 0; i < polygon.size; ++i) {
     const int line = polygon.line[i];
     const Crossing crossing(slice, line);
-    centre_inside = centre_inside && dot(crossing.normal, slice.centre) <= crossing.height;
+    holds_disc = holds_disc && crossing.height - dot(crossing.normal, slice.centre) >= kBeyondCircle * slice.radius;
     const double from = dot(crossing.direction, polygon.corner(i > 0 ? i - 1 : polygon.size - 1));
     const double to = dot(crossing.direction, polygon.corner(i));
     // Where three lines meet in a point, rounding may turn the edge round that they leave there.
@@ -132,14 +160,17 @@ void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
     position[result.edges] = long_edges - 1;
     result.edge[result.edges++] = {line, crossing.enter > from, crossing.leave < to};
   }
-  result.whole_disc = result.edges == 0 && centre_inside && slice.radius > 0;
-  // Both edges at a corner see it inside of the circle, or neither does; unless the polygon is nothing but rounding.
+  result.whole_disc = result.edges == 0 && holds_disc;
+  // Both edges at a corner see it inside of the circle, or neither does, and there the outline turns by less than half
+  // a turn; unless the polygon is nothing but rounding.
   for (int i = 0; i < result.edges; ++i) {
     const int next = (i + 1) % result.edges;
     const bool adjacent = position[next] == (position[i] + 1) % long_edges && result.edges > 1;
     Outline::Edge &edge = result.edge[i], &other = result.edge[next];
-    if (adjacent && !edge.to_circle && !other.from_circle) continue;
-    if (after[i] > kBesideCircle || before[next] > kBesideCircle) {
+    const bool corner = adjacent && !edge.to_circle && !other.from_circle;
+    const Point here = slice.stack.line[edge.line].normal, there = slice.stack.line[other.line].normal;
+    if (corner && (slicing::cross(here, there) > 0 || dot(here, there) > 0)) continue;
+    if (corner || after[i] > kBesideCircle || before[next] > kBesideCircle) {
       result.edges = 0;
       return;
     }
