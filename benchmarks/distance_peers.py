@@ -15,10 +15,10 @@ from collections.abc import Callable
 from math import isfinite
 
 import numpy as np
-from peers import fcl_object
+from peers import coal_hull, fcl_hull, primitive
 from stability_results import NO_ANSWER, NO_DISTANCE
 
-from overlapper import Capsule, Cylinder, Placed, Sphere, overlap
+from overlapper import Cylinder, Hull, Placed, Sphere, overlap
 
 Body = np.ndarray | Placed
 Answer = float | str
@@ -41,13 +41,8 @@ def fcl(a: Body, b: Body) -> Answer:
 
     def placed(body: Body) -> fcl.CollisionObject:
         if isinstance(body, np.ndarray):
-            return fcl_object(body)
-        shape = body.shape
-        if isinstance(shape, Sphere):
-            model = fcl.Sphere(shape.radius)
-        else:
-            model = (fcl.Capsule if isinstance(shape, Capsule) else fcl.Cylinder)(shape.radius, shape.length)
-        return fcl.CollisionObject(model, fcl.Transform(body.position))
+            return fcl.CollisionObject(fcl_hull(Hull(body)))
+        return fcl.CollisionObject(primitive(fcl, body.shape), fcl.Transform(body.position))
 
     return fcl.distance(placed(a), placed(b), fcl.DistanceRequest(enable_signed_distance=True))
 
@@ -66,15 +61,8 @@ def coal_distance(a: Body, b: Body, tolerance: float) -> Answer:
 
     def shape_and_pose(body: Body) -> tuple[coal.ShapeBase, coal.Transform3s]:
         if isinstance(body, np.ndarray):
-            points = coal.StdVec_Vec3s()
-            points.extend(list(body))
-            return coal.ConvexBase.convexHull(points, True, "Qt"), coal.Transform3s.Identity()
-        shape = body.shape
-        if isinstance(shape, Sphere):
-            model = coal.Sphere(shape.radius)
-        else:
-            model = (coal.Capsule if isinstance(shape, Capsule) else coal.Cylinder)(shape.radius, shape.length)
-        return model, coal.Transform3s(np.eye(3), body.position)
+            return coal_hull(body), coal.Transform3s.Identity()
+        return primitive(coal, body.shape), coal.Transform3s(np.eye(3), body.position)
 
     (one, at), (other, there) = shape_and_pose(a), shape_and_pose(b)
 

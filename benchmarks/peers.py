@@ -13,12 +13,46 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import reduce
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 
-from overlapper import Hull, overlap
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Sphere, overlap
 
 Ring = list[int]
+Primitive = Box | Sphere | Capsule | Cylinder | HalfSpace
+
+
+# The shapes of FCL and coal, which have the same names and arguments but for hulls
+
+
+def primitive(library: ModuleType, shape: Primitive) -> Any:
+    if isinstance(shape, Box):
+        return library.Box(*(2 * shape.half_extents))
+    if isinstance(shape, Sphere):
+        return library.Sphere(shape.radius)
+    if isinstance(shape, HalfSpace):
+        return library.Halfspace(shape.normal, shape.offset)
+    return (library.Capsule if isinstance(shape, Capsule) else library.Cylinder)(shape.radius, shape.length)
+
+
+def fcl_hull(hull: Hull) -> Any:
+    import fcl
+
+    faces = np.concatenate([[len(ring), *ring] for ring in hull.facets])
+    return fcl.Convex(hull.vertices, len(hull.facets), faces)
+
+
+def coal_hull(points: np.ndarray) -> Any:
+    import coal
+
+    cloud = coal.StdVec_Vec3s()
+    cloud.extend(list(points))
+    return coal.ConvexBase.convexHull(cloud, True, "Qt")
+
+
+# Peers
 
 
 def auto(*bodies: np.ndarray) -> float:
@@ -131,34 +165,23 @@ def trimesh_boolean(*bodies: np.ndarray) -> float:
 def fcl_collide(a: np.ndarray, b: np.ndarray) -> bool:
     import fcl
 
-    return fcl.collide(*map(fcl_object, (a, b)), fcl.CollisionRequest(), fcl.CollisionResult()) > 0
+    one, other = (fcl.CollisionObject(fcl_hull(Hull(body))) for body in (a, b))
+    return fcl.collide(one, other, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
 
 
 def fcl_distance(a: np.ndarray, b: np.ndarray) -> bool:
     import fcl
 
-    return fcl.distance(*map(fcl_object, (a, b)), fcl.DistanceRequest(enable_signed_distance=True)) < 0
-
-
-def fcl_object(points: np.ndarray):
-    import fcl
-
-    hull = Hull(points)
-    faces = np.concatenate([[len(ring), *ring] for ring in hull.facets])
-    return fcl.CollisionObject(fcl.Convex(hull.vertices, len(hull.facets), faces))
+    one, other = (fcl.CollisionObject(fcl_hull(Hull(body))) for body in (a, b))
+    return fcl.distance(one, other, fcl.DistanceRequest(enable_signed_distance=True)) < 0
 
 
 def coal_collide(a: np.ndarray, b: np.ndarray) -> bool:
     import coal
 
-    shapes = []
-    for body in (a, b):
-        points = coal.StdVec_Vec3s()
-        points.extend(list(body))
-        shapes.append(coal.ConvexBase.convexHull(points, True, "Qt"))
     at_rest = coal.Transform3s.Identity()
     result = coal.CollisionResult()
-    return coal.collide(shapes[0], at_rest, shapes[1], at_rest, coal.CollisionRequest(), result) > 0
+    return coal.collide(coal_hull(a), at_rest, coal_hull(b), at_rest, coal.CollisionRequest(), result) > 0
 
 
 def pybullet_closest(a: np.ndarray, b: np.ndarray) -> bool:

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 from families import globe, prism
-from peers import clipped, enclosed_volume, volume_of_halfspaces
+from peers import clipped, coal_hull, enclosed_volume, fcl_hull, primitive, volume_of_halfspaces
 from strategies import rotation
 from workloads import Pair, corners, is_round, vertices
 
-from overlapper import Batch, Box, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap, penetration_depth
+from overlapper import Batch, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap, penetration_depth
 
 Setting = float | int | str | None
 Asked = Callable[[], Any]
@@ -280,7 +280,11 @@ def centre_of_ball(both: np.ndarray) -> np.ndarray:
 def fcl_depth(pair: Pair, way: str) -> Asked:
     import fcl
 
-    one, other = (fcl.CollisionObject(fcl_shape(body), fcl.Transform(*fcl_pose(body))) for body in pair.bodies)
+    def placed(body: Placed) -> fcl.CollisionObject:
+        model = fcl_hull(body.shape) if isinstance(body.shape, Hull) else primitive(fcl, body.shape)
+        return fcl.CollisionObject(model, fcl.Transform(rotation(body.orientation), body.position))
+
+    one, other = map(placed, pair.bodies)
     if way == "distance":
         if any(isinstance(body.shape, HalfSpace) for body in pair.bodies):
             raise Unfit("half-spaces")
@@ -296,30 +300,13 @@ def fcl_depth(pair: Pair, way: str) -> Asked:
     return collide
 
 
-def fcl_pose(body: Placed) -> tuple[np.ndarray, np.ndarray]:
-    return rotation(body.orientation), body.position
-
-
-def fcl_shape(body: Placed) -> Any:
-    import fcl
-
-    shape = body.shape
-    if isinstance(shape, Box):
-        return fcl.Box(*(2 * shape.half_extents))
-    if isinstance(shape, Sphere):
-        return fcl.Sphere(shape.radius)
-    if isinstance(shape, Cylinder):
-        return fcl.Cylinder(shape.radius, shape.length)
-    if isinstance(shape, HalfSpace):
-        return fcl.Halfspace(shape.normal, shape.offset)
-    rings = np.concatenate([[len(ring), *ring] for ring in shape.facets])
-    return fcl.Convex(shape.vertices, len(shape.facets), rings)
-
-
 def coal_depth(pair: Pair, _: None) -> Asked:
     import coal
 
-    shapes = [coal_shape(body) for body in pair.bodies]
+    shapes = [
+        coal_hull(body.shape.vertices) if isinstance(body.shape, Hull) else primitive(coal, body.shape)
+        for body in pair.bodies
+    ]
     poses = [coal.Transform3s(rotation(body.orientation), body.position) for body in pair.bodies]
     request = coal.CollisionRequest()
 
@@ -329,23 +316,6 @@ def coal_depth(pair: Pair, _: None) -> Asked:
         return -result.getContact(0).penetration_depth if result.numContacts() else 0.0
 
     return collide
-
-
-def coal_shape(body: Placed) -> Any:
-    import coal
-
-    shape = body.shape
-    if isinstance(shape, Box):
-        return coal.Box(*(2 * shape.half_extents))
-    if isinstance(shape, Sphere):
-        return coal.Sphere(shape.radius)
-    if isinstance(shape, Cylinder):
-        return coal.Cylinder(shape.radius, shape.length)
-    if isinstance(shape, HalfSpace):
-        return coal.Halfspace(shape.normal, shape.offset)
-    cloud = coal.StdVec_Vec3s()
-    cloud.extend(list(corners(body)))
-    return coal.ConvexBase.convexHull(cloud, True, "Qt")
 
 
 POWERS = tuple(10.0**-k for k in range(1, 13))
