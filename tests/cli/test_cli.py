@@ -50,6 +50,8 @@ def build(client):
 """
 
 FAILS_LATE = TWO_CUBES.replace("i < STEPS", "i < 5")
+LONG = TWO_CUBES.replace("STEPS = 8", "STEPS = 1_000_000")
+SLOW = TWO_CUBES.replace("def build(client):", "def build(client):\n    print('here'); import time; time.sleep(30)")
 
 
 @pytest.fixture(autouse=True)
@@ -337,17 +339,23 @@ def test_rows_before_a_failure_are_on_disk(tmp_path, ending):
     assert not (tmp_path / f"fails.{ending}").exists() and not (tmp_path / "fails.html").exists()
 
 
-@pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
-def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
-    (tmp_path / "long.py").write_text(TWO_CUBES.replace("STEPS = 8", "STEPS = 1_000_000"))
-    command = [sys.executable, "-m", "overlapper", "run", "long.py", "--out", f"long.{ending}"]
+def interrupted(*args, said, after):
+    """Its output and its complaints, if Ctrl-C comes so many seconds after the scene has said that."""
+    command = [sys.executable, "-m", "overlapper", *args]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
-        assert process.stderr.readline() == "a scene may talk\n"
-        time.sleep(0.3)
+        assert process.stderr.readline() == said + "\n"
+        time.sleep(after)
         process.send_signal(signal.SIGINT)
-        output, _ = process.communicate(timeout=30)
+        output, complaints = process.communicate(timeout=30)
     assert process.returncode == 130
+    return output, complaints
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
+def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
+    (tmp_path / "long.py").write_text(LONG)
+    output, _ = interrupted("run", "long.py", "--out", f"long.{ending}", said="a scene may talk", after=0.3)
     steps = [row["step"] for row in read_table(tmp_path / f"long.{ending}")]
     assert steps == list(range(1, len(steps) + 1))
     said = re.search(r"Interrupted after step (\d+)", output)
@@ -355,36 +363,22 @@ def test_rows_before_an_interruption_are_on_disk(tmp_path, ending):
     assert len(steps) - int(said[1]) in (0, 1)
 
 
-SLOW = TWO_CUBES.replace("def build(client):", "def build(client):\n    import time; time.sleep(30)")
-
-
 @pytest.mark.parametrize("command", ["run", "view"])
 def test_an_early_interruption_writes_nothing_and_says_so(tmp_path, command):
-    (tmp_path / "slow.py").write_text(SLOW.replace("import time", "print('here'); import time"))
+    (tmp_path / "slow.py").write_text(SLOW)
     (tmp_path / "old.html").write_text("of yesterday")
     options = ["--out", "old.csv"] if command == "run" else []
-    command = [sys.executable, "-m", "overlapper", command, "slow.py", "--html", "old.html", *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        assert process.stderr.readline() == "here\n"
-        process.send_signal(signal.SIGINT)
-        output, complaints = process.communicate(timeout=30)
-    assert (process.returncode, output) == (130, "")
+    output, complaints = interrupted(command, "slow.py", "--html", "old.html", *options, said="here", after=0)
+    assert output == ""
     assert complaints.strip() == "overlapper: interrupted; nothing was written"
     assert (tmp_path / "old.html").read_text() == "of yesterday"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["old.html", "slow.py", "two_cubes.py"]
 
 
 def test_a_view_that_is_interrupted_writes_what_came_before(tmp_path):
-    (tmp_path / "long.py").write_text(TWO_CUBES.replace("STEPS = 8", "STEPS = 1_000_000"))
-    command = [sys.executable, "-m", "overlapper", "view", "long.py", "--html", "long.html"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        assert process.stderr.readline() == "a scene may talk\n"
-        time.sleep(0.5)
-        process.send_signal(signal.SIGINT)
-        output, _ = process.communicate(timeout=30)
-    assert (process.returncode, output) == (130, "Written: long.html\n")
+    (tmp_path / "long.py").write_text(LONG)
+    output, _ = interrupted("view", "long.py", "--html", "long.html", said="a scene may talk", after=0.5)
+    assert output == "Written: long.html\n"
     assert (tmp_path / "long.html").stat().st_size > 100_000
 
 

@@ -78,36 +78,22 @@ def test_a_process_that_was_forked_off_leaves_the_marks_to_its_parent(client):
 # --- bodies come and go
 
 
-def test_a_body_that_takes_over_an_id_is_noticed(client):
+@pytest.mark.parametrize("synced", [False, True])  # pybullet then forgets to drop the user data of bodies removed later
+@pytest.mark.parametrize("given_user_data", [False, True])
+@pytest.mark.parametrize("readers", [1, 2])
+def test_a_body_that_takes_over_an_id_is_noticed(client, synced, given_user_data, readers):
     box(client)
     old = box(client, position=[3, 0, 0])
-    bodies = Bodies(client)
+    all_bodies = [Bodies(client) for _ in range(readers)]
+    if synced:
+        p.syncBodyInfo(client)
     p.removeBody(old, physicsClientId=client)
     assert body(client, p.GEOM_SPHERE, radius=0.3, position=[3, 0, 0]) == old
-    bodies.update()
-    assert [type(shape) for shape in bodies.shapes] == [Box, Sphere]
-
-
-def test_a_body_that_takes_over_an_id_after_a_sync_is_noticed(client):
-    """syncBodyInfo makes pybullet forget to drop the user data of bodies that are removed later."""
-    old = box(client)
-    bodies = Bodies(client)
-    p.syncBodyInfo(client)
-    p.removeBody(old, physicsClientId=client)
-    assert body(client, p.GEOM_SPHERE, radius=0.3) == old
-    bodies.update()
-    assert [type(shape) for shape in bodies.shapes] == [Sphere]
-
-
-def test_a_body_that_takes_over_an_id_and_is_given_user_data_is_noticed(client):
-    old = box(client)
-    bodies = Bodies(client)
-    p.syncBodyInfo(client)
-    p.removeBody(old, physicsClientId=client)
-    assert body(client, p.GEOM_SPHERE, radius=0.3) == old
-    p.addUserData(old, "mine", "", physicsClientId=client)
-    bodies.update()
-    assert [type(shape) for shape in bodies.shapes] == [Sphere]
+    if given_user_data:
+        p.addUserData(old, "mine", "", physicsClientId=client)
+    for bodies in all_bodies:
+        bodies.update()
+        assert [type(shape) for shape in bodies.shapes] == [Box, Sphere]
 
 
 def test_user_data_of_others_come_and_go(client):
@@ -137,16 +123,6 @@ def test_a_model_that_is_loaded_again_at_another_scale_is_noticed(client):
     assert p.loadURDF("cube.urdf", globalScaling=0.7, physicsClientId=client) == old
     bodies.update()
     assert_allclose([shape.half_extents for shape in bodies.shapes], [[0.35] * 3], rtol=1e-7)
-
-
-def test_two_readers_of_one_client_both_notice_a_replaced_body(client):
-    old = box(client)
-    readers = Bodies(client), Bodies(client)
-    p.removeBody(old, physicsClientId=client)
-    body(client, p.GEOM_SPHERE, radius=0.3)
-    for bodies in readers:
-        bodies.update()
-        assert [type(shape) for shape in bodies.shapes] == [Sphere]
 
 
 def test_shapes_stay_the_same_objects_while_other_bodies_come_and_go(client):
