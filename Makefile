@@ -24,7 +24,7 @@ run: $(VENV)/all ## build, run SCENE=franka_grasp, write out/franka_grasp.csv an
 	@$(VENV)/bin/overlapper run $(SCENE) --out out/$(SCENE).csv --html out/$(SCENE).html
 
 test: $(VENV)/dev ## build, pass all tests
-	@$(PYTEST) --numprocesses=auto
+	@$(PYTEST) --numprocesses=auto --dist=worksteal
 
 record: $(VENV)/dev ## write anew what is expected of the scenes and recorded of the core's answers
 	@$(PYTEST) --numprocesses=auto --overlapper-record scenes tests/native/test_recorded_answers.py
@@ -39,7 +39,7 @@ coverage-python: $(VENV)/dev ## pass all tests, report the branches of Python th
 # Counts of the run before would be added to, and what a killed process leaves half written is not worth a failure.
 coverage-core: build/coverage/dev ## report the lines of the core that its own tests reach
 	@find build/coverage/native -name '*.gcda' -delete
-	@build/coverage/venv/bin/python -m pytest --numprocesses=auto --quiet $(UNCOUNTED:%=--ignore=tests/native/%.py) \
+	@build/coverage/venv/bin/python -m pytest --numprocesses=auto --dist=worksteal --quiet $(UNCOUNTED:%=--ignore=tests/native/%.py) \
 	  $(COUNTING)
 	@$(VENV)/bin/python -m gcovr --root overlapper/native --exclude-throw-branches --gcov-ignore-parse-errors=all \
 	  --object-directory $(COUNTED) $(COUNTED) --fail-under-line=$(LEAST_OF_CORE)
@@ -51,15 +51,10 @@ growth: $(VENV)/dev ## look for inputs that take time out of proportion to their
 	@$(VENV)/bin/python benchmarks/growth.py $(GROWTH)
 
 # Inputs that reach something new stay in build/fuzz/corpus; one that breaks something is left beside it, by name.
-fuzz: build/fuzz/fuzz_overlap ## give the sanitized core inputs that reach new places, for FUZZ=-max_total_time=60 seconds
+fuzz: build/sanitized/dev ## give the sanitized core inputs that reach new places, for FUZZ=-max_total_time=60 seconds
 	@mkdir -p build/fuzz/corpus
-	@build/fuzz/fuzz_overlap $(FUZZ) -timeout=20 -max_len=600 -len_control=0 -print_final_stats=1 \
+	@build/sanitized/native/fuzz_overlap $(FUZZ) -timeout=20 -max_len=600 -len_control=0 -print_final_stats=1 \
 	  -verbosity=0 -artifact_prefix=build/fuzz/ build/fuzz/corpus overlapper/native/fuzz/corpus
-
-build/fuzz/fuzz_overlap: $(NATIVE)
-	@cmake -S overlapper/native -B build/fuzz -DCMAKE_CXX_COMPILER=clang++ -DOVERLAPPER_FUZZ=ON \
-	  -DOVERLAPPER_WERROR=ON --log-level=WARNING
-	@cmake --build build/fuzz --parallel $$(getconf _NPROCESSORS_ONLN)
 
 lint: $(VENV)/dev ## check style and types
 	@$(VENV)/bin/ruff check
@@ -88,14 +83,16 @@ $(VENV)/all $(VENV)/dev: pyproject.toml $(NATIVE) | $(VENV)/bin/python
 	@touch $@ $(VENV)/all
 
 # Another build of the core in an environment of its own, by the name of its CMake option. All but the package is that of
-# $(VENV): what a .pth names is on the path, but its own .pth, of which one is for the package, are not read.
+# $(VENV): what a .pth names is on the path, but its own .pth, of which one is for the package, are not read. Only clang
+# makes fuzzers.
 build/coverage/dev: OPTION := OVERLAPPER_COVERAGE
 build/sanitized/dev: OPTION := OVERLAPPER_SANITIZE
+build/sanitized/dev: COMPILER := CC=clang CXX=clang++
 build/coverage/dev build/sanitized/dev: build/%/dev: $(VENV)/dev
 	@$(VENV)/bin/python -m venv build/$*/venv
 	@$(VENV)/bin/python -c 'import sys; print(*(path for path in sys.path if path.endswith("site-packages")), sep="\n")' \
 	  >"$$(build/$*/venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/others.pth"
-	@SKBUILD_CMAKE_DEFINE="$(if $(SKBUILD_CMAKE_DEFINE),$(SKBUILD_CMAKE_DEFINE);)$(OPTION)=ON" \
+	@$(COMPILER) SKBUILD_CMAKE_DEFINE="$(if $(SKBUILD_CMAKE_DEFINE),$(SKBUILD_CMAKE_DEFINE);)$(OPTION)=ON" \
 	  SKBUILD_BUILD_DIR=build/$*/native build/$*/venv/bin/python -m pip install --quiet --disable-pip-version-check \
 	  --no-deps --editable .
 	@touch $@

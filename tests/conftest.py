@@ -1,11 +1,28 @@
 """Hypothesis draws the same examples on every run; `--hypothesis-profile=explore` looks further, with new ones."""
 
+import signal
+from pathlib import Path
+
 import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile("same", deadline=None, derandomize=True, database=None, max_examples=40)
 settings.register_profile("explore", deadline=None, max_examples=2000, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("same")
+
+
+# Tests press Ctrl-C, which a shell has whatever it puts into the background ignore, and all that is started from there.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+HERE = Path(__file__).parent
+
+
+def pytest_collection_modifyitems(items):
+    """Counting lines would slow down exact arithmetic by a half, in tests that are not about Python."""
+    for item in items:
+        if item.path.is_relative_to(HERE / "native") or item.path.is_relative_to(HERE / "support"):
+            item.add_marker("no_cover")
 
 
 @pytest.fixture

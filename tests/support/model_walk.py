@@ -49,10 +49,10 @@ class Walk:
     thin ones wrongly; with URDF_USE_IMPLICIT_CYLINDER they are plain capsules.
     """
 
-    def __init__(self, path):
-        self.client = p.connect(p.DIRECT)
-        self.twin = p.connect(p.DIRECT) if path.suffix == ".xml" else self.client
+    def __init__(self, path, clients):
+        self.client, self.twin = clients if path.suffix == ".xml" else clients[:1] * 2
         for client in {self.client, self.twin}:
+            p.resetSimulation(physicsClientId=client)
             p.setAdditionalSearchPath(str(path.parent), physicsClientId=client)
             load(path, client, p.URDF_USE_IMPLICIT_CYLINDER if client != self.client else 0)
         self.bodies = Bodies(self.client)
@@ -63,10 +63,6 @@ class Walk:
         self.skipped = {(each.body, each.link): each.reason for each in self.bodies.skipped}
         ids = [p.getBodyUniqueId(i, self.client) for i in range(p.getNumBodies(self.client))]
         self.links = [(id, link) for id in ids for link in range(-1, p.getNumJoints(id, self.client))]
-
-    def disconnect(self):
-        for client in {self.client, self.twin}:
-            p.disconnect(client)
 
     def complain(self, link, sentence):
         self.problems.append(f"body {link[0]}, link {link[1]}: {sentence}")
@@ -198,15 +194,14 @@ class Walk:
             self.complain(link, f"the box {lower}, {upper} is not within Bullet's {theirs.tolist()}")
 
 
-def examine(path):
+def examine(path, clients):
     """What a model has and what is wrong with what is made of it; no more than that if pybullet cannot load it."""
     try:
-        walk = Walk(path)
+        walk = Walk(path, clients)
     except p.error as error:
         return {"loaded": False, "problems": [str(error)]}
     walk.check_shapes()
     walk.check_places()
-    walk.disconnect()
     names = Counter(type(shape).__name__ for shape in walk.bodies.shapes)
     skipped = [[each.name, each.reason] for each in walk.bodies.skipped]
     return {"loaded": True, "shapes": names, "skipped": skipped, "problems": walk.problems}
@@ -214,7 +209,8 @@ def examine(path):
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", UserWarning)  # of shapes left out: they are among the results
+    clients = p.connect(p.DIRECT), p.connect(p.DIRECT)  # for all models: to connect takes as long as to load one
     with open(sys.argv[1], "a", buffering=1) as results:
         for model in sys.argv[2:]:
             results.write(json.dumps([model, None]) + "\n")
-            results.write(json.dumps([model, examine(Path(model))]) + "\n")
+            results.write(json.dumps([model, examine(Path(model), clients)]) + "\n")
