@@ -248,7 +248,7 @@ class RationalBody:
             return np.array([row[:3]], object), np.array(row[3:], object)
         assert isinstance(self.shape, Hull)
         (corners, unit), triangles = self._corners, self.shape.triangles
-        a, b, c = (corners[corner] for corner in triangles.T)
+        a, b, c = (corners.take(corner, axis=0) for corner in triangles.T)  # indexing may crash for want of memory
         normals = cross(b - a, c - a)
         solid = np.array([any(normal) for normal in normals])
         normals, offsets = normals[solid], (normals * a).sum(axis=1)[solid]

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from strategies import in_general_position, placed, polyhedra, quaternion, solids
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 from overlapper.proof.certificate import CertificateError, certificate
 from overlapper.proof.claims import Overlapping, OwnedPlane, Separated, Touching
 
@@ -119,8 +119,11 @@ def test_three_bodies_somewhere_are_proved(a, b, c):
 # Rounded hulls have no certificate, and fine hulls take too long.
 @pytest.mark.parametrize("name", [name for name in families.FAMILIES if "fine" not in name and "rounded" not in name])
 def test_hard_families_are_proved(name):
-    for seed in range(3):
-        proved(overlap(*families.make(name, seed).placed, tolerance=0.1))
+    overlaps = [overlap(*families.make(name, seed).placed, tolerance=0.1) for seed in range(6)]
+    overlaps = [found for found in overlaps if not any(isinstance(body.shape, RoundedHull) for body in found.shapes)]
+    assert len(overlaps) >= 3
+    for found in overlaps[:3]:
+        proved(found)
 
 
 def test_a_half_space_is_what_its_numbers_say_as_given():
