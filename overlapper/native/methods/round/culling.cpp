@@ -55,7 +55,7 @@ void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side)
       for (const int face : corner.face)
         if (const int wall = part.around.faces[face].wall; wall != kNoWall) part.walls.push_back(wall);
     std::ranges::sort(part.walls);
-    part.walls.erase(std::ranges::unique(part.walls).begin(), part.walls.end());
+    part.walls.erase(std::unique(part.walls.begin(), part.walls.end()), part.walls.end());
   }
 }
 
