@@ -69,8 +69,7 @@ int DualTree::grow(int begin, int end) {
   if (end - begin <= kLeaf) return at;
   int middle = (end - begin) / 2;
   if (parted) {
-    const auto [axis, place] = *parted;
-    const auto lower = [&](const Entry& each) { return dot(each.point - from, axis) < place; };
+    const auto lower = [&](const Entry& each) { return dot(each.point - from, parted->first) < parted->second; };
     middle = static_cast<int>(std::partition(own.begin(), own.end(), lower) - own.begin());
   } else {
     std::nth_element(own.begin(), own.begin() + middle, own.end(), [&](const Entry& a, const Entry& b) {
