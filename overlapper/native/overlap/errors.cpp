@@ -34,6 +34,13 @@ struct Seen {
   double slack_at(Vec3 y) const { return slack * (1 - dot(dual, y)); }
 };
 
+/// Those of all corners of a polygon.
+std::vector<int> numbers(const std::vector<Vec3>& polygon) {
+  std::vector<int> all(polygon.size());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
 /// The planes of other bodies that pass by a facet, found in trees.
 class OthersNear {
  public:
@@ -64,8 +71,7 @@ class OthersNear {
   /// polygon as both may have moved, until `visit` is false.
   template <class Visit>
   void visit(int owner, const std::vector<Vec3>& polygon, Visit visit) const {
-    std::vector<int> all(polygon.size());
-    std::iota(all.begin(), all.end(), 0);
+    const std::vector<int> all = everywhere_.empty() ? std::vector<int>() : numbers(polygon);
     for (int i : everywhere_)
       if (planes_[i].owner != owner && !visit(planes_[i], std::span<const int>(all))) return;
     double farthest = 0;
@@ -258,11 +264,13 @@ class Sandwich {
     for (size_t f = 0; f < facets_.size(); ++f) {
       cancellation_point();
       const std::vector<Vec3> corners = polygon(f);
+      const std::vector<int> all = numbers(corners);
       double doubtful = beside_smooth(corners, facets_[f]) ? kInfinity : 0;
       const auto ring = region_.polytope.facet(static_cast<int>(f));
       for (size_t i = 0; i < ring.size(); ++i) {
         const Seen& plane = facets_[ridges.left_of(ring[(i + 1) % ring.size()], ring[i])];
-        if (plane.owner != facets_[f].owner) doubtful += area_within(corners, plane, facets_[f].moved + plane.moved);
+        if (plane.owner != facets_[f].owner)
+          doubtful += area_within(corners, all, plane, facets_[f].moved + plane.moved);
       }
       areas.push_back(doubtful);
     }
@@ -290,12 +298,6 @@ class Sandwich {
       planes.push_back({dual.point, dual.normal, dual.slack, rounding, dual.owner});
     }
     return planes;
-  }
-
-  double area_within(const std::vector<Vec3>& polygon, const Seen& plane, double distance) const {
-    std::vector<int> all(polygon.size());
-    std::iota(all.begin(), all.end(), 0);
-    return area_within(polygon, all, plane, distance);
   }
 
   /// m²: of a polygon in the frame, where the plane is no farther than that, as it may be from the corners `near` only;

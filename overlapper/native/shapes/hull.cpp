@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cfloat>
 #include <limits>
+#include <numeric>
 #include <string>
 
 #include "geometry/cancellation.h"
@@ -140,44 +141,52 @@ CoplanarRegions merge_coplanar(const ExpandingHull& hull, double rounding) {
   return regions;
 }
 
-/// Closed lines of point indices, one after the other.
-struct Loops {
-  std::vector<int> start{0}, point;
+/// Lists of numbers, one after the other.
+struct Lists {
+  std::vector<int> start{0}, number;
 
   int size() const { return static_cast<int>(start.size()) - 1; }
-  std::span<const int> operator[](int i) const { return std::span(point).subspan(start[i], start[i + 1] - start[i]); }
-  void end() { start.push_back(static_cast<int>(point.size())); }
+  std::span<const int> operator[](int i) const { return std::span(number).subspan(start[i], start[i + 1] - start[i]); }
+  void end() { start.push_back(static_cast<int>(number.size())); }
 };
 
+/// The members of so many groups: `each(use)` calls use(group, member), and is asked for all twice over.
+template <class Each>
+Lists grouped(int groups, Each each) {
+  Lists lists;
+  lists.start.assign(groups + 1, 0);
+  each([&](int group, int) { ++lists.start[group + 1]; });
+  std::partial_sum(lists.start.begin(), lists.start.end(), lists.start.begin());
+  lists.number.resize(lists.start[groups]);
+  std::vector<int> next(lists.start.begin(), lists.start.end() - 1);
+  each([&](int group, int member) { lists.number[next[group]++] = member; });
+  return lists;
+}
+
 /// The directed ridges that leave each region, chained into one loop of point indices per region.
-Loops region_loops(const CoplanarRegions& regions) {
+Lists region_loops(const CoplanarRegions& regions) {
   const ExpandingHull& hull = regions.hull;
   const int count = static_cast<int>(regions.first.size());
-  std::vector<int> begin(count + 1, 0), member;
-  for (int r : regions.region)
-    if (r >= 0) ++begin[r + 1];
-  for (int r = 0; r < count; ++r) begin[r + 1] += begin[r];
-  member.resize(begin[count]);
-  std::vector<int> filled(begin.begin(), begin.end() - 1);
-  for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t)
-    if (regions.region[t] >= 0) member[filled[regions.region[t]]++] = t;
-
-  Loops loops;
-  loops.point.reserve(3 * static_cast<size_t>(count));
+  const Lists members = grouped(count, [&](auto use) {
+    for (int t = 0; t < static_cast<int>(hull.facets.size()); ++t)
+      if (regions.region[t] >= 0) use(regions.region[t], t);
+  });
+  Lists loops;
+  loops.number.reserve(3 * static_cast<size_t>(count));
   loops.start.reserve(count + 1);
   std::vector<int> next(hull.points.size(), -1);
   for (int r = 0; r < count; ++r) {
     cancellation_point();
-    if (begin[r + 1] - begin[r] == 1) {
-      const auto& corners = hull.facets[member[begin[r]]].vertex;
-      loops.point.insert(loops.point.end(), corners.begin(), corners.end());
+    if (members[r].size() == 1) {
+      const auto& corners = hull.facets[members[r][0]].vertex;
+      loops.number.insert(loops.number.end(), corners.begin(), corners.end());
       loops.end();
       continue;
     }
     int first = -1, ridges = 0;
-    for (int m = begin[r]; m < begin[r + 1]; ++m) {
+    for (int t : members[r]) {
       cancellation_point();
-      const ExpandingHull::Facet& facet = hull.facets[member[m]];
+      const ExpandingHull::Facet& facet = hull.facets[t];
       for (int i = 0; i < 3; ++i) {
         if (regions.region[facet.neighbour[i]] == r) continue;
         next[facet.vertex[i]] = facet.vertex[(i + 1) % 3];
@@ -185,7 +194,7 @@ Loops region_loops(const CoplanarRegions& regions) {
       }
     }
     for (int v = first, chained = 0; chained < ridges; ++chained) {
-      loops.point.push_back(v);
+      loops.number.push_back(v);
       v = next[v];
       if (v == first) break;
     }
@@ -195,19 +204,19 @@ Loops region_loops(const CoplanarRegions& regions) {
 }
 
 /// Points in the middle of an edge lie on two facets only: they are no vertices of the solid.
-void drop_edge_points(Loops& loops, int points) {
+void drop_edge_points(Lists& loops, int points) {
   std::vector<int> facets_at(points, 0);
-  for (int v : loops.point) ++facets_at[v];
+  for (int v : loops.number) ++facets_at[v];
   int kept = 0;
   for (int i = 0, from = 0; i < loops.size(); ++i) {
     cancellation_point();
     const int begin = kept, to = loops.start[i + 1];
     for (; from < to; ++from)
-      if (facets_at[loops.point[from]] >= 3) loops.point[kept++] = loops.point[from];
+      if (facets_at[loops.number[from]] >= 3) loops.number[kept++] = loops.number[from];
     if (kept - begin < 3) kept = begin;
     loops.start[i + 1] = kept;
   }
-  loops.point.resize(kept);
+  loops.number.resize(kept);
 }
 
 /// Newell's normal of a polygon, taken about its first corner; the offset is that of its outermost corner.
@@ -245,12 +254,12 @@ std::vector<std::array<int, 3>> exact_corners(const CoplanarRegions& regions) {
   return corners;
 }
 
-HullData hull_data(const CoplanarRegions& regions, const Loops& loops, Vec3 origin, std::vector<int>* source) {
+HullData hull_data(const CoplanarRegions& regions, const Lists& loops, Vec3 origin, std::vector<int>* source) {
   const ExpandingHull& hull = regions.hull;
   HullData data;
   data.origin = origin;
   std::vector<int> index(hull.points.size(), -1);
-  data.ring.reserve(loops.point.size());
+  data.ring.reserve(loops.number.size());
   data.ring_start.reserve(loops.start.size());
   for (int i = 0; i < loops.size(); ++i) {
     cancellation_point();
@@ -380,21 +389,19 @@ void complete(HullData& data) {
   std::vector<int> across;
   data.edges = edges_of(data, across);
   const int vertices = static_cast<int>(data.vertices.size());
-  std::vector<int> start(vertices + 1, 0), around(data.ring.size());
-  for (int v : data.ring) ++start[v + 1];
-  for (int v = 0; v < vertices; ++v) start[v + 1] += start[v];
-  std::vector<int> filled(start.begin(), start.end() - 1);
+  const Lists around = grouped(vertices, [&](auto use) {
+    for (int f = 0; f < static_cast<int>(data.planes.size()); ++f)
+      for (int v : data.facet(f)) use(v, f);
+  });
   for (int f = 0; f < static_cast<int>(data.planes.size()); ++f) {
     cancellation_point();
-    for (int v : data.facet(f)) {
-      around[filled[v]++] = f;
+    for (int v : data.facet(f))
       data.flatness = std::max(data.flatness, -signed_distance(data.planes[f], data.vertices[v]));
-    }
   }
   data.facets_meet.reserve(vertices);
   for (int v = 0; v < vertices; ++v) {
     cancellation_point();
-    data.facets_meet.push_back(well_spread(std::span(around).subspan(start[v], start[v + 1] - start[v]), data.planes));
+    data.facets_meet.push_back(well_spread(around[v], data.planes));
   }
   for (Vec3 v : data.vertices) data.radius = std::max(data.radius, norm(v));
   const double rounding = 256 * DBL_EPSILON * data.radius + 4 * data.flatness;
@@ -413,7 +420,7 @@ std::shared_ptr<HullData> merged(const ExpandingHull& hull, Vec3 origin, std::ve
   // a plane through three of them misses a fourth by up to about eight of those.
   const double rounding = 16 * DBL_EPSILON * extent;
   const CoplanarRegions regions = merge_coplanar(hull, rounding);
-  Loops loops = region_loops(regions);
+  Lists loops = region_loops(regions);
   drop_edge_points(loops, static_cast<int>(hull.points.size()));
   auto data = std::make_shared<HullData>(hull_data(regions, loops, origin, source));
   if (data->planes.size() < 4) return nullptr;
