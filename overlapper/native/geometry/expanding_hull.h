@@ -94,8 +94,8 @@ class ExpandingHull {
   static constexpr size_t kLeastReused = 1024;  ///< facets, before which caches hold the removed ones as well
 
   std::vector<int> cone_, fan_, removed_, stack_, cone_start_, next_conflict_, visited_;
-  std::vector<int> vacant_,
-      born_;  ///< numbers of facets; per facet, how many have been made before, once one is vacant
+  std::vector<int> vacant_;  ///< numbers of facets
+  std::vector<int> born_;    ///< per facet, how many have been made before, once one is vacant
   int made_ = 0;
   struct HorizonRidge {
     int from, to, outside;

@@ -1,12 +1,9 @@
 #include "methods/round/culling.h"
 
 #include <algorithm>
-#include <limits>
 
 namespace overlapper::slicing {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// From a round's centre or axis to a point; unit, or zero.
 Vec3 outward(const Round& round, Vec3 point) {
@@ -50,7 +47,7 @@ void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side)
     }
     part.empty = !something;
     if (part.empty) continue;
-    part.middle = part.around.middle(), part.box = part.around.box();
+    part.middle = part.around.middle(), part.box = part.around.bounds();
     for (const Enclosure::Corner& corner : part.around.corners)
       for (const int face : corner.face)
         if (const int wall = part.around.faces[face].wall; wall != kNoWall) part.walls.push_back(wall);
@@ -63,13 +60,8 @@ bool Culling::keep_walls(const Side& side, int piece, const Part& other, std::ve
   for (const int w : side.parts[piece].walls) {
     const Wall& wall = side.pieces->walls[w];
     const Vec3 normal = rounded(wall.normal);
-    double least = kInfinity, most = -kInfinity;
-    for (const Enclosure::Corner& corner : other.around.corners) {
-      const double along = dot(normal, corner.at);
-      least = std::min(least, along), most = std::max(most, along);
-    }
-    if (least > wall.slack.head + margin_) return false;
-    if (most >= wall.slack.head - margin_) walls.push_back(wall);
+    if (other.around.least(normal) > wall.slack.head + margin_) return false;
+    if (other.around.most(normal) >= wall.slack.head - margin_) walls.push_back(wall);
   }
   return true;
 }
@@ -79,7 +71,7 @@ bool Culling::beyond(const Round& round, const Part& other) const {
   return normal != Vec3{} && other.around.least(normal) > reach(round, normal) + margin_;
 }
 
-bool Culling::meet(int p, int q, std::vector<Wall>& walls, Enclosure::Box& box) const {
+bool Culling::meet(int p, int q, std::vector<Wall>& walls, Bounds& box) const {
   const Part &one = a_.parts[p], &two = b_.parts[q];
   if (one.empty || two.empty) return false;
   box = {max(one.box.lower, two.box.lower), min(one.box.upper, two.box.upper)};

@@ -15,13 +15,13 @@ class Culling {
 
   /// Fills in the walls and a box around what pieces p of a and q of b share; false if that is nothing. Where it is but
   /// nothing shows it, what these walls leave lies outside of the polytope around the common set.
-  bool meet(int p, int q, std::vector<Wall>& walls, Enclosure::Box& box) const;
+  bool meet(int p, int q, std::vector<Wall>& walls, Bounds& box) const;
 
  private:
   struct Part {
     Enclosure around;
     Vec3 middle;
-    Enclosure::Box box;
+    Bounds box;
     std::vector<int> walls;  ///< those of which something is left
     bool empty = false;
   };

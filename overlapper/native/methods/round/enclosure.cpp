@@ -5,7 +5,8 @@
 
 namespace overlapper::slicing {
 
-void Enclosure::become_box(Vec3 lower, Vec3 upper) {
+void Enclosure::become(const Bounds& box) {
+  const auto& [lower, upper] = box;
   faces = {{{-1, 0, 0}, -lower.x, kNoWall}, {{1, 0, 0}, upper.x, kNoWall},   {{0, -1, 0}, -lower.y, kNoWall},
            {{0, 1, 0}, upper.y, kNoWall},   {{0, 0, -1}, -lower.z, kNoWall}, {{0, 0, 1}, upper.z, kNoWall}};
   corners.clear();
@@ -75,12 +76,12 @@ bool Enclosure::cut(const Face& face) {
   return true;
 }
 
-bool Enclosure::contains(Vec3 point) const {
-  return std::ranges::all_of(faces, [&](const Face& face) { return dot(face.normal, point) <= face.slack; });
+bool Enclosure::excludes(Vec3 point) const {
+  return std::ranges::any_of(faces, [&](const Face& face) { return dot(face.normal, point) > face.slack; });
 }
 
-Enclosure::Box Enclosure::box() const {
-  Box box{corners[0].at, corners[0].at};
+Bounds Enclosure::bounds() const {
+  Bounds box{corners[0].at, corners[0].at};
   for (const Corner& corner : corners) box = {min(box.lower, corner.at), max(box.upper, corner.at)};
   return box;
 }

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "geometry/vec.h"
+#include "shapes/shape.h"
 
 namespace overlapper::slicing {
 
@@ -22,13 +22,10 @@ struct Enclosure {
     std::array<int, 3> beside;  ///< the corners at the other ends of its edges, counter-clockwise from outside
     std::array<int, 3> face;    ///< between an edge and the next
   };
-  struct Box {
-    Vec3 lower, upper;
-  };
   std::vector<Face> faces;  ///< all that have cut it, of which further ones may have left nothing
   std::vector<Corner> corners;
 
-  void become_box(Vec3 lower, Vec3 upper);
+  void become(const Bounds& box);
   /// False if the face leaves nothing, and then the polytope is as it was.
   bool cut(const Face& face);
 
@@ -36,8 +33,9 @@ struct Enclosure {
   template <class Use>
   void for_faces(Use use) const;
 
-  bool contains(Vec3 point) const;
-  Box box() const;
+  /// Whether it is surely not inside: what is no number may be.
+  bool excludes(Vec3 point) const;
+  Bounds bounds() const;
   /// Of dot(direction, X) over the polytope.
   double least(Vec3 direction) const;
   double most(Vec3 direction) const { return -least(-direction); }

@@ -283,7 +283,7 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result) {
   const Vec3 size = max(abs(lower), abs(upper));
   const double margin = 1e-12 * (norm(size) + norm(inside) + norm(a.pose.translation) + norm(b.pose.translation));
   const Vec3 wider = margin * Vec3{1, 1, 1};
-  result.become_box(lower - wider, upper + wider);
+  result.become({lower - wider, upper + wider});
   for (const Placed* body : {&a, &b}) {
     const Vec3 origin = body->pose.translation - inside;
     const auto cut = [&](const Plane& plane, double more) {

@@ -38,6 +38,9 @@ struct Totals {
   }
 };
 
+/// Of coordinates (x, y, t).
+Vec3 in_world(const slicing::Stack& stack, Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.t; }
+
 /// ∫ X Xᵀ dV of coordinates (x, y, t) and of their integral `first`, in the world, about a point `offset` before them.
 void add_second(const slicing::Stack& stack, const slicing::Integrals& sum, Vec3 first, Vec3 offset, Totals& totals) {
   const Vec3 axis[3] = {stack.l, stack.m, stack.t};
@@ -84,7 +87,7 @@ class Measuring {
   Totals totals;
   double extent = 0;                           ///< m: no point of the common set is farther from the one inside
   const slicing::Enclosure* common = nullptr;  ///< what lies outside of that belongs to no piece
-  slicing::Enclosure::Box box;                 ///< around what is added, if the common set is enclosed
+  Bounds box;                                  ///< around what is added, if the common set is enclosed
 
  private:
   /// 1 if a wall leaves nothing of one of the rounds, -1 if it leaves all of one, beyond rounding.
@@ -209,7 +212,7 @@ class Measuring {
   /// it to a fraction of the whole that matters. No tetrahedron is negative, but by rounding.
   bool add_polytope() {
     const Vec3 wider = 0.1 * (box.upper - box.lower);
-    polytope_.become_box(box.lower - wider, box.upper + wider);
+    polytope_.become({box.lower - wider, box.upper + wider});
     for (size_t i = 0; i < walls_.size(); ++i)
       if (!polytope_.cut({rounded(walls_[i].normal), walls_[i].slack.head, static_cast<int>(i)})) return false;
     Totals piece;
@@ -271,7 +274,7 @@ class Measuring {
 
   /// Whether that is the centroid of something that shares nothing with what encloses the common set: pieces whose
   /// walls leave something there are convex, and reach no farther.
-  bool outside(Vec3 centroid) const { return common && !common->contains(centroid + offset_); }
+  bool outside(Vec3 centroid) const { return common && common->excludes(centroid + offset_); }
 
   bool add_stack() {
     const std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent);
@@ -297,8 +300,7 @@ class Measuring {
       open = less;
       std::swap(best_, sum_);
     }
-    const Vec3 mean = best_.integrals.first / best_.integrals.volume;
-    if (outside(mean.x * stack->l + mean.y * stack->m + mean.z * stack->t)) return true;
+    if (outside(in_world(*stack, best_.integrals.first) / best_.integrals.volume)) return true;
     totals.open += open;
     add_sum(*stack, best_);
     return true;
@@ -308,9 +310,8 @@ class Measuring {
   /// again from a point of its own; true if so.
   bool move_near(const slicing::Stack& stack) {
     const slicing::Integrals& s = best_.integrals;
-    const Vec3 mean = s.first / s.volume;
+    const Vec3 mean = s.first / s.volume, offset = in_world(stack, mean);
     const double spread = (s.squares.x + s.squares.y + s.squares.z) / s.volume - norm2(mean);
-    const Vec3 offset = mean.x * stack.l + mean.y * stack.m + mean.z * stack.t;
     if (moved_ || !(norm2(mean) > 25 * spread) || !(norm(offset) <= extent)) return false;
     offset_ = offset;
     for (Round& r : rounds_) r.centre = r.centre - wide(offset_);
@@ -358,21 +359,22 @@ class Measuring {
 
   void add_sum(const slicing::Stack& stack, const slicing::Sum& sum) {
     const slicing::Integrals& s = sum.integrals;
-    const auto in_world = [&](Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.n; };
+    const auto turned = [&](Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.n; };
     totals.volume += s.volume + s.correction;
     totals.error += sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
     totals.area += s.area;
     totals.border += s.border;
-    const Vec3 first = s.first.x * stack.l + s.first.y * stack.m + s.first.z * stack.t, pull = in_world(s.pull[0]);
+    const Vec3 first = in_world(stack, s.first), pull = turned(s.pull[0]);
     totals.first += first + s.volume * offset_;
     totals.pull += pull;
-    totals.moment += in_world(s.moment[0]) + cross(offset_, pull);
-    totals.unbalanced += in_world(s.pull[0] + s.pull[1]);
+    totals.moment += turned(s.moment[0]) + cross(offset_, pull);
+    totals.unbalanced += turned(s.pull[0] + s.pull[1]);
     add_second(stack, s, first, offset_, totals);
   }
 
-  std::vector<Round> rounds_;
   static constexpr int kSuperseded = -1;  ///< the owner of a wall that is to go
+
+  std::vector<Round> rounds_;
   std::vector<Wall> walls_, with_radical_;
   std::vector<std::pair<double, int>> by_length_;  ///< walls, by what their normals are along a line
   slicing::Enclosure polytope_;
