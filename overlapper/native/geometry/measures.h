@@ -36,6 +36,12 @@ template <class Vector>
 struct PullOf {
   Vector force;   ///< d volume / d translation: the area vector of the facets that the body owns
   Vector moment;  ///< d volume / d rotation vector about some point, which whoever has a pull names
+
+  PullOf& operator+=(const PullOf& other) {
+    force += other.force;
+    moment += other.moment;
+    return *this;
+  }
 };
 using Pull = PullOf<Vec3>;
 

@@ -2,6 +2,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/predicates.h"
+#include "geometry/sum_in_pairs.h"
 
 namespace overlapper {
 
@@ -49,10 +50,24 @@ void add(Mat3& m, double s, const Mat3& other) {
   m.row2 += s * other.row2;
 }
 
+struct Integrals {
+  double volume = 0;
+  Vec3 first;
+  Mat3 second{{}, {}, {}};
+
+  Integrals& operator+=(const Integrals& other) {
+    volume += other.volume;
+    first += other.first;
+    add(second, 1, other.second);
+    return *this;
+  }
+};
+
 }  // namespace
 
 Moments moments(const Polytope& polytope) {
   Moments sum;
+  SumInPairs<Integrals> integrals;
   sum.cone_volume.reserve(polytope.facets());
   sum.facet_centroid.reserve(polytope.facets());
   for (int f = 0; f < polytope.facets(); ++f) {
@@ -67,14 +82,16 @@ Moments moments(const Polytope& polytope) {
       const Vec3 corners = a + b + c;
       cone += tetrahedron;
       weighted += tetrahedron * corners;
+      Integrals term{tetrahedron, tetrahedron / 4 * corners};
       // ∫ x xᵀ over a tetrahedron with one corner at the origin: V / 20 (Σ pᵢ pᵢᵀ + (Σ pᵢ)(Σ pᵢ)ᵀ).
-      for (Vec3 p : {a, b, c, corners}) add(sum.second_moment, tetrahedron / 20, outer(p, p));
+      for (Vec3 p : {a, b, c, corners}) add(term.second, tetrahedron / 20, outer(p, p));
+      integrals.add(term);
     }
-    sum.volume += cone;
-    sum.first_moment += weighted / 4;
     sum.cone_volume.push_back(cone);
     sum.facet_centroid.push_back(cone > 0 ? weighted / (3 * cone) : a);
   }
+  const Integrals total = integrals.total();
+  sum.volume = total.volume, sum.first_moment = total.first, sum.second_moment = total.second;
   return sum;
 }
 

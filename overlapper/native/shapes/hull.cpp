@@ -9,6 +9,7 @@
 #include "geometry/cancellation.h"
 #include "geometry/expanding_hull.h"
 #include "geometry/predicates.h"
+#include "geometry/sum_in_pairs.h"
 #include "geometry/wide.h"
 #include "shapes/limits.h"
 
@@ -485,21 +486,20 @@ Hull make_hull(std::span<const Vec3> points) {
 HullMeasures measure(const HullData& hull) {
   Vec3 inside;
   for (Vec3 v : hull.vertices) inside += v / static_cast<double>(hull.vertices.size());
-  HullMeasures sum;
-  Vec3 moment;
+  SumInPairs<double> volume, area;
+  SumInPairs<Vec3> moment;
   for (int f = 0; f + 1 < static_cast<int>(hull.ring_start.size()); ++f) {
     const auto ring = hull.facet(f);
     const Vec3 a = hull.vertices[ring[0]] - inside;
     for (size_t i = 1; i + 1 < ring.size(); ++i) {
       const Vec3 b = hull.vertices[ring[i]] - inside, c = hull.vertices[ring[i + 1]] - inside;
       const double tetrahedron = dot(a, cross(b, c)) / 6;
-      sum.volume += tetrahedron;
-      sum.area += norm(cross(b - a, c - a)) / 2;
-      moment += tetrahedron / 4 * (a + b + c);
+      volume.add(tetrahedron);
+      area.add(norm(cross(b - a, c - a)) / 2);
+      moment.add(tetrahedron / 4 * (a + b + c));
     }
   }
-  sum.centroid = inside + moment / sum.volume;
-  return sum;
+  return {volume.total(), area.total(), inside + moment.total() / volume.total()};
 }
 
 }  // namespace overlapper

@@ -6,6 +6,7 @@ from itertools import permutations
 import exact
 import numpy as np
 import pytest
+from families import icosphere
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
@@ -289,6 +290,19 @@ def test_inertia_of_hulls_is_the_exact_one():
         p, q = overlapping_points(np.random.default_rng(seed), low=4, high=8)
         truth = np.array(exact.common(exact.hull(p), exact.hull(q)).inertia, float)
         assert_allclose(overlap(p, q).inertia, truth, atol=1e-13 * np.trace(truth))
+
+
+def test_sums_over_many_facets_are_rounded_no_more_than_those_over_few():
+    below = Placed(HalfSpace(directions(np.random.default_rng(0), 1)[0], 0.1))
+    answer = overlap(icosphere(5), below)
+    corners = answer.vertices[answer.faces].astype(np.longdouble) - answer.vertices.mean(axis=0)
+    sixth = np.linalg.det(corners.astype(float)).astype(np.longdouble) / 6
+    weighted = np.concatenate([corners, corners.sum(axis=1, keepdims=True)], axis=1)
+    first = (sixth[:, None] * corners.sum(axis=1)).sum(axis=0) / 4
+    second = np.einsum("f,fki,fkj->ij", sixth / 20, weighted, weighted) - np.outer(first, first) / sixth.sum()
+    assert answer.volume == pytest.approx(float(sixth.sum()), rel=1e-14)
+    inertia = (np.trace(second) * np.eye(3) - second).astype(float)
+    assert_allclose(answer.inertia, inertia, atol=2e-14 * np.trace(inertia))
 
 
 @pytest.mark.parametrize("count", [3, 4, 6, 10])

@@ -9,6 +9,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/predicates.h"
+#include "geometry/sum_in_pairs.h"
 #include "methods/dual/wide_dual.h"
 
 namespace overlapper {
@@ -165,7 +166,7 @@ namespace {
 /// tetrahedra has its corners in the set, so it lies inside.
 double inner_volume(const Region& region) {
   const Polytope& p = region.polytope;
-  double sum = 0;
+  SumInPairs<double> sum;
   for (int f = 0; f < p.facets(); ++f) {
     const auto ring = p.facet(f);
     const auto pulled = [&](int v) { return region.inner[v] * p.vertices[v]; };
@@ -176,10 +177,10 @@ double inner_volume(const Region& region) {
     const Vec3 a = pulled(ring[first]);
     for (size_t i = 1; i + 1 < ring.size(); ++i) {
       const Vec3 b = pulled(ring[(first + i) % ring.size()]), c = pulled(ring[(first + i + 1) % ring.size()]);
-      sum += dot(a, cross(b, c)) / 6;
+      sum.add(dot(a, cross(b, c)) / 6);
     }
   }
-  return sum;
+  return sum.total();
 }
 
 /// Inertia tensor tr(S) I - S of the second moments S.
@@ -219,23 +220,25 @@ MeasuresAndInertia measure(const Region& region, std::span<const Placed> bodies)
   Mat3 spread = axes * second * transposed(axes);
   for (Vec3* row : {&spread.row0, &spread.row1, &spread.row2}) *row = scale * *row;
 
-  if (bodies.size() > 2) m.pulls_of_group.resize(bodies.size());
-  double moved = 0, farthest = 0, least_slack = std::numeric_limits<double>::infinity();
+  SumInPairs<double> areas, moves;
+  std::vector<SumInPairs<Pull>> pulls(bodies.size());
+  double farthest = 0, least_slack = std::numeric_limits<double>::infinity();
   for (int f = 0; f < region.polytope.facets(); ++f) {
     cancellation_point();
     const Region::Facet& facet = region.facets[f];
     const double area = 3 * scale * in_frame.cone_volume[f] / facet.slack;
-    m.area += area;
+    areas.add(area);
     const Vec3 force = area * facet.normal, at = region.frame.origin + axes * in_frame.facet_centroid[f];
-    Pull& pull = bodies.size() > 2 ? m.pulls_of_group[facet.owner] : m.pulls[facet.owner];
-    pull.force += force;
-    pull.moment += cross(at + (region.reference - bodies[facet.owner].position), force);
-    moved += area * facet.rounding;
+    pulls[facet.owner].add({force, cross(at + (region.reference - bodies[facet.owner].position), force)});
+    moves.add(area * facet.rounding);
     farthest = std::max(farthest, facet.rounding);
     least_slack = std::min(least_slack, facet.slack);
   }
+  m.area = areas.total();
+  if (bodies.size() > 2) m.pulls_of_group.resize(bodies.size());
+  for (size_t i = 0; i < bodies.size(); ++i) (bodies.size() > 2 ? m.pulls_of_group[i] : m.pulls[i]) = pulls[i].total();
   // The error is, to first order, what all planes moved by their rounding add; then by the area that grows on the way.
-  moved *= growth(farthest, least_slack) / 3;
+  const double moved = moves.total() * growth(farthest, least_slack) / 3;
   // The sums themselves follow, whose vertices are placed to about a hundred roundings.
   m.volume_error = 7.0 / 12.0 * (outer - inner) + moved + 256 * DBL_EPSILON * outer;
   return {std::move(m), inertia_tensor(spread)};
