@@ -3,137 +3,226 @@
 #include <algorithm>
 #include <array>
 #include <cfloat>
+#include <cmath>
 #include <limits>
+#include <span>
+
+#include "methods/round/nodes.h"
 
 namespace overlapper::slicing {
 namespace {
 
-/// A node x < 0 of the rule of Gauss and Legendre with twenty nodes, θ = π/2 (1 + x); its mirror image has the same
-/// numbers, those for odd coefficients negated. Made with mpmath.
+/// A node x < 0 of a rule of Gauss and Legendre with n nodes, θ = π/2 (1 + x); its mirror image has the same numbers,
+/// those for odd coefficients negated. Made with mpmath.
 struct Node {
   double share;               ///< sin²(θ/2): of the interval, how much lies below
   double weight;              ///< of the slice there, for an interval of length one
   double sine;                ///< sin θ
-  double last, last_but_one;  ///< what it gives to the coefficients 19 and 18 of the Legendre series
-  double tenth, ninth;        ///< likewise
+  double last, last_but_one;  ///< what it gives to the coefficients n − 1 and n − 2 of the Legendre series
+  double even, odd;           ///< likewise n / 2 and n / 2 − 1; n is a multiple of four
 };
-constexpr std::array<Node, 10> kNodes{{
-    {2.9125011836602692e-5, 0.00014931545975041974, 0.01079336158391596, -0.021416031600054791, 0.041418332533339329,
-     0.12128237786003706, -0.11937908034964661},
-    {0.00080047156645094384, 0.0018036832407043526, 0.056562560469704602, 0.073905784380102392, -0.13873656589564789,
-     -0.084252230981265755, 0.0299883161974961},
-    {0.0047439508469752285, 0.0067644309727544863, 0.13742555479002748, -0.14141296162008345, 0.25121397742423528,
-     -0.22394445191677136, 0.23952959948397038},
-    {0.015881358827840478, 0.016353516719622385, 0.25003312796205107, 0.21644186508752798, -0.3536811352151889,
-     0.14556478637625199, 0.014926122863695763},
-    {0.039170373544543074, 0.03106164566633978, 0.38800028546857557, -0.29299971492323504, 0.42584085924972273,
-     0.27249009898101702, -0.30264365538440568},
-    {0.079504896271153461, 0.050225577761862857, 0.54105034050471344, 0.36579330002083763, -0.45308286683915951,
-     -0.1979093838205187, -0.090260186092919599},
-    {0.14046330817633844, 0.071875659245456093, 0.69493414718949425, -0.43015043504117464, 0.42793355453058784,
-     -0.29296872251053843, 0.32286908653152735},
-    {0.22306042564076279, 0.092919518105004433, 0.83259707458944275, 0.48211063670381045, -0.35085285124816943,
-     0.2415078446362778, 0.17451125550826214},
-    {0.32489037012850178, 0.10974017094932422, 0.93666774797954242, -0.51855508252321621, 0.23002220531294431,
-     0.29214655760977506, -0.3033496366166081},
-    {0.44004085488196592, 0.11910648187918097, 0.99278376480825779, 0.53732818115559507, -0.080075509852663748,
-     -0.27391687623426469, -0.25034997048389792},
+// clang-format off
+constexpr std::array<Node, 4> kNodes8{{
+    {0.0009723930747465951, 0.004956013807543283, 0.06233610595649298, -0.11769245644771356, 0.2098921910670323, 0.29030541733775395, -0.2740188228304149},
+    {0.025287307850590565, 0.054841235667607575, 0.3139927382106792, 0.3778969370845921, -0.5591073831433646, -0.24289619147803757, -0.053756356443960325},
+    {0.13255503062228385, 0.16709469807274444, 0.6781863887723175, -0.6317745531190048, 0.6166048635025358, -0.46158532259653046, 0.4671207500358303},
+    {0.3579160380490356, 0.27310805245210357, 0.9587745256447251, 0.7849065579218132, -0.26738967142620357, 0.41417609673681405, 0.32968848669588297},
 }};
+constexpr std::array<Node, 6> kNodes12{{
+    {0.00020972072861595776, 0.00107302543480214, 0.028960438244746683, -0.05626855563529156, 0.10544099839163595, 0.19845118176971624, -0.1922178626592015},
+    {0.005660301300117079, 0.012602145332097331, 0.15004349088592908, 0.18937270565563258, -0.3268652502223004, -0.15110587102212644, 0.008247895470202648},
+    {0.03230500949427718, 0.04445868376550048, 0.35361784941290414, -0.34604162358432194, 0.5086168908165707, -0.34650729031301014, 0.36919629498002254},
+    {0.10142598485609566, 0.0963441837136269, 0.6037839164869058, 0.49442267934928263, -0.554368149850446, 0.2657306707962303, 0.13534950141601143},
+    {0.22691367497797713, 0.1536162681691669, 0.8376726307716305, -0.608976901663329, 0.4276380562250802, 0.3805850909180829, -0.3945658468106813},
+    {0.4022750493516924, 0.19190569358480625, 0.980713687109109, 0.6711612378327249, -0.1604625453605404, -0.34715378214889286, -0.2985484312028956},
+}};
+constexpr std::array<Node, 8> kNodes16{{
+    {6.929546966908637e-05, 0.00035503112097767017, 0.016648203243229548, -0.03278130486396174, 0.06270545045312347, 0.15058800145020093, -0.14740575972423792},
+    {0.00189372306883215, 0.004251385094079633, 0.08695140899998625, 0.1122209124505884, -0.20493540387013992, -0.10847571647570407, 0.025281105530178673},
+    {0.011095931029013096, 0.015657646148953673, 0.20950237558187715, -0.21159853063188444, 0.3541214949557947, -0.27282166214653136, 0.292586524485687},
+    {0.03645255560584376, 0.03668930032305557, 0.37482671620708485, 0.31691961779722083, -0.46284478766452636, 0.1895693337450734, 0.05269404819587083},
+    {0.08739956378658222, 0.06636434224332013, 0.5648393755272285, -0.41664037702596135, 0.49770223675171826, 0.3211314759255782, -0.35201317927912984},
+    {0.17051405730045766, 0.09992938781207442, 0.7521675705941965, 0.5008933497159644, -0.4435406121078921, -0.2559042813894806, -0.16501933751603287},
+    {0.28597146820556574, 0.12961280457896754, 0.9037517083312625, -0.5617461448292791, 0.305833437439604, -0.32830696857627284, 0.3414173736623772},
+    {0.4256540670547978, 0.14714010267857136, 0.988883577079744, 0.5936159289428018, -0.10904181595768207, 0.30421981746713633, 0.2717959571544673},
+}};
+constexpr std::array<Node, 10> kNodes20{{
+    {2.9125011836602692e-05, 0.00014931545975041974, 0.01079336158391596, -0.021416031600054793, 0.041418332533339326, 0.12128237786003707, -0.11937908034964662},
+    {0.0008004715664509438, 0.0018036832407043527, 0.0565625604697046, 0.0739057843801024, -0.1387365658956479, -0.08425223098126576, 0.0299883161974961},
+    {0.004743950846975229, 0.006764430972754486, 0.1374255547900275, -0.14141296162008346, 0.2512139774242353, -0.22394445191677134, 0.23952959948397037},
+    {0.01588135882784048, 0.016353516719622384, 0.25003312796205107, 0.216441865087528, -0.3536811352151889, 0.145564786376252, 0.014926122863695762},
+    {0.03917037354454307, 0.03106164566633978, 0.38800028546857557, -0.292999714923235, 0.42584085924972276, 0.272490098981017, -0.3026436553844057},
+    {0.07950489627115347, 0.05022557776186286, 0.5410503405047135, 0.36579330002083765, -0.4530828668391595, -0.1979093838205187, -0.0902601860929196},
+    {0.14046330817633845, 0.0718756592454561, 0.6949341471894942, -0.4301504350411746, 0.42793355453058785, -0.29296872251053846, 0.32286908653152735},
+    {0.22306042564076278, 0.09291951810500443, 0.8325970745894428, 0.48211063670381044, -0.35085285124816945, 0.2415078446362778, 0.17451125550826213},
+    {0.3248903701285018, 0.10974017094932421, 0.9366677479795424, -0.5185550825232162, 0.23002220531294432, 0.29214655760977504, -0.3033496366166081},
+    {0.4400408548819659, 0.11910648187918098, 0.9927837648082578, 0.5373281811555951, -0.08007550985266375, -0.2739168762342647, -0.2503499704838979},
+}};
+// clang-format on
+using Rule = std::span<const Node>;
+constexpr std::array<Rule, 4> kRules{kNodes8, kNodes12, kNodes16, kNodes20};
+static_assert(2 * kNodes20.size() == kMostNodes);
 
-/// The relative errors of a rule that are not worth halving for, at first.
-constexpr double kVolumeError = 2e-14, kAreaError = 1e-12;
+/// The relative errors of a rule that are not worth another one, at first.
+constexpr double kVolumeError = 1e-14, kAreaError = 1e-12;
 /// The relative size at which the last coefficients of the series leave no error worth halving for: a rule of n nodes
 /// integrates the first 2 n terms, so that its error is as small as the square of the n-th.
 constexpr double kVolumeTail = 2e-9, kAreaTail = 1e-7;
+/// Nodes that no rule has, nor will half an interval do with much fewer.
+constexpr double kHopeless = 30;
 constexpr int kMostHalvings = 48;
 /// Rules after which halving goes on for ever: where two surfaces touch along a line.
-constexpr int kMostRules = 300;
+constexpr int kMostRules = 600;
 
 /// Coefficients in the middle and at the end of a Legendre series, from values at the nodes.
 struct Series {
-  double last = 0, last_but_one = 0, tenth = 0, ninth = 0;
+  double last = 0, last_but_one = 0, even = 0, odd = 0;
   void add(const Node& node, double low, double high) {
     last += node.last * (low - high);
     last_but_one += node.last_but_one * (low + high);
-    tenth += node.tenth * (low + high);
-    ninth += node.ninth * (low - high);
+    even += node.even * (low + high);
+    odd += node.odd * (low - high);
   }
   double tail() const { return std::max(std::abs(last), std::abs(last_but_one)); }
-  /// A rule of n nodes integrates the first 2 n terms. From the tenth to the twentieth, terms have become smaller by a
-  /// factor; to the fortieth, they do so twice again, and more if the integrand has no singularity nearby.
-  double error() const {
-    const double middle = std::max(std::abs(tenth), std::abs(ninth)), ratio = middle > 0 ? tail() / middle : 1;
-    return 30 * tail() * std::min(1.0, ratio * ratio);
+  /// By what factor terms have become smaller from the middle to the end, not more than one.
+  double ratio() const {
+    const double middle = std::max(std::abs(even), std::abs(odd)), end = tail();
+    return end < middle ? end / middle : 1;
+  }
+  /// A rule of n nodes integrates the first 2 n terms. From the middle to the n-th, terms have become smaller by a
+  /// factor; to the last, they do so twice again, and more if the integrand has no singularity nearby.
+  double error() const { return 30 * tail() * ratio() * ratio(); }
+  /// How many times half the nodes it takes until the error is that, if terms go on like that.
+  double halves_until(double small) const {
+    const double now = error();
+    if (now <= small) return 0;
+    const double each = -2 * std::log(ratio());
+    return each > 0 ? std::log(now / small) / each : std::numeric_limits<double>::infinity();
   }
 };
 
-bool integrate(const Stack& stack, const Outline& outline, double low, double high, double volume, double area,
-               double strictness, int halvings, Sum& sum) {
-  if (++sum.rules > kMostRules) return false;
+/// What a rule says of the slices between two values of t.
+struct Part {
+  const Outline* outline;
+  double low, high;
+  Rule rule;
+  Integrals integrals;
+  Series volume, area;
+  std::array<Sample, kMostNodes> samples;
+
+  double width() const { return high - low; }
+};
+
+Part apply(const Stack& stack, const Outline& outline, double low, double high, Rule rule) {
+  Part part{&outline, low, high, rule, {}, {}, {}, {}};
   const double width = high - low;
-  Integrals here;
-  Series of_volume, of_area;
-  std::array<Sample, 20> samples;
-  for (size_t i = 0; i < kNodes.size(); ++i) {
-    const Node& node = kNodes[i];
-    const double step = width * node.share;
-    const Integrals below = measure(Slice(stack, low + step), outline);
-    const Integrals above = measure(Slice(stack, high - step), outline);
-    here.add(width * node.weight, below);
-    here.add(width * node.weight, above);
-    of_volume.add(node, node.sine * below.volume, node.sine * above.volume);
-    of_area.add(node, node.sine * below.area, node.sine * above.area);
-    samples[i] = {low + step, below.volume};
-    samples[samples.size() - 1 - i] = {high - step, above.volume};
+  const int half = static_cast<int>(rule.size()), size = 2 * half;
+  Nodes nodes;
+  nodes.size = size;
+  for (int i = 0; i < half; ++i) {
+    const double step = width * rule[i].share, weight = width * rule[i].weight;
+    nodes.t[i] = low + step, nodes.t[size - 1 - i] = high - step;
+    nodes.weight[i] = nodes.weight[size - 1 - i] = weight;
   }
-  // The coefficients as volumes and areas; the error beyond the rule goes like the square of what is left.
-  const double tail = width * of_volume.tail();
-  const double whole = std::max(volume, here.volume), whole_area = std::max(area, here.area);
-  // Of what rounding leaves, halving makes no less.
-  const double rounding = 16 * DBL_EPSILON * here.blur / here.volume;
-  const auto rough = [&](const Series& series, double sum_here, double sum_whole, double limit, double limit_of_tail) {
-    const double end = width * series.tail();
-    if (end <= rounding * sum_here) return false;
-    return strictness > 0 ? strictness * end > limit_of_tail * sum_whole : width * series.error() > limit * sum_whole;
-  };
-  if ((rough(of_volume, here.volume, whole, kVolumeError, kVolumeTail) ||
-       rough(of_area, here.area, whole_area, kAreaError, kAreaTail)) &&
-      halvings < kMostHalvings && width > 1e-14 * (std::abs(low) + std::abs(high))) {
-    const double middle = low + width / 2;
-    return integrate(stack, outline, low, middle, whole, whole_area, strictness, halvings + 1, sum) &&
-           integrate(stack, outline, middle, high, whole, whole_area, strictness, halvings + 1, sum);
+  Slices slices;
+  part.integrals = measure(stack, outline, nodes, slices);
+  for (int i = 0; i < half; ++i) {
+    const double sine = width * rule[i].sine;
+    const int mirror = size - 1 - i;
+    part.volume.add(rule[i], sine * slices.volume[i], sine * slices.volume[mirror]);
+    part.area.add(rule[i], sine * slices.area[i], sine * slices.area[mirror]);
   }
-  sum.integrals.add(1, here);
-  sum.samples.insert(sum.samples.end(), samples.begin(), samples.end());
-  const double ratio = whole > 0 ? tail / whole : 0;
-  sum.error += strictness > 0 ? whole * std::min(ratio, 30 * ratio * std::sqrt(ratio)) : width * of_volume.error();
-  return true;
+  for (int i = 0; i < size; ++i) part.samples[i] = {nodes.t[i], slices.volume[i]};
+  return part;
 }
+
+class Integrating {
+ public:
+  Integrating(const Stack& stack, double volume, double area, bool few, double strictness, Sum& sum)
+      : stack_(stack), volume_(volume), area_(area), few_(few), strictness_(strictness), sum_(sum) {}
+
+  bool run(std::span<const Interval> intervals) {
+    thread_local std::vector<Part> parts;
+    parts.clear();
+    for (const Interval& interval : intervals)
+      parts.push_back(apply(stack_, interval.outline, interval.low, interval.high, first()));
+    for (const Part& part : parts) sum_.about += part.integrals.volume, area_ += part.integrals.area;
+    volume_ += sum_.about;
+    for (const Part& part : parts)
+      if (!add(part, 0)) return false;
+    return true;
+  }
+
+ private:
+  Rule first() const { return few_ ? kRules.front() : kRules.back(); }
+
+  /// How many times half of its nodes a rule lacks.
+  double lacks(const Part& part) const {
+    // Of what rounding leaves, other rules make no less.
+    const double rounding = 16 * DBL_EPSILON * part.integrals.blur / part.integrals.volume;
+    const auto of = [&](const Series& series, double here, double whole, double limit, double limit_of_tail) {
+      const double end = series.tail();
+      if (end <= rounding * here) return 0.0;
+      if (strictness_ > 0) return strictness_ * end > limit_of_tail * whole ? 100.0 : 0.0;
+      return series.halves_until(limit * whole);
+    };
+    return std::max(of(part.volume, part.integrals.volume, volume_, kVolumeError, kVolumeTail),
+                    of(part.area, part.integrals.area, area_, kAreaError, kAreaTail));
+  }
+
+  bool add(const Part& part, int halvings) {
+    if (++sum_.rules > kMostRules) return false;
+    const double lacking = lacks(part);
+    if (lacking > 0) {
+      // Of few nodes the terms in the middle are yet to fall, and twice as fast is what comes.
+      const double nodes = static_cast<double>(part.rule.size()) * (2 + lacking / 2);
+      if (part.rule.size() < kRules.back().size() && nodes < kHopeless) {
+        for (const Rule& rule : kRules)
+          if (rule.size() > part.rule.size() &&
+              (2 * static_cast<double>(rule.size()) >= nodes || rule.size() == kRules.back().size()))
+            return add(apply(stack_, *part.outline, part.low, part.high, rule), halvings);
+      }
+      if (halvings < kMostHalvings && part.width() > 1e-14 * (std::abs(part.low) + std::abs(part.high))) {
+        const double middle = part.low + part.width() / 2;
+        return add(apply(stack_, *part.outline, part.low, middle, first()), halvings + 1) &&
+               add(apply(stack_, *part.outline, middle, part.high, first()), halvings + 1);
+      }
+    }
+    sum_.integrals.add(1, part.integrals);
+    sum_.samples.insert(sum_.samples.end(), part.samples.begin(), part.samples.begin() + 2 * part.rule.size());
+    const double ratio = volume_ > 0 ? part.volume.tail() / volume_ : 0;
+    sum_.error += strictness_ > 0 ? volume_ * std::min(ratio, 30 * ratio * std::sqrt(ratio)) : part.volume.error();
+    return true;
+  }
+
+  const Stack& stack_;
+  double volume_, area_;  ///< of all that is measured, about
+  bool few_;
+  double strictness_;
+  Sum& sum_;
+};
 
 /// Of slices that are polygons, the integrands are polynomials of degree four at most, which the rule of Gauss and
 /// Legendre with three nodes integrates exactly.
 void integrate_polygons(const Stack& stack, const Interval& interval, Sum& sum) {
   constexpr double kShare = 0.1127016653792583, kOuter = 5.0 / 18, kInner = 8.0 / 18;
   const double width = interval.high - interval.low;
-  const auto add = [&](double t, double weight) {
-    const Integrals slice = measure(Slice(stack, t), interval.outline);
-    sum.integrals.add(width * weight, slice);
-    sum.samples.push_back({t, slice.volume});
-  };
-  add(interval.low + kShare * width, kOuter);
-  add(interval.low + 0.5 * width, kInner);
-  add(interval.high - kShare * width, kOuter);
+  Nodes nodes;
+  nodes.append(interval.low + kShare * width, width * kOuter);
+  nodes.append(interval.low + 0.5 * width, width * kInner);
+  nodes.append(interval.high - kShare * width, width * kOuter);
+  Slices slices;
+  sum.integrals.add(1, measure(stack, interval.outline, nodes, slices));
+  for (int i = 0; i < nodes.size; ++i) sum.samples.push_back({nodes.t[i], slices.volume[i]});
 }
 
 }  // namespace
 
-bool integrate(const Stack& stack, const Interval& interval, double volume, double area, double strictness, Sum& sum) {
-  if (stack.quadrics == 0) {
-    integrate_polygons(stack, interval, sum);
-    return true;
-  }
-  return integrate(stack, interval.outline, interval.low, interval.high, volume, area + sum.integrals.area, strictness,
-                   0, sum);
+bool integrate(const Stack& stack, std::span<const Interval> intervals, double volume, double area, bool few,
+               double strictness, Sum& sum) {
+  if (stack.quadrics > 0) return Integrating(stack, volume, area, few, strictness, sum).run(intervals);
+  for (const Interval& interval : intervals) integrate_polygons(stack, interval, sum);
+  return true;
 }
 
 namespace {

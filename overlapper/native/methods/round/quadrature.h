@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "methods/round/breakpoints.h"
@@ -13,18 +14,21 @@ struct Sample {
 
 struct Sum {
   Integrals integrals;
+  double about = 0;             ///< m³: the volume by the first rules
   double error = 0;             ///< of the volume, beside rounding
   int rules = 0;                ///< how many were applied
   std::vector<Sample> samples;  ///< in the order of t
 };
 
-/// Integrates over one interval. At its ends a slice is a series in the square root of what t is away from them, so
-/// that with t = m − h cos θ it is analytic in θ, and rules of Gauss and Legendre converge geometrically; where the
-/// last terms of the Legendre series that the nodes give are not small, the interval is halved. `volume` is about that
-/// of all that is measured and `area` what is known of its area, to which errors are small; false if they do not become
-/// so. `strictness` is what to divide the usual limits of these terms by; if 0, terms in the middle of the series tell
-/// how much smaller those beyond its end are.
-bool integrate(const Stack& stack, const Interval& interval, double volume, double area, double strictness, Sum& sum);
+/// Integrates over intervals. At the ends of one a slice is a series in the square root of what t is away from them, so
+/// that with t = m − h cos θ it is analytic in θ, and rules of Gauss and Legendre converge geometrically. The last
+/// terms of the Legendre series that the nodes give tell whether a rule will do; where it will not, one of more nodes
+/// is taken, or the interval is halved. `volume` and `area` are those of what has been measured before, to which and to
+/// what the first rules give errors are small; false if they do not become so. The first rules have eight nodes, or
+/// unless `few` as many as there are. `strictness` is what to divide the usual limits of the last terms by; if 0, terms
+/// in the middle of the series tell how much smaller those beyond its end are.
+bool integrate(const Stack& stack, std::span<const Interval> intervals, double volume, double area, bool few,
+               double strictness, Sum& sum);
 
 /// Whether the volume between two values of t agrees with the samples. The root of the area of slices of a convex set
 /// is concave (Brunn and Minkowski), so that chords between samples bound the volume from below, and chords drawn out

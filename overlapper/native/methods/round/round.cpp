@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cfloat>
+#include <limits>
 #include <numbers>
 #include <vector>
 
 #include "methods/round/culling.h"
+#include "methods/round/nodes.h"
 #include "methods/round/quadrature.h"
 #include "methods/round/stack.h"
 
@@ -280,26 +282,21 @@ class Measuring {
     const std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent);
     if (!stack || !slicing::find_intervals(*stack, false, intervals_)) return false;
     if (intervals_.empty()) return true;
-    best_.integrals.volume = 0;
-    double about = 0;
-    for (const slicing::Interval& interval : intervals_) {
-      const double middle = interval.low + (interval.high - interval.low) / 2;
-      about += (interval.high - interval.low) / 2 *
-               slicing::measure(slicing::Slice(*stack, middle), interval.outline).volume;
-    }
-    double open = integrate(*stack, about, 0);
-    std::swap(best_, sum_);
+    best_.integrals = {};
+    double open = std::numeric_limits<double>::infinity();
     const auto closed = [&] { return open <= kClosed * (totals.volume + best_.integrals.volume); };
+    const auto better = [&](bool few, double strictness) {
+      const double less = integrate(*stack, few, strictness), ratio = less / open;
+      if (less < open) open = less, std::swap(best_, sum_);
+      return ratio;
+    };
+    better(true, 0);
+    if (!closed()) better(false, 0);
     if (!closed() && move_near(*stack)) return true;
     // The rules end where the volume is exact. Where areas are not yet, the surface does not close.
     if (!closed() && !slicing::find_intervals(*stack, true, intervals_)) return false;
-    for (double strictness = 1; strictness < 1e9 && !closed(); strictness *= 1e3) {
-      const double less = integrate(*stack, about, strictness);
-      if (!(less < open / 2) && strictness > 1) break;
-      if (!(less < open)) continue;
-      open = less;
-      std::swap(best_, sum_);
-    }
+    for (double strictness = 1; strictness < 1e9 && !closed(); strictness *= 1e3)
+      if (!(better(false, strictness) < 0.5) && strictness > 1) break;
     if (outside(in_world(*stack, best_.integrals.first) / best_.integrals.volume)) return true;
     totals.open += open;
     add_sum(*stack, best_);
@@ -326,22 +323,19 @@ class Measuring {
     return done;
   }
 
-  /// Fills sum_ of a stack that holds about so much, and returns how much may be missing.
-  double integrate(const slicing::Stack& stack, double about, double strictness) {
+  /// Fills sum_ and returns how much may be missing.
+  double integrate(const slicing::Stack& stack, bool few, double strictness) {
     slicing::Sum& sum = sum_;
-    sum.integrals = {}, sum.error = 0, sum.rules = 0, sum.samples.clear();
-    const double whole = totals.volume + about;
-    bool sound = true;
-    for (const slicing::Interval& interval : intervals_)
-      sound = sound && slicing::integrate(stack, interval, whole, totals.area, strictness, sum);
+    sum.integrals = {}, sum.about = sum.error = 0, sum.rules = 0, sum.samples.clear();
+    const bool sound = slicing::integrate(stack, intervals_, totals.volume, totals.area, few, strictness, sum);
     const slicing::Interval &lowest = intervals_.front(), &highest = intervals_.back();
     if (stack.low_plane && lowest.low == stack.low)
-      slicing::add_face(*stack.low_plane, slicing::Slice(stack, lowest.low), lowest.outline, sum.integrals);
+      slicing::add_face(*stack.low_plane, stack, lowest.outline, lowest.low, sum.integrals);
     if (stack.high_plane && highest.high == stack.high)
-      slicing::add_face(*stack.high_plane, slicing::Slice(stack, highest.high), highest.outline, sum.integrals);
+      slicing::add_face(*stack.high_plane, stack, highest.outline, highest.high, sum.integrals);
     // A piece for which that does not hold is worth its size as an error. It may be rounding alone.
     if (!sound || !(sum.integrals.volume > 0) || !slicing::within_chords(lowest.low, highest.high, sum))
-      return 8 * std::abs(about) + std::abs(sum.integrals.volume);
+      return 8 * std::abs(sum.about) + std::abs(sum.integrals.volume);
     return open_part(stack, sum.integrals);
   }
 

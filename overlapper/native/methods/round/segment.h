@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 
 namespace overlapper::slicing {
 
@@ -29,27 +28,7 @@ struct SegmentSeries {
   }
 };
 
-/// By the half-angle of the arc, from 0 to π. Of a narrow segment the closed forms leave only what rounding has not
-/// cancelled, and the series are used.
-inline Segment segment(double half_angle) {
-  static constexpr SegmentSeries kSeries;
-  if (half_angle < 0.4) {
-    const double square = half_angle * half_angle;
-    Segment sum{};
-    for (int k = SegmentSeries::kTerms - 1; k >= 0; --k) {
-      const Segment& term = kSeries.term[k];
-      sum.area = sum.area * square + term.area;
-      sum.first_across = sum.first_across * square + term.first_across;
-      sum.second_across = sum.second_across * square + term.second_across;
-      sum.second_along = sum.second_along * square + term.second_along;
-    }
-    const double cube = square * half_angle;
-    return {cube * sum.area, cube * sum.first_across, cube * sum.second_across, cube * sum.second_along};
-  }
-  const double s = std::sin(half_angle), c = std::cos(half_angle);
-  const double area = half_angle - s * c, cube = s * s * s;
-  return {area, 2.0 / 3 * cube - c * area, (area + 2 * cube * c) / 4 - 4.0 / 3 * c * cube + c * c * area,
-          (3 * area - 2 * cube * c) / 12};
-}
+/// Of the half-angle of an arc: of narrower segments the closed forms leave only what rounding has not cancelled.
+inline constexpr double kNarrow = 0.4;
 
 }  // namespace overlapper::slicing

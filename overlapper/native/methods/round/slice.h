@@ -134,10 +134,4 @@ struct Integrals {
 
   void add(double weight, const Integrals& other);
 };
-/// What a slice gives per unit of t, if that is its outline.
-Integrals measure(const Slice& slice, const Outline& outline);
-
-/// The face in a plane parallel to the slices, which the slice beside it fills.
-void add_face(const Line& plane, const Slice& slice, const Outline& outline, Integrals& sum);
-
 }  // namespace overlapper::slicing

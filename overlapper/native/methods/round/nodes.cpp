@@ -1,0 +1,412 @@
+#include "methods/round/nodes.h"
+
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "methods/round/segment.h"
+
+namespace overlapper::slicing {
+namespace {
+
+struct Points {
+  Row x, y;
+};
+
+/// The slices of one outline at the nodes.
+class Bundle {
+ public:
+  Bundle(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices)
+      : stack_(stack), outline_(outline), nodes_(nodes), area_(slices.volume), surface_(slices.area), n_(nodes.size) {}
+
+  Integrals measure() {
+    for (int k = 0; k < n_; ++k) area_[k] = x_[k] = y_[k] = xx_[k] = yy_[k] = xy_[k] = surface_[k] = 0;
+    for (int i = 0; i < stack_.quadrics; ++i) place(i);
+    if (outline_.whole_disc) add_disc();
+    else go_round();
+    finish();
+    return sum_;
+  }
+
+ private:
+  /// The sides of a cylinder, or the disc.
+  void place(int number) {
+    const Quadric& q = stack_.quadric[number];
+    const double low = q.low, high = q.high, stretch = 1 + dot(q.shear, q.shear), along = q.along, slack = q.slack;
+    const Point c = q.centre, s = q.shear;
+    Row& half = half_[number];
+    if (q.ball) {
+      for (int k = 0; k < n_; ++k) {
+        const double t = nodes_.t[k];
+        centre_.x[k] = c.x - t * s.x, centre_.y[k] = c.y - t * s.y;
+        slack_[k] = stretch * t * t - 2 * along * t + slack;
+        half[k] = std::sqrt(std::max(0.0, (t - low) * (high - t)));
+      }
+      return;
+    }
+    Row &upper = upper_[number], &lower = lower_[number];
+    for (int k = 0; k < n_; ++k) {
+      const double t = nodes_.t[k], root = std::sqrt(std::max(0.0, (t - low) * (high - t)));
+      const double constant = stretch * t * t - 2 * along * t + slack, middle = c.x - s.x * t;
+      const double far = middle > 0 ? middle + root : middle - root, near = far != 0 ? constant / far : 0;
+      half[k] = root, upper[k] = middle > 0 ? far : near, lower[k] = middle > 0 ? near : far;
+    }
+  }
+
+  void side(const Line& line, Row& result) const {
+    const double offset = line.offset, rate = line.rate;
+    if (line.quadric < 0)
+      for (int k = 0; k < n_; ++k) result[k] = offset - rate * nodes_.t[k];
+    else if (line.upper) result = upper_[line.quadric];
+    else
+      for (int k = 0; k < n_; ++k) result[k] = -lower_[line.quadric][k];
+  }
+
+  void corner(int first, int second, Points& result) const {
+    const Point a = stack_.line[first].normal, b = stack_.line[second].normal;
+    const double inverse = 1 / slicing::cross(a, b);
+    Row p, q;
+    side(stack_.line[first], p), side(stack_.line[second], q);
+    for (int k = 0; k < n_; ++k) {
+      result.x[k] = (p[k] * b.y - q[k] * a.y) * inverse;
+      result.y[k] = (a.x * q[k] - b.x * p[k]) * inverse;
+    }
+  }
+
+  /// Where a line enters the disc and where it leaves; where it has left it by rounding, its tangent point.
+  void crossings(const Line& line, Points& enter, Points& leave) const {
+    const Point u = (1 / line.length) * line.normal;
+    const double length = line.length;
+    Row height;
+    side(line, height);
+    for (int k = 0; k < n_; ++k) {
+      const double h = height[k] / length, cx = centre_.x[k], cy = centre_.y[k];
+      const double middle = u.x * cy - u.y * cx, constant = h * (h - 2 * (u.x * cx + u.y * cy)) + slack_[k];
+      const double discriminant = middle * middle - constant, root = std::sqrt(std::max(0.0, discriminant));
+      const double far = middle > 0 ? middle + root : middle - root, other = far != 0 ? constant / far : 0;
+      const double near = discriminant > 0 ? other : middle;
+      const double from = middle > 0 ? near : far, to = middle > 0 ? far : near;
+      enter.x[k] = h * u.x - from * u.y, enter.y[k] = h * u.y + from * u.x;
+      leave.x[k] = h * u.x - to * u.y, leave.y[k] = h * u.y + to * u.x;
+    }
+  }
+
+  void go_round() {
+    const int edges = outline_.edges;
+    Points buffer[5];
+    Points *first = &buffer[0], *from = &buffer[1], *to = &buffer[2], *last = &buffer[3], *unused = &buffer[4];
+    for (int i = 0; i < edges; ++i) {
+      const Outline::Edge& edge = outline_.edge[i];
+      const int before = outline_.edge[(i + edges - 1) % edges].line, after = outline_.edge[(i + 1) % edges].line;
+      const Line& line = stack_.line[edge.line];
+      if (edge.from_circle || edge.to_circle)
+        crossings(line, edge.from_circle ? *from : *unused, edge.to_circle ? *to : *unused);
+      if (!edge.from_circle) {
+        if (i > 0) *from = *last;
+        else corner(before, edge.line, *from);
+      }
+      if (i == 0) *first = *from;
+      if (!edge.to_circle) {
+        if (i == edges - 1) *to = *first;
+        else corner(edge.line, after, *to);
+      }
+      if (line.quadric < 0) add_edge(line, *from, *to);
+      else add_side(line, *from, *to);
+      if (i > 0 && edge.from_circle) {
+        add_arc(*last, *from, before, edge.line);
+        add_triangle(*first, *last, *from);
+      }
+      if (i > 0 && (i < edges - 1 || edge.to_circle)) add_triangle(*first, *from, *to);
+      if (i == edges - 1 && edge.to_circle) add_arc(*to, *first, edge.line, outline_.edge[0].line);
+      std::swap(to, last);
+    }
+  }
+
+  void add_triangle(const Points& a, const Points& b, const Points& c) {
+    for (int k = 0; k < n_; ++k) {
+      const double ax = a.x[k], ay = a.y[k], bx = b.x[k], by = b.y[k], cx = c.x[k], cy = c.y[k];
+      const double w = ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / 2, third = w * (1.0 / 3),
+                   part = w * (1.0 / 12);
+      const double sx = ax + bx + cx, sy = ay + by + cy;
+      area_[k] += w;
+      x_[k] += third * sx;
+      y_[k] += third * sy;
+      xx_[k] += part * (ax * ax + bx * bx + cx * cx + sx * sx);
+      yy_[k] += part * (ay * ay + by * by + cy * cy + sy * sy);
+      xy_[k] += part * (ax * ay + bx * by + cx * cy + sx * sy);
+    }
+  }
+
+  /// What planes have of the slices' borders.
+  void add_edge(const Line& line, const Points& from, const Points& to) {
+    const Point d = (1 / line.length) * Point{-line.normal.y, line.normal.x};
+    const double inverse = 1 / line.length, offset = std::abs(line.offset), rate = std::abs(line.rate);
+    const double nx = std::abs(line.normal.x), ny = std::abs(line.normal.y), owned = line.owner != kCut ? 1 : 0;
+    Row weight, x, y, blur;
+    for (int k = 0; k < n_; ++k) {
+      const double px = from.x[k], py = from.y[k], qx = to.x[k], qy = to.y[k], t = nodes_.t[k];
+      const double w = ((qx - px) * d.x + (qy - py) * d.y) * inverse, counts = w * nodes_.weight[k];
+      surface_[k] += owned * w;
+      weight[k] = counts;
+      x[k] = counts * (0.5 * (px + qx)), y[k] = counts * (0.5 * (py + qy));
+      blur[k] = counts * (offset + rate * std::abs(t) + nx * std::max(std::abs(px), std::abs(qx)) +
+                          ny * std::max(std::abs(py), std::abs(qy)));
+    }
+    double all = 0, mx = 0, my = 0, mt = 0, size = 0, blurs = 0;
+    for (int k = 0; k < n_; ++k) {
+      const double t = nodes_.t[k];
+      all += weight[k], mx += x[k], my += y[k], mt += t * weight[k], size += std::abs(t) * weight[k], blurs += blur[k];
+    }
+    const Point s = stack_.shear;
+    // In the orthogonal axes l, m, n.
+    const Vec3 normal{line.normal.x, line.normal.y, line.rate - dot(s, line.normal)};
+    const Vec3 place{mx + s.x * mt, my + s.y * mt, mt};
+    sum_.correction += line.offset_tail * all - line.rate_tail * mt - line.normal_tail.x * mx - line.normal_tail.y * my;
+    sum_.blur += blurs;
+    sum_.pull[line.owner] += all * normal;
+    sum_.moment[line.owner] += cross(place, normal);
+    sum_.across += mt * normal.z;
+    sum_.terms += size * (rate + std::abs(s.x) * nx + std::abs(s.y) * ny);
+    sum_.border += all * std::sqrt(norm2(normal));
+    sum_.area += owned * all;
+  }
+
+  /// What the side of a cylinder has of them.
+  void add_side(const Line& line, const Points& from, const Points& to) {
+    const Quadric& q = stack_.quadric[line.quadric];
+    const Point n = line.normal, s = stack_.shear;
+    const double stretch = 1 + dot(q.shear, q.shear), along = std::abs(2 * q.along), slack = std::abs(q.slack);
+    const double level = q.level, radius = q.radius, nx = std::abs(n.x), ny = std::abs(n.y);
+    const Row &half = half_[line.quadric], &upper = upper_[line.quadric], &lower = lower_[line.quadric];
+    const Row& here = line.upper ? upper : lower;
+    Row weight, x, y, slope, rise, blur;
+    for (int k = 0; k < n_; ++k) {
+      const double px = from.x[k], py = from.y[k], qx = to.x[k], qy = to.y[k], t = nodes_.t[k], h = half[k];
+      const double w = (qy - py) * n.x - (qx - px) * n.y, counts = w * nodes_.weight[k];
+      const double far = std::max(std::abs(upper[k]), std::abs(lower[k]));
+      const double terms = stretch * t * t + along * std::abs(t) + slack, inverse = h > 0 ? 1 / h : 0;
+      surface_[k] += w * radius * inverse;
+      weight[k] = counts;
+      x[k] = 0.5 * (px + qx) + s.x * t, y[k] = 0.5 * (py + qy) + s.y * t;
+      slope[k] = (t - level) * inverse;
+      rise[k] = radius * inverse;
+      blur[k] = counts * (std::abs(here[k]) + (far > 0 ? terms / far : 0) + nx * std::max(std::abs(px), std::abs(qx)) +
+                          ny * std::max(std::abs(py), std::abs(qy)));
+    }
+    double all = 0, mx = 0, my = 0, mt = 0, up = 0, x_up = 0, y_up = 0, t_up = 0, size = 0, area = 0, blurs = 0;
+    for (int k = 0; k < n_; ++k) {
+      const double t = nodes_.t[k], w = weight[k], z = w * slope[k];
+      all += w, mx += w * x[k], my += w * y[k], mt += w * t;
+      up += z, x_up += z * x[k], y_up += z * y[k], t_up += z * t;
+      size += std::abs(t) * (std::abs(t) + std::abs(level)) * (w * rise[k]);
+      area += w * rise[k], blurs += blur[k];
+    }
+    sum_.blur += blurs;
+    sum_.pull[line.owner] += Vec3{all * n.x, all * n.y, up};
+    sum_.moment[line.owner] += Vec3{y_up - mt * n.y, mt * n.x - x_up, mx * n.y - my * n.x};
+    sum_.across += t_up;
+    sum_.terms += radius > 0 ? size / radius : 0;
+    // A cylinder's normal has length radius / half chord, as its area has.
+    sum_.border += area;
+    sum_.area += area;
+  }
+
+  /// The arcs from p to q, counter-clockwise: the segments beyond their chords, and the zone of the sphere.
+  void add_arc(const Points& p, const Points& q, int before, int after) {
+    const Quadric& ball = stack_.quadric[stack_.ball];
+    const double level = ball.level, stretch = 1 + dot(ball.shear, ball.shear), along = std::abs(2 * ball.along);
+    const double slack = std::abs(ball.slack);
+    const Row& radius = half_[stack_.ball];
+    Row one, two;
+    beyond(stack_.line[before], one), beyond(stack_.line[after], two);
+    Row length, distance, ax, ay, angle, sine, cosine;
+    double least = 4, most = 0;
+    for (int k = 0; k < n_; ++k) {
+      const double cx = q.x[k] - p.x[k], cy = q.y[k] - p.y[k], l = std::sqrt(cx * cx + cy * cy);
+      const double inverse = l > 0 ? 1 / l : 0, x = cy * inverse, y = -cx * inverse;
+      const double beside = x * (0.5 * (p.x[k] + q.x[k]) - centre_.x[k]) + y * (0.5 * (p.y[k] + q.y[k]) - centre_.y[k]);
+      // Of a chord that rounding may have turned round, what is known of the two lines that it lies between tells the
+      // side.
+      const double sure = one[k] > 0 && two[k] > 0 ? -std::abs(beside) : std::abs(beside);
+      const double d = l < 1e-6 * radius[k] ? sure : beside, h = 0.5 * l;
+      const double whole = std::max(std::sqrt(h * h + d * d), DBL_MIN);
+      length[k] = l, distance[k] = d, ax[k] = x, ay[k] = y;
+      sine[k] = h / whole, cosine[k] = d / whole;
+      angle[k] = half_turn_angle(h / whole, d / whole);
+    }
+    for (int k = 0; k < n_; ++k) least = std::min(least, angle[k]), most = std::max(most, angle[k]);
+    Row segment_area, first_across, second_across, second_along;
+    if (least < kNarrow) {
+      const int terms = most < 0.1 ? 8 : SegmentSeries::kTerms;
+      static constexpr SegmentSeries kSeries;
+      for (int k = 0; k < n_; ++k) segment_area[k] = first_across[k] = second_across[k] = second_along[k] = 0;
+      for (int i = terms - 1; i >= 0; --i) {
+        const Segment term = kSeries.term[i];
+        for (int k = 0; k < n_; ++k) {
+          const double square = angle[k] * angle[k];
+          segment_area[k] = segment_area[k] * square + term.area;
+          first_across[k] = first_across[k] * square + term.first_across;
+          second_across[k] = second_across[k] * square + term.second_across;
+          second_along[k] = second_along[k] * square + term.second_along;
+        }
+      }
+      for (int k = 0; k < n_; ++k) {
+        const double cube = angle[k] * angle[k] * angle[k];
+        segment_area[k] *= cube, first_across[k] *= cube, second_across[k] *= cube, second_along[k] *= cube;
+      }
+    }
+    if (most >= kNarrow) {
+      for (int k = 0; k < n_; ++k) {
+        const double s = sine[k], c = cosine[k], cube = s * s * s, area = angle[k] - s * c;
+        const bool wide = angle[k] >= kNarrow;
+        segment_area[k] = wide ? area : segment_area[k];
+        first_across[k] = wide ? 2.0 / 3 * cube - c * area : first_across[k];
+        second_across[k] = wide ? (area + 2 * cube * c) / 4 - 4.0 / 3 * c * cube + c * c * area : second_across[k];
+        second_along[k] = wide ? (3 * area - 2 * cube * c) / 12 : second_along[k];
+      }
+    }
+    Row strip, blur;
+    for (int k = 0; k < n_; ++k) {
+      const double r = radius[k], r2 = r * r, w = segment_area[k] * r2, f = first_across[k] * r2 * r;
+      const double a = second_across[k] * r2 * r2, b = second_along[k] * r2 * r2, x = ax[k], y = ay[k];
+      const double mx = 0.5 * (p.x[k] + q.x[k]), my = 0.5 * (p.y[k] + q.y[k]), t = nodes_.t[k];
+      area_[k] += w;
+      x_[k] += w * mx + f * x;
+      y_[k] += w * my + f * y;
+      xx_[k] += w * mx * mx + 2 * f * mx * x + a * x * x + b * y * y;
+      yy_[k] += w * my * my + 2 * f * my * y + a * y * y + b * x * x;
+      xy_[k] += w * mx * my + f * (mx * y + my * x) + (a - b) * x * y;
+      const double turned = nodes_.weight[k] * 2 * angle[k];
+      surface_[k] += 2 * angle[k] * ball.radius;
+      strip[k] = turned;
+      blur[k] = 0.5 * turned * (stretch * t * t + along * std::abs(t) + slack + length[k] * length[k]);
+    }
+    double x = 0, y = 0, up = 0, all = 0, t_up = 0, size = 0, blurs = 0;
+    for (int k = 0; k < n_; ++k) {
+      const double t = nodes_.t[k], w = nodes_.weight[k] * length[k], z = (t - level) * strip[k];
+      x += w * ax[k], y += w * ay[k], up += z, all += strip[k], t_up += t * z;
+      size += std::abs(t) * (std::abs(t) + std::abs(level)) * strip[k], blurs += blur[k];
+    }
+    sum_.blur += blurs;
+    add_zone(ball, {x, y, up}, all, t_up, size);
+  }
+
+  /// Of the disc's centre, positive where a line leaves nearly all of the disc.
+  void beyond(const Line& line, Row& result) const {
+    const Point n = line.normal;
+    const double length = line.length;
+    const Row& radius = half_[stack_.ball];
+    Row sides;
+    side(line, sides);
+    for (int k = 0; k < n_; ++k)
+      result[k] = sides[k] - (n.x * centre_.x[k] + n.y * centre_.y[k]) - 0.9 * radius[k] * length;
+  }
+
+  void add_disc() {
+    const Quadric& ball = stack_.quadric[stack_.ball];
+    const double pi = std::numbers::pi;
+    double up = 0, all = 0, t_up = 0, size = 0;
+    for (int k = 0; k < n_; ++k) {
+      const double r2 = half_[stack_.ball][k] * half_[stack_.ball][k], w = pi * r2, x = centre_.x[k], y = centre_.y[k];
+      const double t = nodes_.t[k], turned = 2 * pi * nodes_.weight[k], z = turned * (t - ball.level);
+      area_[k] = w, x_[k] = w * x, y_[k] = w * y;
+      xx_[k] = w * (x * x + r2 / 4), yy_[k] = w * (y * y + r2 / 4), xy_[k] = w * x * y;
+      surface_[k] = 2 * pi * ball.radius;
+      up += z, all += turned, t_up += t * z;
+      size += std::abs(t) * (std::abs(t) + std::abs(ball.level)) * turned;
+      sum_.blur += turned * r2;
+    }
+    add_zone(ball, {0, 0, up}, all, t_up, size);
+  }
+
+  /// What the ball has of the surface. Its forces act along lines through its centre.
+  void add_zone(const Quadric& ball, Vec3 pull, double turned, double t_up, double size) {
+    sum_.area += turned * ball.radius;
+    sum_.border += turned * ball.radius;
+    sum_.pull[ball.owner] += pull;
+    sum_.moment[ball.owner] += cross(Vec3{ball.centre.x, ball.centre.y, ball.level}, pull);
+    sum_.across += t_up;
+    sum_.terms += size;
+  }
+
+  void finish() {
+    double volume = 0, x = 0, y = 0, z = 0, xx = 0, yy = 0, zz = 0, yz = 0, zx = 0, xy = 0;
+    for (int k = 0; k < n_; ++k) {
+      const double t = nodes_.t[k], w = nodes_.weight[k], a = w * area_[k], ax = w * x_[k], ay = w * y_[k];
+      volume += a, x += ax, y += ay, z += a * t;
+      xx += w * xx_[k], yy += w * yy_[k], zz += a * t * t;
+      yz += ay * t, zx += ax * t, xy += w * xy_[k];
+    }
+    sum_.volume = volume;
+    sum_.first = {x, y, z};
+    sum_.squares = {xx, yy, zz};
+    sum_.products = {yz, zx, xy};
+  }
+
+  /// atan2(sine, cosine) for a sine that is not negative, after Cephes: of half the angle, a rational approximation. It
+  /// has no branches.
+  static double half_turn_angle(double sine, double cosine) {
+    const double tangent = sine / (1 + std::abs(cosine));
+    const bool large = tangent > 0.66;
+    const double u = large ? (tangent - 1) / (tangent + 1) : tangent, z = u * u;
+    const double p =
+        (((-8.750608600031904122785e-1 * z - 1.615753718733365076637e1) * z - 7.500855792314704667340e1) * z -
+         1.228866684490136173410e2) *
+            z -
+        6.485021904942025371773e1;
+    const double q =
+        ((((z + 2.485846490142306297962e1) * z + 1.650270098316988542046e2) * z + 4.328810604912902668951e2) * z +
+         4.853903996359136964868e2) *
+            z +
+        1.945506571482613964425e2;
+    const double small = u + u * (z * p / q), half = large ? std::numbers::pi / 4 + small : small;
+    return cosine < 0 ? std::numbers::pi - 2 * half : 2 * half;
+  }
+
+  const Stack& stack_;
+  const Outline& outline_;
+  const Nodes& nodes_;
+  Row &area_, &surface_;
+  int n_;
+  std::array<Row, 2> half_, upper_, lower_;  ///< per quadric; the sides only of cylinders
+  Points centre_;                            ///< of the disc
+  Row slack_;                                ///< |centre|² − radius²
+  Row x_, y_, xx_, yy_, xy_;
+  Integrals sum_;
+};
+
+}  // namespace
+
+Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices) {
+  return Bundle(stack, outline, nodes, slices).measure();
+}
+
+Integrals measure(const Stack& stack, const Outline& outline, double t) {
+  Nodes one;
+  one.append(t, 1);
+  Slices slices;
+  return measure(stack, outline, one, slices);
+}
+
+void add_face(const Line& plane, const Stack& stack, const Outline& outline, double t, Integrals& sum) {
+  const Integrals face = measure(stack, outline, t);
+  const double area = face.volume;
+  // The plane is parallel but for less than 1e-11: what it is tilted counts to first order.
+  const Point tilt = plane.normal + plane.normal_tail;
+  sum.correction +=
+      (plane.offset_tail * area - plane.rate_tail * t * area - tilt.x * face.first.x - tilt.y * face.first.y) /
+      std::abs(plane.rate);
+  sum.blur += area * (std::abs(plane.offset) + std::abs(plane.rate * t)) / std::abs(plane.rate);
+  if (plane.owner != kCut) sum.area += area;
+  const double side = plane.rate > 0 ? 1 : -1;
+  sum.pull[plane.owner] += Vec3{0, 0, side * area};
+  sum.across += t * side * area;
+  sum.terms += std::abs(t) * area;
+  sum.border += area;
+  sum.moment[plane.owner] += cross(
+      Vec3{face.first.x + stack.shear.x * t * area, face.first.y + stack.shear.y * t * area, t * area}, {0, 0, side});
+}
+
+}  // namespace overlapper::slicing

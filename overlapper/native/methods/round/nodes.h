@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+
+#include "methods/round/slice.h"
+
+namespace overlapper::slicing {
+
+inline constexpr int kMostNodes = 20;
+
+/// A number for each node of a rule.
+using Row = std::array<double, kMostNodes>;
+
+/// Where a rule looks at slices, and what each of them counts.
+struct Nodes {
+  int size = 0;
+  Row t, weight;
+
+  void append(double at, double counts) { t[size] = at, weight[size] = counts, ++size; }
+};
+
+/// Of each slice: its area, and that of the surface per unit of t.
+struct Slices {
+  Row volume, area;
+};
+
+/// What slices give that all have that outline, weighted and summed. What is bound for each node by itself is done for
+/// all of them before the next, so that compilers take several at a time.
+Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices);
+
+/// What a single slice gives per unit of t.
+Integrals measure(const Stack& stack, const Outline& outline, double t);
+
+/// The face in a plane parallel to the slices, which the slice beside it, at `t`, fills.
+void add_face(const Line& plane, const Stack& stack, const Outline& outline, double t, Integrals& sum);
+
+}  // namespace overlapper::slicing
