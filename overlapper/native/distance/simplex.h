@@ -62,6 +62,12 @@ inline double rank(Vec3 nearest) { return norm2(nearest); }
 /// direction that is off by the root of that, and more digits count.
 inline DoubleDouble rank(const WideVector& nearest) { return norm(nearest); }
 
+/// Whether GJK may take a step that leads nearer by nothing but rounding, onto more corners. Of four that are in one
+/// plane but for rounding, the nearest point may be on the diagonal that is no edge: the way from there to a third is
+/// shorter by the square of rounding only, but the normal of the three tells that the fourth is nearer.
+template <class Vector>
+inline constexpr bool kTurnsOnTheSpot = !std::is_same_v<Vector, Vec3>;
+
 /// A needle's normal is found with about twice as many digits as its corners have.
 inline Vec3 plane_normal(Vec3 a, Vec3 b, Vec3 c) { return accurate_normal(a, b, c); }
 /// Double-doubles have digits to spare, and are scaled to keep their products in range.
@@ -164,6 +170,14 @@ auto reduce(SimplexOf<Vector>& s) {
   return least;
 }
 
+/// Whether the point nearest to the origin of the line or plane of all corners is between them; then `s` has it.
+template <class Vector>
+bool reaches_with_all(SimplexOf<Vector>& s) {
+  const auto corner = [&](int i) { return s.corner[i].difference(); };
+  if (s.size == 2) return weigh(corner(0), corner(1), s);
+  return s.size == 3 && weigh(corner(0), corner(1), corner(2), s);
+}
+
 template <class Vector>
 bool contains(const SimplexOf<Vector>& s, const Vector& difference) {
   for (int i = 0; i < s.size; ++i)
@@ -201,11 +215,23 @@ SeparationOf<Vector> separate(const DifferencePointOf<Vector>& first, const Supp
     if (settled(rounded(length), gap, result.gap) || contains(simplex, w)) break;
     SimplexOf<Vector> grown = simplex;
     grown.corner[grown.size++] = farthest;
-    const auto nearer = reduce(grown);
+    SimplexOf<Vector> reduced = grown;
+    const auto nearer = reduce(reduced);
     result.origin_inside = rounded(nearer) == 0;
-    if (!result.origin_inside && !(nearer < least)) break;
-    simplex = grown, least = nearer;
-    if (result.origin_inside) break;
+    if (result.origin_inside) {
+      // Where signs are not exact, weights of a flat tetrahedron may miss the origin by more than its nearest face
+      // does.
+      if (kInsideIsExact<Vector> || norm(reduced.witness_a() - reduced.witness_b()) < norm(simplex.nearest))
+        simplex = reduced;
+      break;
+    }
+    if (nearer < least) {
+      simplex = reduced, least = nearer;
+    } else if (kTurnsOnTheSpot<Vector> && reaches_with_all(grown)) {
+      simplex = grown;
+    } else {
+      break;
+    }
   }
   if (result.origin_inside) result.normal = {};
   else result.distance = rounded(norm(simplex.nearest));

@@ -33,7 +33,8 @@ WideGap wide_gap(const WideBody& a, const WideBody& b, double rounding) {
 
   const double radius_a = core_radius(a.shape), radius_b = core_radius(b.shape);
   // The difference of the radii and a distance of nearly their sum is taken before it is rounded.
-  const DoubleDouble radii = two_sum(radius_a, radius_b), apart = norm(cores.simplex.nearest);
+  const DoubleDouble radii = two_sum(radius_a, radius_b);
+  const DoubleDouble apart = cores.origin_inside ? DoubleDouble{} : norm(cores.simplex.nearest);
   const WideVector& normal = cores.normal;
   const bool cores_apart = cores.distance > rounding && cores.gap > 0;
   WideGap result;

@@ -14,10 +14,13 @@ from overlapper import Hull
 
 SEED = 2026
 AFFORDABLE = {  # seeds whose exact truth takes less than half a second, and such as were hard
+    "combined": (*range(SEED, SEED + 5), 300168, 400034),  # witnesses of needles, and needles that touch
+    "round_contacts": (*range(SEED, SEED + 5), 300076, 400019),  # over the diagonal that is no edge
     "fine_round_hulls": (2026, 2027),
     "finest_round_hulls": (2027,),
     "prisms": (2026, 2029, 2031, 2033, 2034, 2036, 2037),
     "lenses": range(SEED, SEED + 40),
+    "slender_groups": (*range(SEED, SEED + 5), 400091),  # whose drawing is rough
     "dual_pairs": (*range(SEED, SEED + 5), 300221),  # among its planes the simplex method goes round in circles
 }
 
