@@ -164,6 +164,27 @@ def test_crossing_cylinders_share_the_bicylinder(radius):
     assert found.area == pytest.approx(16 * radius**2, rel=1e-12)
 
 
+@pytest.mark.parametrize("tilt", [0, 1e-9, 0.02, 0.3])
+@pytest.mark.parametrize(
+    "other", [Cylinder(0.6, 9), Capsule(0.6, 0.3), Sphere(0.6)], ids=["cylinder", "capsule", "ball"]
+)
+def test_what_a_cap_cuts_off_is_missing_however_little_it_is(tilt, other):
+    turn = (np.sin(tilt / 2), 0, 0, np.cos(tilt / 2))
+    axis = np.array([0, -np.sin(tilt), np.cos(tilt)])
+    a, b = sink(Placed(other, (0.9, 0.2, 0.1)), Placed(Cylinder(0.4, 8), (0, 0, 0), turn), 0.03)
+    whole = overlap(a, b).volume
+
+    def beyond(cut, side):
+        return overlap(a, Placed(Cylinder(0.4, 4 - side * cut), (4 * side + cut) / 2 * axis, turn))
+
+    inside, tip = 0.0, 3.0
+    while tip - inside > 1e-9:
+        middle = (inside + tip) / 2
+        inside, tip = (middle, tip) if beyond(middle, 1) else (inside, middle)
+    for cut in tip - np.geomspace(1e-6, 0.3, 61):
+        assert sum(beyond(cut, side).volume for side in (1, -1)) == pytest.approx(whole, rel=3e-12)
+
+
 def test_a_ball_over_the_corner_of_a_box_is_an_eighth_of_it():
     found = overlap(Placed(Sphere(0.5), (1, 1, 1)), Box([1, 1, 1]))
     assert_is(found, arb.pi() / 48)

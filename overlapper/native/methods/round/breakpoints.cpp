@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <numbers>
+
+#include "methods/round/nodes.h"
 
 namespace overlapper::slicing {
 namespace {
@@ -31,6 +34,7 @@ class Candidates {
  public:
   Candidates(const Stack& stack, std::vector<double>& values) : stack_(stack), values_(values) {}
 
+  /// Those that have closed forms.
   void collect() {
     const int lines = stack_.lines - 4;
     for (int i = 0; i < lines; ++i) {
@@ -45,7 +49,29 @@ class Candidates {
     if (stack_.quadrics == 2) {
       const Quadric &p = stack_.quadric[0], &q = stack_.quadric[1];
       if (p.ball != q.ball) ball_and_cylinder(p.ball ? p : q, p.ball ? q : p);
-      else if (std::abs(cross(p.across, q.across)) < 1e-12) parallel_cylinders(p, q);
+      else if (parallel(p, q)) parallel_cylinders(p, q);
+    }
+  }
+
+  /// Those between low and high in which a plane meets corners of the two quadrics: by samples, and between samples on
+  /// either side of the plane by false position.
+  void trace(double low, double high) {
+    const Quadric &p = stack_.quadric[0], &q = stack_.quadric[1];
+    if (stack_.quadrics < 2 || (!p.ball && !q.ball && parallel(p, q))) return;
+    const double middle = low + (high - low) / 2, half = (high - low) / 2;
+    for (int k = 0; k < kMostNodes; ++k)
+      samples_[k] = middle - half * std::cos(std::numbers::pi * (k + 0.5) / kMostNodes);
+    find_sides(stack_, samples_, kMostNodes, sides_);
+    for (int i = 0; i < stack_.lines - 4; ++i) {
+      const Line& side = stack_.line[i];
+      if (plane(i) || (stack_.ball < 0 && side.quadric != 0)) continue;
+      if (stack_.ball >= 0) {
+        for (int j = 0; j < stack_.lines - 4; ++j)
+          if (plane(j)) corner_and_ball(i, j);
+        continue;
+      }
+      for (int j = 0; j < stack_.lines - 4; ++j)
+        if (stack_.line[j].quadric == 1) corner_and_planes(i, j);
     }
   }
 
@@ -71,6 +97,97 @@ class Candidates {
       if (q.value(p, t) > kNear * terms) return;
     }
     values_.push_back(t);
+  }
+
+  static bool parallel(const Quadric& p, const Quadric& q) { return std::abs(cross(p.across, q.across)) < 1e-12; }
+
+  /// The corner of two lines at the samples.
+  void find_corners(int i, int j) {
+    const Point a = stack_.line[i].normal, b = stack_.line[j].normal;
+    const double inverse = 1 / cross(a, b);
+    Row p, q;
+    for (const bool first : {true, false}) {
+      const Line& line = stack_.line[first ? i : j];
+      Row& side = first ? p : q;
+      const double offset = line.offset, rate = line.rate;
+      if (line.quadric < 0)
+        for (int k = 0; k < kMostNodes; ++k) side[k] = offset - rate * samples_[k];
+      else if (line.upper) side = sides_.upper[line.quadric];
+      else
+        for (int k = 0; k < kMostNodes; ++k) side[k] = -sides_.lower[line.quadric][k];
+    }
+    for (int k = 0; k < kMostNodes; ++k) {
+      x_[k] = (p[k] * b.y - q[k] * a.y) * inverse;
+      y_[k] = (a.x * q[k] - b.x * p[k]) * inverse;
+    }
+  }
+
+  void corner_and_planes(int i, int j) {
+    find_corners(i, j);
+    for (int k = 0; k < stack_.lines - 4; ++k) {
+      if (!plane(k)) continue;
+      const Line& l = stack_.line[k];
+      const Point n = l.normal;
+      const double offset = l.offset, rate = l.rate;
+      Row slack;
+      for (int s = 0; s < kMostNodes; ++s) slack[s] = offset - rate * samples_[s] - (n.x * x_[s] + n.y * y_[s]);
+      for_changes(slack, i, j, [&](Point p, double t) { return offset - rate * t - dot(n, p); });
+    }
+  }
+
+  /// Of the side of a cylinder and a plane.
+  void corner_and_ball(int i, int j) {
+    const Point a = stack_.line[i].normal, b = stack_.line[j].normal;
+    if (std::abs(cross(a, b)) < 1e-9 * stack_.line[j].length) return;
+    find_corners(i, j);
+    const Quadric& ball = stack_.quadric[stack_.ball];
+    Row value;
+    for (int s = 0; s < kMostNodes; ++s)
+      value[s] = x_[s] * x_[s] + y_[s] * y_[s] - 2 * (x_[s] * sides_.centre_x[s] + y_[s] * sides_.centre_y[s]) +
+                 sides_.slack[s];
+    for_changes(value, i, j, [&](Point p, double t) { return ball.value(p, t); });
+  }
+
+  /// Where a function of a corner is zero. Where it turns before it is, two values may hide between samples.
+  template <class Function>
+  void for_changes(const Row& value, int i, int j, Function function) {
+    const auto at = [&](double t) { return function(Slice(stack_, t).corner(i, j), t); };
+    const auto between = [&](double low, double high, double at_low, double at_high) {
+      if ((at_low < 0) != (at_high < 0)) add_zero(low, high, at_low, at_high, i, j, at);
+    };
+    for (int k = 0; k + 1 < kMostNodes; ++k) {
+      between(samples_[k], samples_[k + 1], value[k], value[k + 1]);
+      if (k == 0) continue;
+      const double before = value[k - 1], here = value[k], after = value[k + 1], side = here < 0 ? -1 : 1;
+      if (!(side * before > side * here && side * after > side * here)) continue;
+      // The turning point of the parabola through three samples.
+      const double p = samples_[k] - samples_[k - 1], q = samples_[k + 1] - samples_[k];
+      const double fall = (here - before) / p, rise = (after - here) / q, curve = (rise - fall) / (p + q);
+      const double t = samples_[k] - (fall + p * curve) / (2 * curve);
+      if (!(t > samples_[k - 1] && t < samples_[k + 1])) continue;
+      const double least = at(t);
+      if ((least < 0) == (here < 0)) continue;
+      if (t < samples_[k]) between(samples_[k - 1], t, before, least), between(t, samples_[k], least, here);
+      else between(samples_[k], t, here, least), between(t, samples_[k + 1], least, after);
+    }
+  }
+
+  /// By false position after Dowell and Jarratt (1971).
+  template <class Function>
+  void add_zero(double low, double high, double at_low, double at_high, int i, int j, Function at) {
+    double t = low;
+    for (int step = 0; step < 40; ++step) {
+      const double next = high - at_high * (high - low) / (at_high - at_low);
+      const bool settled = std::abs(next - t) <= 1e-15 * std::abs(next);
+      t = next;
+      if (settled || !(t > std::min(low, high) && t < std::max(low, high))) break;
+      const double here = at(t);
+      if (here == 0) break;
+      if ((here < 0) != (at_high < 0)) low = high, at_low = at_high;
+      else at_low *= at_high / (at_high + here);
+      high = t, at_high = here;
+    }
+    add_if_near(Slice(stack_, t).corner(i, j), t);
   }
 
   void on_ridge(int i, int j) {
@@ -152,6 +269,8 @@ class Candidates {
 
   const Stack& stack_;
   std::vector<double>& values_;
+  Row samples_, x_, y_;  ///< of t, and a corner there
+  Sides sides_;
 };
 
 /// Finds what the closed forms have not, and puts intervals together that have the same outline.
@@ -160,17 +279,23 @@ class Settling {
   Settling(const Stack& stack, bool closely, std::vector<Interval>& intervals)
       : stack_(stack),
         beside_(closely ? 1e-13 : 1e-5),
-        inner_(closely               ? kMostInner
-               : stack.quadrics == 2 ? 6
-                                     : 2),
+        inner_(closely ? kMostInner : 2),
         intervals_(intervals),
         low_(stack.low),
         high_(stack.high) {}
 
-  bool run(std::vector<double>& values) {
+  bool run(Candidates& candidates, std::vector<double>& values) {
+    candidates.collect();
     values.push_back(low_), values.push_back(high_);
     std::sort(values.begin(), values.end());
-    if (!close_in(values)) return true;
+    if (!find_inside(values)) {
+      // Of corners of a plane and two quadrics nothing is known yet.
+      candidates.trace(low_, high_);
+      std::sort(values.begin(), values.end());
+      if (!find_inside(values)) return true;
+    }
+    close_in();
+    candidates.trace(low_, high_);
     values.push_back(low_), values.push_back(high_);
     std::sort(values.begin(), values.end());
     const double least = 1e-14 * (high_ - low_);
@@ -209,7 +334,6 @@ class Settling {
 
   bool settle(double low, double high) {
     const double width = high - low;
-    // The corners of a plane and two quadrics come and go between samples only if they are close together.
     std::array<double, kMostInner + 2> t;
     t[0] = low + beside_ * width;
     for (int i = 1; i < inner_; ++i) t[i] = low + width * i / inner_;
@@ -246,50 +370,30 @@ class Settling {
     return true;
   }
 
-  /// What slices hold something is found to a factor of four, so that a bisection looks where changes are. False if
-  /// none does: where all breakpoints have closed forms, one in the middle between two of them would.
-  bool close_in(const std::vector<double>& values) {
-    const auto holds = [&](double t) { return !at(t).empty(); };
-    std::optional<double> inside;
+  bool holds(double t) const { return !at(t).empty(); }
+
+  /// False if no slice holds something: one in the middle between two breakpoints would.
+  bool find_inside(const std::vector<double>& values) {
     // The origin is a point of the common set, though not of every piece.
-    if (low_ < 0 && 0 < high_ && holds(0)) inside = 0;
-    for (size_t i = 0; i + 1 < values.size() && !inside; ++i)
-      if (const double middle = values[i] + (values[i + 1] - values[i]) / 2; holds(middle)) inside = middle;
-    if (!inside && stack_.quadrics == 2) inside = look_for_something();
-    if (!inside) return false;
-    inside_ = *inside;
-    for (double* end : {&low_, &high_}) {
+    if (low_ < 0 && 0 < high_ && holds(0)) {
+      inside_ = 0;
+      return true;
+    }
+    for (size_t i = 0; i + 1 < values.size(); ++i) {
+      inside_ = values[i] + (values[i + 1] - values[i]) / 2;
+      if (holds(inside_)) return true;
+    }
+    return false;
+  }
+
+  /// What slices hold something is found to a factor of four, so that samples and bisections look where changes are.
+  void close_in() {
+    for (double* end : {&low_, &high_})
       for (int step = 0; step < 60; ++step) {
         const double nearer = inside_ + (*end - inside_) / 4;
         if (nearer == inside_ || holds(nearer)) break;
         *end = nearer;
       }
-    }
-    return true;
-  }
-
-  /// Slices that hold something are an interval, and so are those in which the first lines leave something, and those
-  /// in which a line misses it by no more than so much: a golden section meets them.
-  std::optional<double> look_for_something() const {
-    constexpr double kGolden = 0.6180339887498949;
-    const auto better = [](const Outline& a, const Outline& b) {
-      return a.failed != b.failed ? a.failed > b.failed : a.missed > b.missed;
-    };
-    double low = stack_.low, high = stack_.high;
-    double p = high - kGolden * (high - low), q = low + kGolden * (high - low);
-    Outline at_p = at(p), at_q = at(q);
-    for (int i = 0; i < 70; ++i) {
-      if (!at_p.empty()) return p;
-      if (!at_q.empty()) return q;
-      if (better(at_p, at_q)) {
-        high = q, q = p, at_q = at_p;
-        p = high - kGolden * (high - low), at_p = at(p);
-      } else {
-        low = p, p = q, at_p = at_q;
-        q = low + kGolden * (high - low), at_q = at(q);
-      }
-    }
-    return std::nullopt;
   }
 
   const Stack& stack_;
@@ -299,7 +403,7 @@ class Settling {
   int inner_;
   std::vector<Interval>& intervals_;
   double low_, high_;                                        ///< beyond which there is nothing
-  double inside_ = std::numeric_limits<double>::infinity();  ///< at which there is something, if it is known
+  double inside_ = std::numeric_limits<double>::infinity();  ///< at which there is something
   int events_ = 0;
 };
 
@@ -310,8 +414,8 @@ bool find_intervals(const Stack& stack, bool closely, std::vector<Interval>& int
   if (!(stack.low < stack.high)) return true;
   thread_local std::vector<double> values;
   values.clear();
-  Candidates(stack, values).collect();
-  return Settling(stack, closely, intervals).run(values);
+  Candidates candidates(stack, values);
+  return Settling(stack, closely, intervals).run(candidates, values);
 }
 
 }  // namespace overlapper::slicing

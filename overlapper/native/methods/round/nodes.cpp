@@ -23,7 +23,7 @@ class Bundle {
 
   Integrals measure() {
     for (int k = 0; k < n_; ++k) area_[k] = x_[k] = y_[k] = xx_[k] = yy_[k] = xy_[k] = surface_[k] = 0;
-    for (int i = 0; i < stack_.quadrics; ++i) place(i);
+    find_sides(stack_, nodes_.t, n_, sides_);
     if (outline_.whole_disc) add_disc();
     else go_round();
     finish();
@@ -31,37 +31,13 @@ class Bundle {
   }
 
  private:
-  /// The sides of a cylinder, or the disc.
-  void place(int number) {
-    const Quadric& q = stack_.quadric[number];
-    const double low = q.low, high = q.high, stretch = 1 + dot(q.shear, q.shear), along = q.along, slack = q.slack;
-    const Point c = q.centre, s = q.shear;
-    Row& half = half_[number];
-    if (q.ball) {
-      for (int k = 0; k < n_; ++k) {
-        const double t = nodes_.t[k];
-        centre_.x[k] = c.x - t * s.x, centre_.y[k] = c.y - t * s.y;
-        slack_[k] = stretch * t * t - 2 * along * t + slack;
-        half[k] = std::sqrt(std::max(0.0, (t - low) * (high - t)));
-      }
-      return;
-    }
-    Row &upper = upper_[number], &lower = lower_[number];
-    for (int k = 0; k < n_; ++k) {
-      const double t = nodes_.t[k], root = std::sqrt(std::max(0.0, (t - low) * (high - t)));
-      const double constant = stretch * t * t - 2 * along * t + slack, middle = c.x - s.x * t;
-      const double far = middle > 0 ? middle + root : middle - root, near = far != 0 ? constant / far : 0;
-      half[k] = root, upper[k] = middle > 0 ? far : near, lower[k] = middle > 0 ? near : far;
-    }
-  }
-
   void side(const Line& line, Row& result) const {
     const double offset = line.offset, rate = line.rate;
     if (line.quadric < 0)
       for (int k = 0; k < n_; ++k) result[k] = offset - rate * nodes_.t[k];
-    else if (line.upper) result = upper_[line.quadric];
+    else if (line.upper) result = sides_.upper[line.quadric];
     else
-      for (int k = 0; k < n_; ++k) result[k] = -lower_[line.quadric][k];
+      for (int k = 0; k < n_; ++k) result[k] = -sides_.lower[line.quadric][k];
   }
 
   void corner(int first, int second, Points& result) const {
@@ -82,8 +58,8 @@ class Bundle {
     Row height;
     side(line, height);
     for (int k = 0; k < n_; ++k) {
-      const double h = height[k] / length, cx = centre_.x[k], cy = centre_.y[k];
-      const double middle = u.x * cy - u.y * cx, constant = h * (h - 2 * (u.x * cx + u.y * cy)) + slack_[k];
+      const double h = height[k] / length, cx = sides_.centre_x[k], cy = sides_.centre_y[k];
+      const double middle = u.x * cy - u.y * cx, constant = h * (h - 2 * (u.x * cx + u.y * cy)) + sides_.slack[k];
       const double discriminant = middle * middle - constant, root = std::sqrt(std::max(0.0, discriminant));
       const double far = middle > 0 ? middle + root : middle - root, other = far != 0 ? constant / far : 0;
       const double near = discriminant > 0 ? other : middle;
@@ -179,7 +155,8 @@ class Bundle {
     const Point n = line.normal, s = stack_.shear;
     const double stretch = 1 + dot(q.shear, q.shear), along = std::abs(2 * q.along), slack = std::abs(q.slack);
     const double level = q.level, radius = q.radius, nx = std::abs(n.x), ny = std::abs(n.y);
-    const Row &half = half_[line.quadric], &upper = upper_[line.quadric], &lower = lower_[line.quadric];
+    const Row &half = sides_.half[line.quadric], &upper = sides_.upper[line.quadric],
+              &lower = sides_.lower[line.quadric];
     const Row& here = line.upper ? upper : lower;
     Row weight, x, y, slope, rise, blur;
     for (int k = 0; k < n_; ++k) {
@@ -218,7 +195,7 @@ class Bundle {
     const Quadric& ball = stack_.quadric[stack_.ball];
     const double level = ball.level, stretch = 1 + dot(ball.shear, ball.shear), along = std::abs(2 * ball.along);
     const double slack = std::abs(ball.slack);
-    const Row& radius = half_[stack_.ball];
+    const Row& radius = sides_.half[stack_.ball];
     Row one, two;
     beyond(stack_.line[before], one), beyond(stack_.line[after], two);
     Row length, distance, ax, ay, angle, sine, cosine;
@@ -226,7 +203,8 @@ class Bundle {
     for (int k = 0; k < n_; ++k) {
       const double cx = q.x[k] - p.x[k], cy = q.y[k] - p.y[k], l = std::sqrt(cx * cx + cy * cy);
       const double inverse = l > 0 ? 1 / l : 0, x = cy * inverse, y = -cx * inverse;
-      const double beside = x * (0.5 * (p.x[k] + q.x[k]) - centre_.x[k]) + y * (0.5 * (p.y[k] + q.y[k]) - centre_.y[k]);
+      const double beside =
+          x * (0.5 * (p.x[k] + q.x[k]) - sides_.centre_x[k]) + y * (0.5 * (p.y[k] + q.y[k]) - sides_.centre_y[k]);
       // Of a chord that rounding may have turned round, what is known of the two lines that it lies between tells the
       // side.
       const double sure = one[k] > 0 && two[k] > 0 ? -std::abs(beside) : std::abs(beside);
@@ -297,11 +275,11 @@ class Bundle {
   void beyond(const Line& line, Row& result) const {
     const Point n = line.normal;
     const double length = line.length;
-    const Row& radius = half_[stack_.ball];
+    const Row& radius = sides_.half[stack_.ball];
     Row sides;
     side(line, sides);
     for (int k = 0; k < n_; ++k)
-      result[k] = sides[k] - (n.x * centre_.x[k] + n.y * centre_.y[k]) - 0.9 * radius[k] * length;
+      result[k] = sides[k] - (n.x * sides_.centre_x[k] + n.y * sides_.centre_y[k]) - 0.9 * radius[k] * length;
   }
 
   void add_disc() {
@@ -309,7 +287,8 @@ class Bundle {
     const double pi = std::numbers::pi;
     double up = 0, all = 0, t_up = 0, size = 0;
     for (int k = 0; k < n_; ++k) {
-      const double r2 = half_[stack_.ball][k] * half_[stack_.ball][k], w = pi * r2, x = centre_.x[k], y = centre_.y[k];
+      const double r2 = sides_.half[stack_.ball][k] * sides_.half[stack_.ball][k], w = pi * r2, x = sides_.centre_x[k],
+                   y = sides_.centre_y[k];
       const double t = nodes_.t[k], turned = 2 * pi * nodes_.weight[k], z = turned * (t - ball.level);
       area_[k] = w, x_[k] = w * x, y_[k] = w * y;
       xx_[k] = w * (x * x + r2 / 4), yy_[k] = w * (y * y + r2 / 4), xy_[k] = w * x * y;
@@ -370,14 +349,35 @@ class Bundle {
   const Nodes& nodes_;
   Row &area_, &surface_;
   int n_;
-  std::array<Row, 2> half_, upper_, lower_;  ///< per quadric; the sides only of cylinders
-  Points centre_;                            ///< of the disc
-  Row slack_;                                ///< |centre|² − radius²
+  Sides sides_;
   Row x_, y_, xx_, yy_, xy_;
   Integrals sum_;
 };
 
 }  // namespace
+
+void find_sides(const Stack& stack, const Row& t, int count, Sides& sides) {
+  for (int i = 0; i < stack.quadrics; ++i) {
+    const Quadric& q = stack.quadric[i];
+    const double low = q.low, high = q.high, stretch = 1 + dot(q.shear, q.shear), along = q.along, slack = q.slack;
+    const Point c = q.centre, s = q.shear;
+    Row &half = sides.half[i], &upper = sides.upper[i], &lower = sides.lower[i];
+    for (int k = 0; k < count; ++k) half[k] = std::sqrt(std::max(0.0, (t[k] - low) * (high - t[k])));
+    if (q.ball) {
+      for (int k = 0; k < count; ++k) {
+        sides.centre_x[k] = c.x - t[k] * s.x, sides.centre_y[k] = c.y - t[k] * s.y;
+        sides.slack[k] = stretch * t[k] * t[k] - 2 * along * t[k] + slack;
+      }
+      continue;
+    }
+    for (int k = 0; k < count; ++k) {
+      const double constant = stretch * t[k] * t[k] - 2 * along * t[k] + slack, middle = c.x - s.x * t[k];
+      // The nearer of the two roots of y² − 2 middle y + constant: not as a difference.
+      const double far = middle > 0 ? middle + half[k] : middle - half[k], near = far != 0 ? constant / far : 0;
+      upper[k] = middle > 0 ? far : near, lower[k] = middle > 0 ? near : far;
+    }
+  }
+}
 
 Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices) {
   return Bundle(stack, outline, nodes, slices).measure();

@@ -11,6 +11,13 @@ inline constexpr int kMostNodes = 20;
 /// A number for each node of a rule.
 using Row = std::array<double, kMostNodes>;
 
+/// Of each slice, per quadric: half its chord, and the sides of a cylinder or the disc.
+struct Sides {
+  std::array<Row, 2> half, upper, lower;
+  Row centre_x, centre_y, slack;  ///< of the disc; |centre|² − radius²
+};
+void find_sides(const Stack& stack, const Row& t, int count, Sides& sides);
+
 /// Where a rule looks at slices, and what each of them counts.
 struct Nodes {
   int size = 0;
