@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "geometry/vec.h"
@@ -78,6 +79,12 @@ struct Measures {
   Vec3 centroid;
   std::array<Pull, 2> pulls{};       ///< on the bodies of a pair, each about its body's position
   std::vector<Pull> pulls_of_group;  ///< likewise, on more than two
+};
+
+/// Measures, and the inertia but where they are of a formula that has none.
+struct MeasuresAndInertia {
+  Measures measures;
+  std::optional<Mat3> inertia;  ///< about the centroid, at unit density
 };
 
 /// Three times the mean of the area on the way, over the area at its beginning, while the planes of a polytope move out

@@ -270,12 +270,12 @@ Region grown(const Arrangement& at, const Inside& inside, double reach, double t
 namespace {
 
 /// The formula's answer where it is as good as a polytope's: where its terms nearly cancel, that knows more.
-std::optional<Measures> by_formula(const OverlappingBodies& overlapping, double finest) {
+std::optional<MeasuresAndInertia> by_formula(const OverlappingBodies& overlapping, double finest) {
   const Arrangement& at = overlapping.at;
-  auto measures = closed_form(at.relative[0], at.relative[1], rounding(overlapping.search().reach), at.reference);
-  if (!measures || measures->volume_error > finest * measures->volume) return std::nullopt;
-  if (at.order[0] == 1) std::swap(measures->pulls[0], measures->pulls[1]);
-  return measures;
+  auto found = closed_form(at.relative[0], at.relative[1], rounding(overlapping.search().reach), at.reference);
+  if (!found || found->measures.volume_error > finest * found->measures.volume) return std::nullopt;
+  if (at.order[0] == 1) std::swap(found->measures.pulls[0], found->measures.pulls[1]);
+  return found;
 }
 
 MeasuresAndInertia by_region(const Region& region, std::span<const Placed> bodies, Way way) {
@@ -332,10 +332,10 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
   const double finest = std::max(overlapping.tolerance, kFinest);
   MeasuresAndInertia kept;
   auto formula = choice.tries(Way::kClosedForm) && !in_doubt ? by_formula(overlapping, finest) : std::nullopt;
-  if (choice.tries(Way::kSlicing) && !(formula && formula->volume_error <= kEnough * formula->volume))
+  if (choice.tries(Way::kSlicing) && !(formula && error_of(formula->measures) <= kEnough * formula->measures.volume))
     if (const auto& sliced = overlapping.sliced()) return *sliced;
   if (in_doubt) return by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);
-  if (formula) kept.measures = std::move(*formula);
+  if (formula) kept = std::move(*formula);
   else kept = by_region(overlapping.region(), overlapping.bodies, overlapping.traced ? Way::kTracing : Way::kDual);
   const auto keep_better = [&](const Region& region) {
     MeasuresAndInertia again = by_region(region, overlapping.bodies, Way::kWideDual);

@@ -8,6 +8,9 @@
 #include <span>
 #include <vector>
 
+#include "methods/quadric/ball.h"
+#include "shapes/solid.h"
+
 namespace overlapper {
 namespace {
 
@@ -398,22 +401,91 @@ std::optional<Measures> lens_of_ends(const Revolved& a, const Revolved& b, doubl
   return lens(centre_a, a.radius, centre_b, b.radius, rounding, reference, ends, positions);
 }
 
+// --------------------------------------------------------------------------------------------------------- polyhedra
+
+/// The corners, planes and edges of a box or a hull, in coordinates of its own.
+class OwnPolyhedron {
+ public:
+  explicit OwnPolyhedron(const Shape& shape) {
+    if (const Box* box = std::get_if<Box>(&shape)) {
+      for (int i = 0; i < 8; ++i) corners_[i] = corner(*box, i);
+      for (int f = 0; f < 6; ++f) planes_[f] = side(*box, f);
+      polyhedron_ = {corners_, planes_, edges(shape)};
+    } else if (const Hull* hull = std::get_if<Hull>(&shape)) {
+      polyhedron_ = {hull->data->vertices, hull->data->planes, edges(shape)};
+    }
+  }
+  /// Without edges if there is none.
+  const quadric::Polyhedron& operator*() const { return polyhedron_; }
+
+ private:
+  std::array<Vec3, 8> corners_;
+  std::array<Plane, 6> planes_;
+  quadric::Polyhedron polyhedron_;
+};
+
+/// About the centroid, along the polyhedron's axes.
+Mat3 inertia(const quadric::BallPart& part) {
+  const Vec3 c = part.first / part.volume, f = part.first;
+  const Vec3 s = part.squares - Vec3{f.x * c.x, f.y * c.y, f.z * c.z};
+  const Vec3 p = part.products - Vec3{f.y * c.z, f.z * c.x, f.x * c.y};
+  return {{s.y + s.z, -p.z, -p.y}, {-p.z, s.z + s.x, -p.x}, {-p.y, -p.x, s.x + s.y}};
+}
+
+/// Where one plane at most reaches a ball, a cap has fewer terms.
+std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, const Placed& other, int self,
+                                                      double rounding, Vec3 reference,
+                                                      const std::array<Vec3, 2>& positions) {
+  const OwnPolyhedron polyhedron(other.shape);
+  if ((*polyhedron).edges.empty()) return std::nullopt;
+  const Vec3 centre = apply_transposed(other.pose.rotation, ball.centre - other.pose.translation);
+  const auto reaches = [&](const Plane& plane) { return -signed_distance(plane, centre) < ball.radius + rounding; };
+  if (std::ranges::count_if((*polyhedron).planes, reaches) < 2) return std::nullopt;
+  const auto part = quadric::measure_ball(*polyhedron, centre, ball.radius, true);
+  if (!part || !(part->volume > 0)) return std::nullopt;
+  Measures q = by_formula();
+  q.facets_touched = part->faces;
+  q.volume = part->volume, q.area = part->area;
+  q.volume_error = part->error + rounding * part->area;
+  if (!std::isfinite(q.volume_error)) return std::nullopt;
+  const auto turned = [&](Vec3 v) { return other.pose.rotation * v; };
+  q.centroid = reference + (ball.centre + turned(part->first / part->volume));
+  // The forces on the ball act towards its centre.
+  const Vec3 on_other = turned(part->flat);
+  q.pulls = opposite_pulls(self == 0 ? -on_other : on_other, ball.centre, positions);
+  const Mat3 rotation = other.pose.rotation;
+  return MeasuresAndInertia{std::move(q), rotation * inertia(*part) * transposed(rotation)};
+}
+
+std::optional<MeasuresAndInertia> without_inertia(const std::optional<Measures>& measures) {
+  return measures ? std::optional(MeasuresAndInertia{*measures, {}}) : std::nullopt;
+}
+
 }  // namespace
 
-std::optional<Measures> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference) {
+std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference) {
   const std::optional<Revolved> smooth_a = revolved(a), smooth_b = revolved(b);
   const std::array<Vec3, 2> positions{a.position - reference, b.position - reference};
   if (smooth_a && smooth_b) {
     if (!smooth_a->round || !smooth_b->round) return std::nullopt;
-    return lens_of_ends(*smooth_a, *smooth_b, rounding, reference, positions);
+    return without_inertia(lens_of_ends(*smooth_a, *smooth_b, rounding, reference, positions));
   }
   if (!smooth_a && !smooth_b) return std::nullopt;
   const Placed& other = smooth_a ? b : a;
   if (smooth(other.shape)) return std::nullopt;
+  const Revolved& body = smooth_a ? *smooth_a : *smooth_b;
+  const int self = smooth_a ? 0 : 1;
+  std::optional<MeasuresAndInertia> several;
+  if (body.round && body.half_length == 0)
+    several = ball_and_polyhedron(body, other, self, rounding, reference, positions);
+  const auto error = [](const Measures& m) { return m.volume_error / m.volume; };
+  if (several && error(several->measures) <= kEnough) return several;
   std::vector<Plane> planes;
   append_planes(other.shape, planes);
   for (Plane& plane : planes) plane = other.pose * plane;
-  return cut_by_polytope(smooth_a ? *smooth_a : *smooth_b, planes, smooth_a ? 0 : 1, rounding, reference, positions);
+  const auto cut = cut_by_polytope(body, planes, self, rounding, reference, positions);
+  if (several && !(cut && error(*cut) <= error(several->measures))) return several;
+  return without_inertia(cut);
 }
 
 }  // namespace overlapper

@@ -440,10 +440,10 @@ Errors errors_of_formula(const Measures& stated, const Region& drawn, std::span<
   return errors;
 }
 
-double error_of_sliced_inertia(const MeasuresAndInertia& sliced) {
-  const Mat3& i = *sliced.inertia;
+double error_of_integrated_inertia(const MeasuresAndInertia& values) {
+  const Mat3& i = *values.inertia;
   const double trace = i.row0.x + i.row1.y + i.row2.z;
-  return 4 * sliced.measures.volume_error / sliced.measures.volume * 45 / 4 * trace;
+  return 4 * values.measures.volume_error / values.measures.volume * 45 / 4 * trace;
 }
 
 double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b) {

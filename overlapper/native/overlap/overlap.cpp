@@ -175,7 +175,10 @@ Errors Overlap::errors_of_measures() const {
   const bool integrated = way() == Way::kClosedForm || way() == Way::kSlicing;
   Errors errors;
   if (integrated) errors = errors_of_formula(measures(), drawn(), bodies());
-  if (integrated && sliced()) errors.inertia = error_of_sliced_inertia(*sliced());
+  const MeasuresAndInertia* with_inertia = nullptr;
+  if (integrated && in_full().inertia) with_inertia = &in_full();
+  else if (integrated && sliced()) with_inertia = &*sliced();
+  if (with_inertia) errors.inertia = error_of_integrated_inertia(*with_inertia);
   else {
     const Errors of_polytope = errors_beside(measured_with_errors(finest_region(), bodies()), stated());
     if (integrated) errors.inertia = of_polytope.inertia;

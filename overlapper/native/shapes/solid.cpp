@@ -17,7 +17,6 @@ constexpr std::array<Edge, 12> box_edges() {
   }
   return edges;
 }
-/// The edges of a box, by the numbers of corner() and side().
 constexpr std::array<Edge, 12> kBoxEdges = box_edges();
 
 /// One coordinate of a box's corners and normals, from that row of its rotation. Both go by the numbers of corner() and
@@ -54,6 +53,12 @@ void set_box(Solid& solid, const Box& box) {
 }
 
 }  // namespace
+
+std::span<const Edge> edges(const Shape& shape) {
+  if (std::holds_alternative<Box>(shape)) return kBoxEdges;
+  if (const Hull* hull = std::get_if<Hull>(&shape)) return hull->data->edges;
+  return {};
+}
 
 void set_solid(Solid& solid, const Placed& body, int owner, const Pose* pose, double beyond) {
   const Shape& shape = body.shape;

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from round_exact import exactly
 from round_truth import dot, number, truth, vector
-from strategies import quaternion
+from strategies import quaternion, rotation
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
@@ -135,6 +135,47 @@ def test_all_measures_are_exact_on_a_face_an_edge_and_a_corner(turned, feature, 
             found = overlap(a, b)
             assert found.way in ("slicing", "closed form")
             assert_all_is_exact(a, b, found, far + size * ratio)
+
+
+# From a place on a box, or from one so many radii off it in a direction, to the centre of a round body; over an edge, a
+# corner or a face, through the middle or as tangents.
+PLACES = {
+    "centre at a corner": ((1, 1, 1), (0, 0, 0)),
+    "centre on an edge": ((0.3, 1, 1), (0, 0, 0)),
+    "centre on a face": ((0.3, -0.8, 1), (0, 0, 0)),
+    "corner on the surface": ((1, 1, 1), (0.6, 0, -0.8)),
+    "corner on the axis": ((1, 1, 1), (0, 0, -0.4)),
+    "edge along the surface": ((0.3, 1, 1), (0, -0.6, -0.8)),
+    "edge along the surface beside": ((0.3, 1, 1), (0, -0.6, 0.8)),
+    "face along the surface": ((0.9, 0.9, 1), (0, 0, -1)),
+    "edge through the surface": ((0.3, 1, 1), (0, -0.6, -0.3)),
+    "anywhere": ((0.7, 0.8, 0.9), (0.1, 0.2, 0.3)),
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("off", [0, 1e-15, 1e-9, 1e-4])
+def test_all_measures_are_exact_where_surfaces_pass_through_middles_or_along_each_other(place, off):
+    rng = np.random.default_rng(3)
+    on_box, away = np.array(PLACES[place])
+    half = np.array([0.5, 0.6, 0.7])
+    for turn in ((0, 0, 0, 1), (0.5, 0.5, 0.5, 0.5), quaternion(rng)):
+        box = Placed(Box(half), rng.normal(size=3), turn)
+        for shape in (Sphere(0.45),):
+            centre = on_box * half + shape.radius * away + off * rng.normal(size=3)
+            a = Placed(shape, box.position + rotation(turn) @ centre, turn)
+            found = overlap(a, box)
+            assert found.way in ("slicing", "closed form")
+            assert_all_is_exact(a, box, found, 2)
+
+
+@pytest.mark.parametrize("first", ["sphere"])
+@pytest.mark.parametrize("second", ["box", "hull"])
+def test_nearly_all_random_poses_of_a_round_body_and_a_polyhedron_have_a_formula(first, second):
+    rng = np.random.default_rng(2)
+    found = [overlap(somewhere(rng, first), somewhere(rng, second)) for _ in range(200)]
+    ways = [o.way for o in found if o]
+    assert ways.count("closed form") > 0.8 * len(ways)
 
 
 @pytest.mark.parametrize("depth", DEPTHS)

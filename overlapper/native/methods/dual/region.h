@@ -23,11 +23,6 @@ Region grow(std::span<const Body> bodies, std::span<const Owned<PlaneOf<Body>>> 
 /// corners as given, whatever `bodies` are relative to. Nothing if the frame's origin turns out not to be inside.
 std::optional<Region> widened(std::span<const Placed> bodies, const Region& region);
 
-/// Measures, and the inertia where a polytope was measured, not a formula evaluated.
-struct MeasuresAndInertia {
-  Measures measures;
-  std::optional<Mat3> inertia;  ///< about the centroid, at unit density
-};
 /// Measures of a region by Way::kDual; owners of the region's facets are numbers of `bodies`.
 MeasuresAndInertia measure(const Region& region, std::span<const Placed> bodies);
 

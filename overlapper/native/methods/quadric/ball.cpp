@@ -1,0 +1,186 @@
+#include "methods/quadric/ball.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+namespace overlapper::quadric {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kUnit = 0x1p-53;  ///< of rounding
+/// Lengths are right to this fraction of how far the numbers reach that they are made of: a unit vector to 4 roundings,
+/// a difference to one, their product to 3.
+constexpr double kPlacing = 8 * kUnit;
+
+/// A disc that the plane of a face cuts from the ball, and what is known of the face's part of it, from edge to edge:
+/// a polygon seen from the middle, as angles and triangles, and sectors for what the angles leave of the whole turn.
+struct Disc {
+  double height = 0;     ///< of the plane over the centre
+  double square = 0;     ///< of the radius ρ; 0 if the plane does not reach the ball
+  bool around = true;    ///< the face holds the middle, as none of its edges lies this side of that
+  bool touched = false;  ///< by an edge
+  double angle = 0;      ///< of the edges' parts inside the ball, as the middle sees them
+  double sizes = 0;      ///< of these
+  double twice = 0;      ///< twice the area of their triangles
+  double second = 0;     ///< four times ∫ |y|² dA over the triangles
+  Vec3 third;            ///< ∫ (|y|² − ρ²) y dA over triangles and sectors
+};
+
+/// The part of an edge inside the ball, as the middle of a disc sees it. Lengths along the edge count from the point
+/// that is nearest to the centre.
+struct Chord {
+  Vec3 out, along;  ///< unit, in the disc's plane: from the face across the edge, and along that
+  double height;    ///< of the edge's line over the middle, positive if that is on the side of the face
+  double from, to;
+
+  double distance2(double t) const { return height * height + t * t; }
+};
+
+/// Returns the size of the angle.
+double add(const Chord& chord, bool with_second, Disc& disc) {
+  const auto [out, along, h, from, to] = chord;
+  const double length = to - from, h2 = h * h, cubes = length * (from * from + from * to + to * to);
+  const double angle = std::atan2(length * h, h2 + from * to);
+  disc.touched = true;
+  disc.angle += angle, disc.sizes += std::abs(angle);
+  disc.twice += h * length;
+  disc.second += h * (h2 * length + cubes / 3);
+  if (with_second) {
+    const double radius2 = disc.square, part = h2 / 5 - radius2 / 3;
+    const double squares = length * (from + to), fourths = squares * (from * from + to * to);
+    disc.third += h2 * (part * length + cubes / 15) * out + h * (part * squares / 2 + fourths / 20) * along;
+    // The directions of sectors sum to the opposite of those of the edges.
+    const double begin = 1 / std::sqrt(chord.distance2(from)), end = 1 / std::sqrt(chord.distance2(to));
+    const double sector = 2.0 / 15 * radius2 * radius2 * std::sqrt(radius2);
+    disc.third += sector * ((to * end - from * begin) * out - h * (end - begin) * along);
+  }
+  return std::abs(angle);
+}
+
+/// How far the border of the curved part turns where it leaves a plane for another, and the edge between them, at the
+/// length t from the edge's point nearest to the centre: less than none, or more than half a turn, if t is negative.
+double turn_at(double t, double radius, double cosine, double sine, double heights) {
+  const double x = cosine * t * t - heights, turn = std::atan2(radius * sine * t, x);
+  return turn < 0 && x < 0 ? turn + 2 * kPi : turn;
+}
+
+}  // namespace
+
+// With heights h and areas A of the faces, and the area C of the curved part, all about the centre,
+//
+//   3 V = Σ h A + r C,   2 ∫ x dV = Σ n ∫ (|x|² − r²) dA over the faces,   ∫ n dA = −Σ A n over the curved part.
+//   2 ∫ x xᵀ dV + ∫ |x|² dV = r² V + Σ n ∫ (|x|² − r²) xᵀ dA.
+//
+// C is what the theorem of Gauss and Bonnet leaves: 2π times the curved part's Euler characteristic, less the turns at
+// its corners and those along its arcs, −h φ / r for an arc of angle φ. The characteristic is that of a sphere, 2, less
+// that of the faces' parts together: their number, less that of edges inside, and of corners inside, once more.
+//
+// No decision parts these sums from each other: whether a corner is inside, what of an edge is, and on which side of an
+// edge a disc's middle lies are each decided once, for whatever depends on it. Decided wrongly by rounding, they are
+// right for a ball or a plane that is off by as much; so tangent planes and grazed edges need no care.
+//
+// The error. Every term has ten roundings or fewer, and every sum on the way one more. An edge is where rounding has
+// put it, to kPlacing of how far its numbers reach: seen along it, the two planes and their line still meet, so that
+// what it gives to the volume, a signed part of the ball between its planes and two of its disc's radii, changes by no
+// more than the parts of the discs that it cuts off, each a part of a sector. Where it ends in a corner inside, it is
+// seen from a disc's middle in a direction that is off by the corner's misplacement over its distance from there, and
+// with it a sector and what of the ball is above; without bound where a corner is in the middle of a disc, and edges
+// disagree upon where it is seen. Where it ends on the sphere, the turn there is of planes that it is parallel to, but
+// for what is measured.
+std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius, bool with_second) {
+  thread_local std::vector<Disc> discs;
+  thread_local std::vector<char> inside;
+  const double r = radius, r2 = r * r, r3 = r * r2;
+  discs.assign(polyhedron.planes.size(), {});
+  for (size_t f = 0; f < discs.size(); ++f) {
+    const double h = -signed_distance(polyhedron.planes[f], centre);
+    if (h <= -r) return std::nullopt;
+    discs[f].height = h, discs[f].square = std::max(0.0, (r - h) * (r + h));
+  }
+  inside.resize(polyhedron.corners.size());
+  int characteristic = 2;
+  for (size_t i = 0; i < inside.size(); ++i) {
+    inside[i] = norm2(polyhedron.corners[i] - centre) < r2;
+    characteristic -= inside[i];
+  }
+  BallPart part;
+  double turns = 0;    // at corners of the curved part
+  double partial = 0;  // the size of sums on the way
+  for (const Edge& edge : polyhedron.edges) {
+    Disc &left = discs[edge.left], &right = discs[edge.right];
+    const bool from_inside = inside[edge.from], to_inside = inside[edge.to];
+    const Vec3 corner = polyhedron.corners[edge.from], between = polyhedron.corners[edge.to] - corner;
+    const Vec3 n = polyhedron.planes[edge.left].normal, m = polyhedron.planes[edge.right].normal;
+    const double length = std::sqrt(norm2(between));
+    const Vec3 p = corner - centre, along = between / length, out = cross(along, n);
+    // Seen along the edge, both planes and the line in which they meet, from the one plane's height and the line's. No
+    // zero is negative, whose angle would be on the other side.
+    const double cosine = dot(n, m), sine = std::max(0.0, dot(out, m));
+    const double height = dot(out, p) + 0.0, other = sine * left.height - cosine * height + 0.0;
+    if (height < 0) left.around = false;
+    if (other < 0) right.around = false;
+    const double half = std::sqrt(std::max(0.0, left.square - height * height));
+    const double first = dot(p, along), last = first + length;
+    if (!from_inside && !to_inside && !(half > 0 && right.square > 0 && first < 0 && last > 0)) continue;
+    // An edge along the sphere may seem to end on that beyond a corner: the corner counts.
+    const double from = from_inside ? first : std::clamp(-half, first, to_inside ? last : 0);
+    const double to = to_inside ? last : std::clamp(half, from_inside ? first : 0, last);
+    const auto turn = [&](double t) { return turn_at(t, r, cosine, sine, height * other); };
+    const int ends = !from_inside + !to_inside;
+    if (ends == 2 && -from == to) turns += 2 * turn(to);
+    else turns += (from_inside ? 0 : turn(-from)) + (to_inside ? 0 : turn(to));
+    partial += turns;
+    const Chord of_left{out, along, height, from, to};
+    const Chord of_right{sine * n - cosine * out, along, other, from, to};
+    const double beside =
+        left.square * add(of_left, with_second, left) + right.square * add(of_right, with_second, right);
+    ++characteristic;
+    const double far = std::abs(first) + std::abs(height) + std::abs(left.height);
+    const auto seen = [&](double t) {
+      return 1 / std::sqrt(of_left.distance2(t)) + 1 / std::sqrt(of_right.distance2(t));
+    };
+    part.error += kPlacing * far * beside;
+    if (from_inside) part.error += kPlacing * far * r3 / 2 * seen(from);
+    if (to_inside) part.error += kPlacing * (far + length) * r3 / 2 * seen(to);
+    part.error += ends * r3 * (std::abs(dot(along, n)) + std::abs(dot(along, m)) + kPlacing);
+  }
+  double curved = 2 * kPi * characteristic - turns, cones = 0;
+  double sizes = 2 * kPi * std::abs(characteristic) + turns, cone_sizes = 0;
+  double pressure = 0;  // Σ h ∫ (|x|² − r²) dA
+  for (size_t f = 0; f < discs.size(); ++f) {
+    const Disc& disc = discs[f];
+    const bool whole_turn = disc.around && disc.square > 0;
+    if (!whole_turn && !disc.touched) continue;
+    ++part.faces;
+    const Vec3 n = polyhedron.planes[f].normal;
+    const double h = disc.height, turn = whole_turn ? 2 * kPi : 0, arcs = turn - disc.angle;
+    const double face = (disc.square * arcs + disc.twice) / 2;
+    curved += arcs * h / r - 2 * kPi;
+    cones += h * face;
+    partial += std::abs(curved) + std::abs(arcs);
+    sizes += (turn + disc.sizes) * std::abs(h) / r + 2 * kPi;
+    cone_sizes += std::abs(h) * (disc.square * (turn + disc.sizes) + std::abs(disc.twice)) / 2;
+    part.area += face;
+    part.flat += face * n;
+    const double on_face = (disc.second - disc.square * disc.square * arcs) / 4 - disc.square * disc.twice / 2;
+    part.first += on_face / 2 * n;
+    if (!with_second) continue;
+    pressure += h * on_face;
+    const Vec3 w = h * on_face * n + disc.third;
+    part.squares += {n.x * w.x, n.y * w.y, n.z * w.z};
+    part.products += 0.5 * Vec3{n.y * w.z + n.z * w.y, n.z * w.x + n.x * w.z, n.x * w.y + n.y * w.x};
+  }
+  part.area += r2 * curved;
+  part.volume = (cones + r3 * curved) / 3;
+  part.error += kUnit * (10 * (cone_sizes + r3 * sizes) / 3 + r3 * partial);
+  if (with_second) {
+    const double all = (3 * r2 * part.volume + pressure) / 5, each = r2 * part.volume - all;
+    part.squares = 0.5 * (part.squares + Vec3{each, each, each});
+    part.products = 0.5 * part.products;
+  }
+  return part;
+}
+
+}  // namespace overlapper::quadric
