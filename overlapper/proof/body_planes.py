@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Shape
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Shape
 from overlapper.proof.claims import AXES, OwnedPlane, support_above
 from overlapper.proof.rational import Exact, RationalBody, exact, integers
 
@@ -69,7 +69,7 @@ class BodyPlanes:
         if self.flat:
             direction: Exact = self.normals[self._tightest_facet(local)]
         else:
-            direction = exact(_round_normal(self.body.shape, local.astype(float)))
+            direction = exact(self._round_normal(local.astype(float)))
         normal: Exact = self.body.axes @ direction
         return normal
 
@@ -81,6 +81,17 @@ class BodyPlanes:
         exactly = (self.normals[few] @ local - self.offsets[few]).astype(float)
         lengths = np.linalg.norm(self.normals[few].astype(float), axis=1)
         return int(few[(exactly / lengths).argmax()])
+
+    def _round_normal(self, point: Floats) -> Floats:
+        if not isinstance(self.body.shape, RoundedHull):
+            return _round_normal(self.body.shape, point)
+        halfspaces = self.body.hull.halfspaces
+        above = halfspaces[:, :3] @ point + halfspaces[:, 3]
+        if above.max() > 0.0:
+            outward: Floats = point - self.body.next_on_core(point).astype(float)
+            if outward.any():
+                return outward
+        return np.asarray(halfspaces[above.argmax(), :3])
 
 
 def _round_normal(shape: Shape, point: Floats) -> Floats:

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from overlapper import Capsule, Cylinder, HalfSpace, Overlap, RoundedHull, Sphere
 from overlapper.proof.body_planes import BodyPlanes, Floats, supporting
 from overlapper.proof.claims import (
+    Bounds,
+    Bracketed,
     Certificate,
     CertificateError,
     Overlapping,
@@ -26,6 +28,7 @@ from overlapper.proof.claims import (
     Separated,
     Touching,
     support_above,
+    volume_bounds,
 )
 from overlapper.proof.clipping import BORDER, ClippedPolytope
 from overlapper.proof.deepest_ball import DeepestBall, room
@@ -36,6 +39,10 @@ from overlapper.proof.ray_exit import ray_exits
 # by rounding meet in corners that the first number cannot tell apart.
 BITS = (64, 256)
 
+# Bits to which the volume of a pair with a round body is proved.
+NARROW = 48
+Round = Sphere | Capsule | Cylinder | RoundedHull
+
 
 def certificate(overlap: Overlap) -> Certificate:
     """What proves the status of `overlap`, and bounds of its volume, to somebody who does not trust us.
@@ -43,14 +50,16 @@ def certificate(overlap: Overlap) -> Certificate:
     `verify()` of the result checks it in rational arithmetic, without the core, and returns (lower, upper) bounds of
     the common volume in m³ as fractions. CertificateError says why there is no certificate.
     """
-    if any(isinstance(body.shape, RoundedHull) for body in overlap.shapes):
-        raise CertificateError("rounded hulls have no certificate")
     bodies = [RationalBody(shape) for shape in overlap.shapes]
     match overlap.status:
         case "separated":
             return _separated(overlap, bodies)
         case "touching":
             return _touching(overlap, bodies)
+        case _ if len(bodies) == 2 and any(isinstance(body.shape, Round) for body in bodies):
+            return _bracketed(overlap)
+        case _ if any(isinstance(body.shape, RoundedHull) for body in bodies):
+            raise CertificateError("more than two bodies that overlap have no certificate if one is a rounded hull")
         case _:
             return _overlapping(overlap, bodies)
 
@@ -80,7 +89,7 @@ def _facing(overlap: Overlap, bodies: list[RationalBody]) -> list[OwnedPlane]:
 
 def _touching(overlap: Overlap, bodies: list[RationalBody]) -> Touching:
     planes = _facing(overlap, bodies)
-    if planes and any(isinstance(body.shape, Sphere | Capsule | Cylinder) for body in bodies):
+    if planes and any(isinstance(body.shape, Round) for body in bodies):
         point: Exact = (exact(overlap.witness_a) + exact(overlap.witness_b)) / 2
     else:
         ball = DeepestBall(bodies, planes)
@@ -110,6 +119,20 @@ def _nearest(body: RationalBody, point: Exact) -> Exact:
 
 
 # ---------------------------------------------------------------------------------------------------------- overlapping
+
+
+def _bracketed(overlap: Overlap) -> Bracketed:
+    """Bounds so narrow that with few digits they still are."""
+    a, b = overlap.shapes
+
+    def is_narrow(bounds: Bounds) -> bool:
+        return bounds[1] - bounds[0] <= bounds[0] / (1 << NARROW + 1)
+
+    lower, upper = volume_bounds(a, b, is_narrow)
+    if not lower:
+        raise CertificateError("the bodies share no volume")
+    unit = Fraction(2) ** (lower.numerator.bit_length() - lower.denominator.bit_length() - NARROW - 4)
+    return Bracketed(overlap.shapes, math.floor(lower / unit) * unit, math.ceil(upper / unit) * unit)
 
 
 def _overlapping(overlap: Overlap, bodies: list[RationalBody]) -> Overlapping:

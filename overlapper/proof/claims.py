@@ -8,26 +8,25 @@ in the world.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
+from decimal import Decimal
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import HalfSpace, Placed
+from overlapper.install import hint
 from overlapper.proof.rational import Exact, RationalBody, fans, integers, is_closed, root, triple
-
-Bounds = tuple[Fraction, Fraction]
+from overlapper.proof.refusal import Bounds as Bounds
+from overlapper.proof.refusal import CertificateError as CertificateError
 
 AXES = np.array([[Fraction(int(i == j)) for j in range(3)] for i in range(3)])
 
 
 # Bits below 1 to which shares of single cones are rounded, upwards: their sum then is as short as they are.
 ROUNDED = 128
-
-
-class CertificateError(ValueError):
-    """A claim that is false, or a case for which no certificate was found; one sentence says which."""
 
 
 def require(claim: bool | np.bool_, sentence: str) -> None:
@@ -65,8 +64,34 @@ def require_bodies(shapes: object) -> None:
     require(all(type(shape) is Placed for shape in shapes), "shapes must be Placed")
 
 
-@dataclass(frozen=True, eq=False)
-class OwnedPlane:
+class Short:
+    """Says how much it holds, which may be thousands of numbers."""
+
+    def __repr__(self) -> str:
+        assert is_dataclass(self)
+        held = (_in_short(field.name, getattr(self, field.name)) for field in fields(self))
+        return f"{type(self).__name__}({', '.join(held)})"
+
+
+def _in_short(name: str, value: object) -> str:
+    match value:
+        case Fraction():
+            return f"{name}={_rounded(value)}"
+        case np.ndarray() if value.ndim == 1 and len(value) == 3 and value.dtype == object:
+            return f"{name}=[{', '.join(map(_rounded, value))}]"
+        case np.ndarray() | tuple():
+            return f"{len(value)} {name}"
+        case _:
+            return f"{name}={value!r}"
+
+
+def _rounded(number: Fraction) -> str:
+    """To twelve digits, of any exponent."""
+    return f"{Decimal(number.numerator) / Decimal(number.denominator):.12g}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OwnedPlane(Short):
     """Body number `owner` lies in { x : normal . x <= offset }; the normal (3,) is of any length."""
 
     normal: Exact
@@ -94,8 +119,8 @@ def check_balance(planes: tuple[OwnedPlane, ...]) -> None:
     require(not np.any(total), "normals must add up to zero")
 
 
-@dataclass(frozen=True, eq=False)
-class Separated:
+@dataclass(frozen=True, eq=False, repr=False)
+class Separated(Short):
     """At most four planes that no point can be below: their normals add up to zero, their offsets to less.
 
     Of a pair these are the two sides of a gap. (The weights of Farkas' lemma are in the lengths of the normals.)
@@ -111,8 +136,8 @@ class Separated:
         return Fraction(0), Fraction(0)
 
 
-@dataclass(frozen=True, eq=False)
-class Touching:
+@dataclass(frozen=True, eq=False, repr=False)
+class Touching(Short):
     """Nearly a gap and nearly a common point.
 
     At most four planes whose normals add up to zero leave no room for a ball larger than `inradius`. `point` (3,) is no
@@ -165,8 +190,8 @@ def support_above(body: RationalBody, direction: Exact) -> Fraction:
     return support[0] + root(support[1])[1]
 
 
-@dataclass(frozen=True, eq=False)
-class Overlapping:
+@dataclass(frozen=True, eq=False, repr=False)
+class Overlapping(Short):
     """Planes around the common part, and a star inside of it.
 
     A ball of radius `margin` about `point` (3,) lies in all bodies. Polygons `rings[k]` of `vertices` (n, 3),
@@ -252,4 +277,43 @@ class Overlapping:
         return ratio
 
 
-Certificate = Separated | Touching | Overlapping
+@dataclass(frozen=True, eq=False, repr=False)
+class Bracketed(Short):
+    """The volume that two bodies share, round ones among them, is not below `lower` and not above `upper`, in m³.
+
+    The check computes the volume anew from the numbers of the shapes, in ball arithmetic with as many bits as it takes
+    to tell (see `overlapper.proof.volume`); it needs python-flint.
+    """
+
+    shapes: tuple[Placed, ...]
+    lower: Fraction
+    upper: Fraction
+
+    def verify(self) -> Bounds:
+        require_bodies(self.shapes)
+        require(len(self.shapes) == 2, "shapes must be two bodies")
+        require_number(self.lower)
+        require_number(self.upper)
+        lower, upper = Fraction(self.lower), Fraction(self.upper)
+        require(0 < lower <= upper, "lower must be greater than 0 and not above upper")
+
+        def is_decided(proved: Bounds) -> bool:
+            within = lower <= proved[0] and proved[1] <= upper
+            return within or proved[1] < lower or upper < proved[0]
+
+        a, b = self.shapes
+        proved = volume_bounds(a, b, is_decided)
+        require(lower <= proved[0] and proved[1] <= upper, "the common volume must lie between lower and upper")
+        return lower, upper
+
+
+def volume_bounds(a: Placed, b: Placed, is_narrow: Callable[[Bounds], bool]) -> Bounds:
+    """Bounds of the volume that two bodies share, of which it was said that they are narrow."""
+    try:
+        from overlapper.proof.volume import proved_bounds
+    except ImportError as error:
+        raise ImportError(f"a certificate of round bodies needs {hint('python-flint')}") from error
+    return proved_bounds(a, b, is_narrow)
+
+
+Certificate = Separated | Touching | Overlapping | Bracketed

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere
+from overlapper.proof.nearest import nearest_weights
 
 Exact = NDArray[np.object_]  # of Fraction
 
@@ -130,9 +131,9 @@ class RationalBody:
             case Box() as box:
                 return base + exact(box.half_extents) @ [abs(x), abs(y), abs(z)] / scale, Fraction(0)
             case Hull():
-                return base + Fraction(self._farthest(local), scale * self._corners[1]), Fraction(0)
+                return base + Fraction(self._farthest(local), scale * self.corners[1]), Fraction(0)
             case RoundedHull() as rounded:
-                tip = Fraction(self._farthest(local), scale * self._corners[1])
+                tip = Fraction(self._farthest(local), scale * self.corners[1])
                 return base + tip, Fraction(rounded.radius) ** 2 * Fraction(local @ local, scale * scale)
             case Sphere() as ball:
                 return base, Fraction(ball.radius) ** 2 * Fraction(local @ local, scale * scale)
@@ -149,15 +150,30 @@ class RationalBody:
                 level = Fraction(half.given_offset) * (local @ normal) / (normal @ normal)
                 return base + level / scale, Fraction(0)
 
-    @cached_property
-    def _corners(self) -> tuple[Exact, int]:
+    @property
+    def hull(self) -> Hull:
+        """The shape itself, or the core of a rounded hull."""
         assert isinstance(self.shape, Hull | RoundedHull)
-        hull = self.shape if isinstance(self.shape, Hull) else self.shape.core
-        return integers(exact(hull.corners))
+        return self.shape if isinstance(self.shape, Hull) else self.shape.core
+
+    @cached_property
+    def corners(self) -> tuple[Exact, int]:
+        """Of a hull or of the core of a rounded one, in its own frame: integers (n, 3), and by what to divide them."""
+        return integers(exact(self.hull.corners))
+
+    def next_on_core(self, point: NDArray[np.float64]) -> Exact:
+        """A point of the core, exactly, that is to rounding the nearest to one outside; both in the body's axes."""
+        corners, triangles = self.hull.corners, self.hull.triangles
+        weights = nearest_weights(corners[triangles] - point)
+        near = np.einsum("ki,kij->kj", weights, corners[triangles] - point)
+        row = int((near * near).sum(axis=1).argmin())
+        shares = exact(weights[row])
+        nearest: Exact = shares @ exact(corners[triangles[row]]) / shares.sum()
+        return nearest
 
     @cached_property
     def _corners_in_doubles(self) -> NDArray[np.float64]:
-        corners, _ = self._corners
+        corners, _ = self.corners
         return in_doubles(corners, 1 << bits(corners))
 
     def _farthest(self, direction: Exact) -> int:
@@ -166,7 +182,7 @@ class RationalBody:
         along = self._corners_in_doubles @ d
         doubt = DOUBT * (abs(self._corners_in_doubles) @ abs(d)) + UNDERFLOW
         few = np.flatnonzero(along + doubt >= (along - doubt).max())
-        return int(max(self._corners[0][few] @ direction))
+        return int(max(self.corners[0][few] @ direction))
 
     def is_below(self, direction: Exact, offset: Fraction) -> bool:
         """Whether the body lies in { x : direction . x <= offset }: the squares are compared, no root is taken."""
@@ -174,7 +190,11 @@ class RationalBody:
         return support is not None and support[0] <= offset and support[1] <= (offset - support[0]) ** 2
 
     def contains(self, points: Exact, margin: Fraction | int = 0, scale: int = 1) -> NDArray[np.bool_]:
-        """Whether the body holds a ball of radius `margin` about each of the points (n, 3) / scale in the world."""
+        """Whether the body holds a ball of radius `margin` about each of the points (n, 3) / scale in the world.
+
+        Of points on the surface of a rounded hull this may be said to be false, as the nearest point of the core is
+        only known to rounding.
+        """
         local, scale = self.local(points, scale)
         x, y, z = local.T
         inside: Any
@@ -202,6 +222,12 @@ class RationalBody:
                 inside = (abs(z) <= least(Fraction(cylinder.length) / 2)) & holds(x * x + y * y, cylinder.radius)
             case Hull() | HalfSpace():
                 inside = self._below_facets(local, scale, margin)
+            case RoundedHull() as rounded:
+                room = Fraction(rounded.radius) - margin
+                inside = self._below_facets(local, scale, max(-room, Fraction(0)))
+                for i in np.flatnonzero(~inside) if room >= 0 else ():
+                    arm = local[i] - scale * self.next_on_core(in_doubles(local[i], scale))
+                    inside[i] = arm @ arm <= (room * scale) ** 2
         return np.asarray(inside, bool)
 
     def _below_facets(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
@@ -235,7 +261,7 @@ class RationalBody:
 
     @cached_property
     def facets(self) -> tuple[Exact, Exact]:
-        """Normals (k, 3), outward, and offsets (k,), integers, of the planes of a hull or half-space in its own frame.
+        """Normals (k, 3), outward, and offsets (k,), integers, of the planes of a hull, core or half-space in its axes.
 
         What is below all planes of a hull's triangles is inside of the hull of the corners: the triangles close, so
         their surface winds about a point that is on the inner side of each, and no plane can then separate the point
@@ -246,8 +272,7 @@ class RationalBody:
         if isinstance(self.shape, HalfSpace):
             row = primitive([*exact(self.shape.given_normal), Fraction(self.shape.given_offset)])
             return np.array([row[:3]], object), np.array(row[3:], object)
-        assert isinstance(self.shape, Hull)
-        (corners, unit), triangles = self._corners, self.shape.triangles
+        (corners, unit), triangles = self.corners, self.hull.triangles
         a, b, c = (corners.take(corner, axis=0) for corner in triangles.T)  # indexing may crash for want of memory
         normals = cross(b - a, c - a)
         solid = np.array([any(normal) for normal in normals])
@@ -258,6 +283,11 @@ class RationalBody:
         # The offsets are in units of the corners, once more than the normals.
         rows = np.array(sorted({_lowest(row) for row in np.column_stack([normals * unit, offsets])}), object)
         return rows[:, :3], rows[:, 3]
+
+    def is_closed_by_facets(self) -> bool:
+        """Whether all corners are below all facets, so that the hull is no larger than what is below these."""
+        numbers, scale = self.corners
+        return bool(self._below_facets(numbers, scale, 0).all())
 
 
 def _lowest(row: Exact) -> tuple[int, ...]:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere
+from overlapper.proof.nearest import nearest_weights
 from overlapper.proof.rational import Exact, RationalBody, cross, exact
 
 Floats = NDArray[np.float64]
@@ -116,7 +117,7 @@ class Difference:
         facet = halfspaces[halfspaces[:, 3].argmax()]
         if facet[3] < 0.0:
             return [facet[:3]], float(facet[3])
-        points = np.einsum("ki,kij->kj", _nearest_weights(triangles), triangles)
+        points = np.einsum("ki,kij->kj", nearest_weights(triangles), triangles)
         distances = np.linalg.norm(points, axis=1)
         row = distances.argmin()
         # The way back from a nearest point that is next to the origin is all rounding; the facet's normal is not.
@@ -125,7 +126,7 @@ class Difference:
     def certified(self) -> tuple[float, float]:
         """(lower, upper) bounds of the signed distance of the pair, evaluated exactly and rounded outwards."""
         triangles, _ = self.surface()
-        weights = _nearest_weights(triangles)
+        weights = nearest_weights(triangles)
         points = np.einsum("ki,kij->kj", weights, triangles)
         row = np.linalg.norm(points, axis=1).argmin()
         shares = exact(weights[row]) / sum(exact(weights[row]))
@@ -200,26 +201,3 @@ def _least(corners: Exact, normal: Exact) -> float:
     """How far along `normal` the nearest of the corners is."""
     squared = normal @ normal
     return float(min(corners @ normal)) / math.sqrt(squared) if squared else 0.0
-
-
-def _nearest_weights(triangles: Floats) -> Floats:
-    """Barycentric weights (k, 3) of the point nearest to the origin on each of the triangles (k, 3, 3)."""
-    corner = triangles[:, 0]
-    u, v = triangles[:, 1] - corner, triangles[:, 2] - corner
-    uu, uv, vv = (np.einsum("ki,ki->k", *pair) for pair in ((u, u), (u, v), (v, v)))
-    cu, cv = -np.einsum("ki,ki->k", corner, u), -np.einsum("ki,ki->k", corner, v)
-    candidates = np.zeros((len(triangles), 4, 3))
-    candidates[:, 0, 0] = 1.0
-    with np.errstate(divide="ignore", invalid="ignore"):  # a triangle without area has its edges
-        second, third = np.array([vv * cu - uv * cv, uu * cv - uv * cu]) / (uu * vv - uv * uv)
-        first = 1.0 - second - third
-        inside = (first >= 0.0) & (second >= 0.0) & (third >= 0.0)
-    candidates[inside, 0] = np.column_stack([first, second, third])[inside]
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        start, edge = triangles[:, i], triangles[:, j] - triangles[:, i]
-        squared = np.einsum("ki,ki->k", edge, edge)
-        share = np.clip(-np.einsum("ki,ki->k", start, edge) / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
-        candidates[:, i + 1, i], candidates[:, i + 1, j] = 1.0 - share, share
-    lengths = np.linalg.norm(candidates @ triangles, axis=2)
-    nearest: Floats = candidates[np.arange(len(triangles)), lengths.argmin(axis=1)]
-    return nearest

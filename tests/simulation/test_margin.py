@@ -22,7 +22,6 @@ from overlapper import (
     penetration_depth,
 )
 from overlapper.polytopes.shape_text import alike, shape_of, text_of
-from overlapper.proof.certificate import CertificateError
 from overlapper.reference import Fcl
 from overlapper.simulation import Bodies
 from overlapper.viewer.outline import outline
@@ -134,8 +133,6 @@ def test_what_a_rounded_hull_is_not_taken_for_is_said():
     pair = RoundedHull(CUBE, 0.1), Placed(RoundedHull(CUBE, 0.1), (0.5, 0, 0))
     with pytest.raises(ValueError, match="shapes must not be rounded hulls for method 'paper'"):
         overlap(*pair, method="paper")
-    with pytest.raises(CertificateError, match="rounded hulls have no certificate"):
-        overlap(*pair).certificate()
     with Fcl() as fcl:
         assert fcl.compare(overlap(*pair)).verdict == "unsupported"
 

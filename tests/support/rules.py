@@ -324,13 +324,13 @@ def volume_off(case: Case, found: Overlap) -> Fraction:
 
 
 def the_certificate_is_proved(case: Case, found: Overlap) -> str:
-    """Within what is stated; of round bodies, which the proof encloses by other planes, beside it and as narrow."""
-    if any(isinstance(body.shape, RoundedHull) for body in found.shapes):
+    """Within what is stated; of three round bodies, which it encloses by other planes, beside that and as narrow."""
+    if len(found.shapes) > 2 and found and any(isinstance(body.shape, RoundedHull) for body in found.shapes):
         return ""  # they have none
     lower, upper = certificate(found).verify()
     volume, error = Fraction(found.volume), Fraction(found.volume_error)
     within = volume - error <= lower <= upper <= volume + error
-    beside = case.round and lower <= volume + error and volume - error <= upper
+    beside = case.round and len(found.shapes) > 2 and lower <= volume + error and volume - error <= upper
     narrow = upper - lower <= 3 * max(2 * error, Fraction(TOLERANCE) * volume)
     return "" if within or (beside and narrow) else "the proved bounds are not within the stated ones"
 

@@ -291,7 +291,8 @@ void define_rounded_hull(nb::module_& m) {
                                   R"(All points within `radius` (m) of the convex hull of (n, 3) points (m).
 
 The Minkowski sum of the hull and a ball: what Bullet collides with where a convex mesh has a margin. ValueError as
-for Hull and Sphere. Method "paper" does not take it, and it has no certificate.)");
+for Hull and Sphere. Method "paper" does not take it; more than two bodies that overlap, it among them, have
+no certificate.)");
   rounded.def(
       "__init__",
       [](RoundedHull* self, nb::handle vertices, nb::handle radius) {

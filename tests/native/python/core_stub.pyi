@@ -275,7 +275,8 @@ class RoundedHull:
     All points within `radius` (m) of the convex hull of (n, 3) points (m).
 
     The Minkowski sum of the hull and a ball: what Bullet collides with where a convex mesh has a margin. ValueError as
-    for Hull and Sphere. Method "paper" does not take it, and it has no certificate.
+    for Hull and Sphere. Method "paper" does not take it; more than two bodies that overlap, it among them, have
+    no certificate.
     """
 
     def __init__(self, vertices: numpy.typing.ArrayLike, radius: float) -> None: ...

@@ -1,0 +1,283 @@
+"""Volumes of two quadrics and a polytope, by slices, in ball arithmetic.
+
+Slices are orthogonal to the axes: of a cylinder they show a strip between two lines, of a ball a disc, of the polytope
+a polygon. Each of the lines keeps its direction and has the offset b₀ + b₁ t + b₂ ρ₁(t) + b₃ ρ₂(t), where t is along
+the normal of the slices and ρ(t)² is quadratic. The area of a polygon is thus a quadratic form in 1, t, ρ₁ and ρ₂, and
+has an elementary integral but for ρ₁ ρ₂. What is not elementary is integrated by `acb.integral` (Petras; Johansson,
+Numerical integration in arbitrary-precision ball arithmetic, 2018), whose error is proved.
+
+The outline of a slice changes its sides or their order only at breakpoints: where three of the curves that bound slices
+meet in a point of the common body, where a line touches the disc in such a point, where parallel lines meet, or where a
+strip or the disc ends. These t are roots of polynomials with rational coefficients, of degree four or less, which FLINT
+encloses. Superfluous ones do no harm. Three sides of the polytope meet in its corners only, two in its edges, and those
+edges that lie in a slice are a place where parallel lines meet. What lies between bounds of breakpoints that are too
+close to each other has at most the widest slice.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from flint import acb, arb, ctx, fmpq, fmpq_poly
+
+from overlapper.proof.one_quadric import root
+from overlapper.proof.vectors import Vector, minus
+
+# A line takes { (p, q) : normal · (p, q) <= offset }, whose offset is a combination of 1, t, ρ₁ and ρ₂.
+Combination = tuple[fmpq, fmpq, fmpq, fmpq]
+Point = tuple[arb, arb, arb]  # (t, p, q)
+ZERO = fmpq(0)
+T = fmpq_poly([0, 1])
+
+# Where between two breakpoints the outline is looked at: in the middle symmetry has other lines meet than elsewhere.
+SHARE = fmpq(3331, 7919)
+
+# Of the bits of a number, those to which what is not elementary is integrated.
+INTEGRATED = 0.75
+
+Form = list[fmpq]  # coefficients of 1, t, t², ρ₁, t ρ₁, ρ₁², ρ₂, t ρ₂, ρ₂², ρ₁ ρ₂
+
+
+class Undecided(ArithmeticError):
+    """A number is too wide to have a sign."""
+
+
+def is_positive(x: arb) -> bool:
+    if x > 0:
+        return True
+    if x < 0:
+        return False
+    raise Undecided
+
+
+@dataclass(frozen=True)
+class Line:
+    normal: tuple[fmpq, fmpq]
+    offset: Combination
+
+
+@dataclass
+class Outline:
+    """What a slice is made of: quadratic forms, segments taken from the disc, and its angles."""
+
+    forms: list[tuple[int, ...]] = field(default_factory=list)
+    segments: Counter[int] = field(default_factory=Counter)
+    turn: arb = field(default_factory=lambda: arb(0))
+
+
+class Slices:
+    """What is common to both kinds. Coordinates t, p, q are rational combinations of those of space."""
+
+    corners: list[Vector]  # of the polytope
+    edges: list[tuple[int, int, int, int]]
+    lines: list[Line]  # of which the first four are a parallelogram, counter-clockwise
+    squares: tuple[fmpq_poly, ...]  # ρ₁² and ρ₂², of which a ball has none of its own
+    steep: list[tuple[fmpq, fmpq]]  # (rate, offset) of planes rate t <= offset
+
+    scale: fmpq  # of the volume in these coordinates by that in space
+
+    def __call__(self, bits: int) -> arb:
+        with ctx.workprec(bits):
+            return self._volume(bits) / self.scale
+
+    def _volume(self, bits: int) -> arb:
+        total = arb(0)
+        low: arb | None = None
+        for start, end in clusters(self.marks()):
+            if low is not None:
+                total += self._between(low, start, int(bits * INTEGRATED))
+            total += (end - start).union(0) * self.widest()
+            low = end
+        return total
+
+    def _between(self, low: arb, high: arb, goal: int) -> arb:
+        middle = (low + SHARE * (high - low)).mid()
+        for rate, offset in self.steep:
+            if is_positive(rate * middle - offset):
+                return arb(0)
+        if not all(is_positive(at(square, middle)) for square in self.squares):
+            return arb(0)
+        outline = self.outline(middle)
+        return self.integral(outline, low, high, goal) if outline else arb(0)
+
+    # What the two kinds differ in.
+
+    def marks(self) -> Iterator[arb]:
+        raise NotImplementedError
+
+    def widest(self) -> arb:
+        """More than the area of any slice."""
+        raise NotImplementedError
+
+    def outline(self, t: arb) -> Outline | None:
+        raise NotImplementedError
+
+    def integral(self, outline: Outline, low: arb, high: arb, goal: int) -> arb:
+        raise NotImplementedError
+
+    # What they share.
+
+    def level_edges(self) -> Iterator[arb]:
+        """Of edges that lie in a slice, ends need not be in the quadrics for what is between them to be."""
+        for i, j, _, _ in self.edges:
+            if self.corners[i][0] == self.corners[j][0]:
+                yield arb(self.corners[i][0])
+
+    def basis(self, t: arb) -> list[arb]:
+        return [arb(1), t, *(at(square, t).nonnegative_part().sqrt() for square in self.squares)]
+
+    def polygon(self, offsets: list[arb]) -> list[tuple[int, tuple[arb, arb]]]:
+        """The lines around what is below all of them, and where each meets the next; empty if there is nothing."""
+        around = [(k, self.meeting(k, (k + 1) % 4, offsets)) for k in range(4)]
+        for new in range(4, len(self.lines)):
+            x, y = self.lines[new].normal
+            above = [is_positive(x * p + y * q - offsets[new]) for _, (p, q) in around]
+            if not any(above):
+                continue
+            if all(above):
+                return []
+            count = len(around)
+            last = next(k for k in range(count) if above[k] and not above[(k + 1) % count])
+            first = next(k for k in range(count) if above[k] and not above[k - 1])
+            entering, leaving = around[first][0], around[(last + 1) % count][0]
+            kept = [around[(last + 1 + k) % count] for k in range((first - last - 1) % count)]
+            corners = [(entering, self.meeting(entering, new, offsets)), (new, self.meeting(new, leaving, offsets))]
+            around = [*kept, *corners]
+        return around
+
+    def meeting(self, i: int, j: int, offsets: list[arb]) -> tuple[arb, arb]:
+        (a, b), (c, d) = self.lines[i].normal, self.lines[j].normal
+        det = a * d - b * c
+        return (offsets[i] * d - offsets[j] * b) / det, (offsets[j] * a - offsets[i] * c) / det
+
+    def corner(self, i: int, j: int) -> tuple[Combination, Combination]:
+        """Where two lines meet, as combinations."""
+        (a, b), (c, d) = self.lines[i].normal, self.lines[j].normal
+        det = a * d - b * c
+        e, f = self.lines[i].offset, self.lines[j].offset
+        return combined(d / det, e, -b / det, f), combined(a / det, f, -c / det, e)
+
+
+def combined(x: fmpq, u: Combination, y: fmpq, v: Combination) -> Combination:
+    a, b, c, d = (x * s + y * t for s, t in zip(u, v))
+    return a, b, c, d
+
+
+def product(u: Combination, v: Combination) -> Form:
+    return [
+        u[0] * v[0],
+        u[0] * v[1] + u[1] * v[0],
+        u[1] * v[1],
+        u[0] * v[2] + u[2] * v[0],
+        u[1] * v[2] + u[2] * v[1],
+        u[2] * v[2],
+        u[0] * v[3] + u[3] * v[0],
+        u[1] * v[3] + u[3] * v[1],
+        u[3] * v[3],
+        u[2] * v[3] + u[3] * v[2],
+    ]
+
+
+def clusters(marks: Iterable[arb]) -> list[tuple[arb, arb]]:
+    """Bounds of the marks, in order, without those that overlap."""
+    found: list[tuple[arb, arb]] = []
+    for low, high in sorted(((mark.lower(), mark.upper()) for mark in marks), key=lambda pair: pair[0].mid()):
+        if found and not found[-1][1] < low:
+            found[-1] = found[-1][0], high if high > found[-1][1] else found[-1][1]
+        else:
+            found.append((low, high))
+    return found
+
+
+def at(poly: fmpq_poly, x: arb) -> arb:
+    value = arb(0)
+    for coefficient in reversed(poly.coeffs()):
+        value = value * x + coefficient
+    return value
+
+
+def roots(poly: fmpq_poly) -> list[arb]:
+    """The real ones; none of what is zero everywhere."""
+    match poly.degree():
+        case -1 | 0:
+            return []
+        case 1:
+            return [arb(-poly[0] / poly[1])]
+        case 2:
+            discriminant = poly[1] * poly[1] / 4 - poly[0] * poly[2]
+            if discriminant < 0:
+                return []
+            far = root(discriminant)
+            return [(-poly[1] / 2 + side * far) / poly[2] for side in (-1, 1)]
+        case _:
+            pairs: list[Any] = poly.numer().complex_roots()
+            found = (acb(x) for x, _ in pairs)
+            return [x.real for x in found if x.imag == 0]
+
+
+def along(start: Vector, end: Vector, form: Callable[[Vector, Vector], fmpq], constant: fmpq) -> list[arb]:
+    """Shares of the way at which the form of a point with itself is the constant."""
+    way = minus(end, start)
+    return roots(fmpq_poly([form(start, start) - constant, 2 * form(start, way), form(way, way)]))
+
+
+def points_between(start: Vector, end: Vector, shares: Iterable[arb]) -> Iterator[Point]:
+    """At shares of the way, but those that are certainly beyond its ends."""
+    for share in shares:
+        if not (share < 0 or share > 1):
+            t, p, q = (x + share * (y - x) for x, y in zip(start, end))
+            yield t, p, q
+
+
+class Parabola:
+    """R(t) = most - bend (t - peak)², of which the root has elementary integrals."""
+
+    def __init__(self, constant: arb, slope: arb, bend: arb) -> None:
+        self.bend = bend
+        self.peak = slope / (2 * bend)
+        self.most = constant + slope * slope / (4 * bend)
+
+    def __call__(self, t: arb) -> arb:
+        off = t - self.peak
+        return (self.most - self.bend * off * off).nonnegative_part()
+
+    def moments(self, t: arb) -> tuple[arb, arb, arb, arb, arb]:
+        """Antiderivatives of 1/√R, t/√R, t²/√R, √R and t √R."""
+        off, value = t - self.peak, self(t).sqrt()
+        stretch = self.bend.sqrt()
+        one = arb.atan2(stretch * off, value) / stretch
+        two = self.peak * one - value / self.bend
+        squared = (self.most * one - off * value) / (2 * self.bend)
+        three = squared + self.peak * (2 * two - self.peak * one)
+        area = (off * value + self.most * one) / 2
+        return one, two, three, area, self.peak * area - value**3 / (3 * self.bend)
+
+
+def of_form(squares: tuple[fmpq_poly, ...], low: arb, high: arb) -> list[arb]:
+    """The integrals of 1, t, t², ρ₁, t ρ₁, ρ₁², ρ₂, t ρ₂, ρ₂²."""
+
+    def power(k: int) -> arb:
+        return (high**k - low**k) / k
+
+    found = [power(1), power(2), power(3)]
+    for square in squares:
+        parabola = Parabola(arb(square[0]), arb(square[1]), arb(-square[2]))
+        ends = [parabola.moments(t) for t in (low, high)]
+        found += [ends[1][3] - ends[0][3], ends[1][4] - ends[0][4]]
+        found.append(square[0] * power(1) + square[1] * power(2) + square[2] * power(3))
+    return found
+
+
+def integrated(f: Callable[[acb, bool], acb], low: arb, high: arb, most: arb, goal: int) -> arb:
+    """Between ends that are known to rounding, of what is not more than `most`."""
+    start, end = low.mid(), high.mid()
+    inner = acb.integral(f, start, end, rel_tol=arb(2) ** -goal, abs_tol=arb(2) ** (-4 * goal)).real
+    return inner + (low.rad() + high.rad()) * most.union(-most)
+
+
+def half_turn(y: arb, x: arb) -> arb:
+    """The angle of (x, y) in [0, π] for y that is not negative, but may be rounded to what is."""
+    return arb.pi() / 2 - arb.atan2(x, y)

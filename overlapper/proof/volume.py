@@ -1,0 +1,232 @@
+"""Bounds of the volume that two bodies share, as narrow as asked for: pieces of the one by pieces of the other.
+
+Decisions are made without rounding or by balls that do not hold zero; where one holds it, more bits are taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+from flint import arb, ctx, fmpq
+
+from overlapper import HalfSpace, Placed
+from overlapper.proof import one_quadric
+from overlapper.proof.ball_and_tube import BallAndTube
+from overlapper.proof.corners import Polytope, below
+from overlapper.proof.pieces import DOUBT, Ball, Floats, Piece, Plane, Quadric, Tube, pieces
+from overlapper.proof.rational import RationalBody
+from overlapper.proof.refusal import Bounds, CertificateError
+from overlapper.proof.slices import Slices, Undecided
+from overlapper.proof.two_tubes import TwoTubes
+from overlapper.proof.vectors import cross, dot, fraction, minus, plus, scaled
+
+# Bits of a first try, and of a last one, after which doubt is taken for a fault of the input.
+FIRST, LAST = 128, 1 << 11
+# Bits at which a sign that is not decided is taken for one that never is.
+TIED = 512
+
+
+class Common:
+    """What two placed shapes share."""
+
+    def __init__(self, a: Placed, b: Placed) -> None:
+        bodies = RationalBody(a), RationalBody(b)
+        home = next((body for body in bodies if not isinstance(body.shape, HalfSpace)), None)
+        if home is None:
+            raise CertificateError("one of the bodies must be bounded")
+        self._parts: list[Part] = []
+        self.lost = fmpq(0)
+        first, second = (_Pieces(pieces(body, home)) for body in bodies)
+        for i, j in first.near(second):
+            one, other = first.pieces[i], second.pieces[j]
+            self._parts += parts(one, other)
+            self.lost += one.lost + other.lost
+        self._known: list[arb | None] = [None] * len(self._parts)
+
+    def bounds(self, bits: int) -> Bounds | None:
+        """With numbers of so many bits; None if these are too few for one of the parts.
+
+        Of a part that is known much better than another, what was found before is kept.
+        """
+        with ctx.workprec(bits):
+            widest = max((volume.rad() for volume in self._known if volume is not None), default=arb(0))
+            least = widest / (64 * len(self._known) + 1)
+            for k, part in enumerate(self._parts):
+                known = self._known[k]
+                if known is None or known.rad() > least:
+                    with suppress(Undecided):
+                        self._known[k] = part(bits)
+            found = [volume for volume in self._known if volume is not None]
+            if len(found) < len(self._parts):
+                return None
+            total = sum(found, arb(0))
+        lower, upper = dyadic(total.lower()), dyadic(total.upper()) + fraction(self.lost)
+        return max(lower, Fraction(0)), upper
+
+
+Part = Callable[[int], arb]
+
+
+class OrBetween:
+    """What slices find, or bounds of it.
+
+    Where a plane goes through the curve in which the quadrics meet, three sides of a slice meet all the time, and no
+    bits tell their order. Of a thinner and a thicker cylinder they do.
+    """
+
+    def __init__(self, slices: Callable[[Tube], Slices], tube: Tube) -> None:
+        self.slices, self.tube = slices, tube
+        self._as_given = slices(tube)
+
+    def __call__(self, bits: int) -> arb:
+        try:
+            return self._as_given(bits)
+        except Undecided:
+            if bits < TIED:
+                raise
+        off = fmpq(1, 1 << bits // 4)
+        thin, thick = (self.slices(replace(self.tube, square=self.tube.square * x)) for x in (1 - off, 1 + off))
+        return thin(bits).union(thick(bits))
+
+
+def dyadic(number: arb) -> Fraction:
+    mantissa, exponent = number.man_exp()
+    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+
+
+class _Pieces:
+    """Pieces of a body, with boxes around them."""
+
+    def __init__(self, found: list[Piece]) -> None:
+        self.pieces = found
+        self.boxes = np.array([box(piece) for piece in found])
+
+    def near(self, other: _Pieces) -> Iterator[tuple[int, int]]:
+        """Pairs of pieces that doubles do not see apart."""
+        lower, upper = self.boxes[:, None, 0], self.boxes[:, None, 1]
+        apart = (lower >= other.boxes[None, :, 1]) | (upper <= other.boxes[None, :, 0])
+        for i, j in np.argwhere(~apart.any(axis=2)):
+            if not any(parted(p, q) for p, q in ((self.pieces[i], other.pieces[j]), (other.pieces[j], self.pieces[i]))):
+                yield int(i), int(j)
+
+
+def box(piece: Piece) -> Floats:
+    """Around a piece, in doubles that are rounded outwards."""
+    if piece.spine is None:
+        return np.array([[-np.inf] * 3, [np.inf] * 3])
+    low, high = piece.spine.min(axis=0) - piece.reach, piece.spine.max(axis=0) + piece.reach
+    margin = DOUBT * (np.abs(piece.spine).max() + piece.reach)
+    return np.array([low - margin, high + margin])
+
+
+def parted(piece: Piece, other: Piece) -> bool:
+    """Whether all of the other is beyond one plane of the piece."""
+    if other.spine is None:
+        return False
+    for plane in piece.planes:
+        size = max(abs(x) for x in plane.normal)
+        x, y, z, level = (float(fraction(number / size)) for number in (*plane.normal, plane.offset))
+        normal = np.array([x, y, z])
+        least = (other.spine @ normal).min() - other.reach * np.linalg.norm(normal)
+        if least > level + DOUBT * 4.0 * (np.abs(other.spine).max() + other.reach + abs(level)):
+            return True
+    return False
+
+
+def parts(one: Piece, other: Piece) -> list[Part]:
+    """What two pieces share, as volumes that wait to be computed."""
+    around = np.array([f(p, q) for f, p, q in zip((np.maximum, np.minimum), box(one), box(other))])
+    planes = (*one.planes, *other.planes)
+    quadrics = [piece.quadric for piece in (one, other) if piece.quadric is not None]
+    if len(quadrics) == 2:
+        return _of_two(quadrics[0], quadrics[1], planes, around)
+    return _of_one(quadrics[0] if quadrics else None, planes, around)
+
+
+def _of_one(quadric: Quadric | None, planes: tuple[Plane, ...], around: Floats) -> list[Part]:
+    polytope = _below(quadric, planes, around)
+    if polytope is None:
+        return []
+    common = polytope
+    match quadric:
+        case None:
+            volume = common.volume()
+            return [lambda bits: arb(volume)]
+        case Ball() as ball:
+            return [lambda bits: one_quadric.in_ball(ball, common)]
+        case Tube() as tube:
+            return [lambda bits: one_quadric.in_tube(tube, common)]
+
+
+def _below(quadric: Quadric | None, planes: tuple[Plane, ...], around: Floats) -> Polytope | None:
+    """Without the planes that leave all of a ball, and nothing if one leaves nothing of it."""
+    if isinstance(quadric, Ball):
+        kept = []
+        for plane in planes:
+            height, square = plane.height(quadric.centre), dot(plane.normal, plane.normal)
+            if height * height < quadric.square * square:
+                kept.append(plane)
+            elif height > 0:
+                return None
+        planes = tuple(kept)
+    return below(planes, around)
+
+
+def _of_two(one: Quadric, other: Quadric, planes: tuple[Plane, ...], around: Floats) -> list[Part]:
+    alike = isinstance(one, Ball) and isinstance(other, Ball)
+    if isinstance(one, Tube) and isinstance(other, Tube):
+        alike = not any(cross(one.axis, other.axis))
+    if alike:
+        return _split(one, other, planes, around)
+    if isinstance(one, Tube) and isinstance(other, Tube):
+        return _sliced(lambda tube, polytope: TwoTubes(one, tube, polytope), other, below(planes, around))
+    ball, tube = (one, other) if isinstance(one, Ball) else (other, one)
+    assert isinstance(ball, Ball) and isinstance(tube, Tube)
+    arm = minus(ball.centre, tube.point)
+    arm = plus(arm, tube.axis, -dot(arm, tube.axis) / dot(tube.axis, tube.axis))
+    if is_within(dot(arm, arm), ball.square, tube.square):
+        return _of_one(ball, planes, around)
+    return _sliced(lambda tube, polytope: BallAndTube(ball, tube, polytope), tube, _below(ball, planes, around))
+
+
+def _sliced(slices: Callable[[Tube, Polytope], Slices], tube: Tube, polytope: Polytope | None) -> list[Part]:
+    return [OrBetween(lambda thick: slices(thick, polytope), tube)] if polytope else []
+
+
+def is_within(between: fmpq, small: fmpq, large: fmpq) -> bool:
+    """Whether a circle is in another, by the squares of the distance of the centres and of the radii: d + r <= R."""
+    # d² + r² - R² <= -2 d r, of which the left side must not be positive.
+    excess = between + small - large
+    return small <= large and excess <= 0 and excess * excess >= 4 * between * small
+
+
+def _split(one: Quadric, other: Quadric, planes: tuple[Plane, ...], around: Floats) -> list[Part]:
+    """Two balls or two parallel tubes: on each side of the plane of the circle or lines in which they meet is one."""
+    if isinstance(one, Ball) and isinstance(other, Ball):
+        centre, arm = one.centre, minus(other.centre, one.centre)
+    else:
+        assert isinstance(one, Tube) and isinstance(other, Tube)
+        centre, arm = one.point, minus(other.point, one.point)
+        arm = plus(arm, one.axis, -dot(arm, one.axis) / dot(one.axis, one.axis))
+    if not any(arm):
+        return _of_one(one if one.square <= other.square else other, planes, around)
+    # |x - c|² - r² is less for the other beyond the plane, so that there the first is the one that bounds.
+    level = dot(arm, centre) + (dot(arm, arm) + one.square - other.square) / 2
+    found = _of_one(other, (*planes, Plane(arm, level)), around)
+    return found + _of_one(one, (*planes, Plane(scaled(arm, -1), -level)), around)
+
+
+def proved_bounds(a: Placed, b: Placed, is_narrow: Callable[[Bounds], bool]) -> Bounds:
+    """Bounds of the volume that are narrow enough."""
+    common = Common(a, b)
+    bits = FIRST
+    while bits <= LAST:
+        bounds = common.bounds(bits)
+        if bounds and is_narrow(bounds):
+            return bounds
+        bits *= 2
+    raise CertificateError("the common volume could not be bounded: the bodies may only touch")
