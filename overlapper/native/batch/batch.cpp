@@ -147,6 +147,21 @@ std::shared_ptr<Overlap> Overlaps::overlap(size_t row) const {
   return std::make_shared<Overlap>(std::move(bodies), tolerance, method);
 }
 
+const Overlaps::Patches& Overlaps::patches() const {
+  return patches_->get([this] {
+    Patches found;
+    found.centre.reserve(size());
+    found.moments.reserve(size());
+    for (size_t row = 0; row < size(); ++row) {
+      const bool any = status[row] == static_cast<std::int8_t>(Status::kOverlapping);
+      const Patch patch = any ? overlap(row)->patch() : PatchSums({}, {}).patch();
+      found.centre.push_back(patch.centre);
+      found.moments.push_back(patch.moments);
+    }
+    return found;
+  });
+}
+
 Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
   Overlaps chosen;
   chosen.examined = examined;

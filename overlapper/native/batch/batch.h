@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "batch/box_tree.h"
+#include "overlap/once.h"
 #include "overlap/overlap.h"
 #include "shapes/shape.h"
 
@@ -46,12 +47,23 @@ struct Overlaps {
   std::shared_ptr<const std::vector<Shape>> shapes;
   std::shared_ptr<const std::vector<PoseNumbers>> poses;
 
+  /// Of each row, a Patch.
+  struct Patches {
+    std::vector<Vec3> centre;
+    std::vector<Mat3> moments;
+  };
+
   size_t size() const { return pairs.size(); }
   void append(IndexPair pair, const Row& row);
   void reserve(size_t rows);
   /// The pair of that row with all that can be asked of it.
   std::shared_ptr<Overlap> overlap(size_t row) const;
   Overlaps select(std::span<const std::int64_t> rows) const;
+  /// Found when first asked for, pair by pair.
+  const Patches& patches() const;
+
+ private:
+  std::shared_ptr<Once<Patches>> patches_ = std::make_shared<Once<Patches>>();
 };
 
 /// The pairs of shapes that move: what was found in the last call is kept, and serves where it proves the same answer.

@@ -300,11 +300,19 @@ double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 
 
 }  // namespace
 
+namespace {
+
+WideVector point_inside(const OverlappingBodies& overlapping) {
+  const Inside& found = overlapping.inside();
+  return found.wide_ball ? found.wide_ball->centre : wide(found.ball.centre);
+}
+
+}  // namespace
+
 std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping) {
   if (!choose(traits(overlapping.bodies)).tries(Way::kSlicing)) return std::nullopt;
   const Arrangement& at = overlapping.at;
-  const Inside& found = overlapping.inside();
-  const WideVector inside = found.wide_ball ? found.wide_ball->centre : wide(found.ball.centre);
+  const WideVector inside = point_inside(overlapping);
   const auto round = measure_round(at.relative[0], at.relative[1], at.reference, inside);
   if (!round) return std::nullopt;
   MeasuresAndInertia answer;
@@ -322,6 +330,18 @@ std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping) {
   }
   answer.inertia = round->inertia;
   return answer;
+}
+
+std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, const Measures& measures) {
+  const Arrangement& at = overlapping.at;
+  const WideVector inside = point_inside(overlapping);
+  const bool swapped = at.order[0] == 1;
+  PatchSums sums(measures.centroid - at.reference - rounded(inside), measures.pulls[1].force);
+  if (!measure_round_patch(at.relative[0], at.relative[1], at.reference, inside, swapped ? 0 : 1, sums))
+    return std::nullopt;
+  Patch patch = sums.patch();
+  patch.centre += rounded(inside) + at.reference;
+  return patch;
 }
 
 MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {

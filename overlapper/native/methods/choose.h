@@ -7,6 +7,7 @@
 #include <span>
 
 #include "geometry/measures.h"
+#include "geometry/patch.h"
 #include "geometry/thresholds.h"
 #include "methods/dual/deepest_ball.h"
 #include "methods/dual/region.h"
@@ -130,6 +131,9 @@ Region finest_region(const OverlappingBodies& overlapping);
 /// By slices of the round shapes themselves, whatever the tolerance. Nothing for bodies that have another way, or where
 /// slicing gives up.
 std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping);
+
+/// The patch of a pair with such measures, by slices. Nothing where sliced() has nothing.
+std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, const Measures& measures);
 
 /// What measure_at_once() cannot measure well enough.
 MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping);

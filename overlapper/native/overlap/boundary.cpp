@@ -6,6 +6,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/ridges.h"
+#include "geometry/sum_in_pairs.h"
 
 namespace overlapper {
 namespace {
@@ -113,6 +114,30 @@ std::vector<int> contracted(std::span<const int> ring, std::span<const int> grou
 }
 
 }  // namespace
+
+Patch patch_of(const Region& region, Vec3 centroid) {
+  const Polytope& p = region.polytope;
+  const Ridges ridges(p);
+  const auto along_border = [&](const auto& use) {
+    for (int f = 0; f < p.facets(); ++f) {
+      cancellation_point();
+      if (region.facets[f].owner != 1) continue;
+      const auto ring = p.facet(f);
+      for (size_t i = 0; i < ring.size(); ++i) {
+        const int from = ring[i], to = ring[(i + 1) % ring.size()];
+        if (region.facets[ridges.left_of(to, from)].owner == 1) continue;
+        use(region.frame.axes * p.vertices[from], region.frame.axes * p.vertices[to]);
+      }
+    }
+  };
+  SumInPairs<Vec3> area;
+  along_border([&](Vec3 from, Vec3 to) { area.add(cross(from, to) / 2); });
+  PatchSums sums(centroid - region.reference - region.frame.origin, area.total());
+  along_border([&](Vec3 from, Vec3 to) { sums.add_edge(from, to); });
+  Patch patch = sums.patch();
+  patch.centre += region.frame.origin + region.reference;
+  return patch;
+}
 
 Boundary boundary_of(const Region& region, int bodies) {
   const Polytope& p = region.polytope;

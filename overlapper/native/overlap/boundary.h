@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "geometry/patch.h"
 #include "methods/dual/region.h"
 
 namespace overlapper {
@@ -21,6 +22,9 @@ struct Boundary {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
   }
 };
+/// The patch of a pair, from the ridges where the owner changes.
+Patch patch_of(const Region& region, Vec3 centroid);
+
 /// The boundary of the common set of that many bodies.
 Boundary boundary_of(const Region& region, int bodies);
 

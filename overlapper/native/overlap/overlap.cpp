@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "methods/clipping/clip.h"
 #include "methods/paper.h"
 #include "methods/tracing/trace.h"
 
@@ -93,6 +94,21 @@ const Region& Overlap::drawn() const {
 
 const Boundary& Overlap::boundary() const {
   return lazy().boundary.get([this] { return boundary_of(drawn(), static_cast<int>(bodies().size())); });
+}
+
+const Patch& Overlap::patch() const {
+  assert(pair());
+  return lazy().patch.get([this] { return patch_of_overlap(); });
+}
+
+Patch Overlap::patch_of_overlap() const {
+  if (status_ != Status::kOverlapping) return PatchSums({}, {}).patch();
+  std::optional<Patch> exact;
+  if (way() == Way::kClipping || way() == Way::kWideClipping) exact = clipped_patch(two_[0], two_[1]);
+  if (way() == Way::kClosedForm || way() == Way::kSlicing) exact = sliced_patch(overlapping_bodies(), measures());
+  Patch patch = exact ? *exact : patch_of(drawn(), centroid());
+  patch.area = Vec3{} + measures().pulls[1].force;
+  return patch;
 }
 
 Region Overlap::region_of_overlap() const {

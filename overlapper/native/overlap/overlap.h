@@ -57,6 +57,8 @@ class Overlap {
   /// Inertia tensor about the centroid, unit density; by slices where the measures have closed forms.
   Mat3 inertia() const;
   const Boundary& boundary() const;
+  /// Of a pair; without an area unless overlapping.
+  const Patch& patch() const;
 
   /// The slopes of the volume, per body: d volume / d translation, then / d rotation vector about the body's position;
   /// zeros unless overlapping.
@@ -83,6 +85,7 @@ class Overlap {
     Once<std::optional<MeasuresAndInertia>> sliced;
     Once<MeasuresAndInertia> in_full;
     Once<Boundary> boundary;
+    Once<Patch> patch;
     Once<Contact> contact;
     Once<ContactErrors> contact_errors;
     Once<Region> finest_region;
@@ -97,6 +100,7 @@ class Overlap {
   const std::optional<MeasuresAndInertia>& sliced() const;
   const MeasuresAndInertia& in_full() const;
   Region region_of_overlap() const;
+  Patch patch_of_overlap() const;
   OverlappingBodies overlapping_bodies() const;
   MeasuresAndInertia measured_in_full() const;
   const Region& finest_region() const;

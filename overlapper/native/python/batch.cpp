@@ -104,6 +104,25 @@ void column(nb::class_<Overlaps>& cls, const char* name, std::vector<Element> Ov
       nb::rv_policy::reference, nb::sig(sig.c_str()), doc);
 }
 
+template <class Element>
+void patch_column(nb::class_<Overlaps>& cls, const char* name, std::vector<Element> Overlaps::Patches::* values,
+                  std::initializer_list<size_t> row_shape, const char* doc) {
+  const std::vector<size_t> row(row_shape);
+  const std::string sig = "def " + std::string(name) + "(self) -> numpy.typing.NDArray[numpy.float64]";
+  cls.def_prop_ro(
+      name,
+      [values, row](nb::handle self) {
+        const Overlaps& overlaps = nb::cast<const Overlaps&>(self);
+        const std::vector<Element>& elements =
+            unlocked([&]() -> const Overlaps::Patches& { return overlaps.patches(); }).*values;
+        std::vector<size_t> shape{elements.size()};
+        shape.insert(shape.end(), row.begin(), row.end());
+        return nb::ndarray<nb::numpy, const double>(reinterpret_cast<const double*>(elements.data()), shape.size(),
+                                                    shape.data(), self);
+      },
+      nb::rv_policy::reference, nb::sig(sig.c_str()), doc);
+}
+
 void define_columns(nb::class_<Overlaps>& cls) {
   column<int>(cls, "pairs", &Overlaps::pairs, {2}, "int32", "(p, 2) indices of the shapes a and b of each row.");
   column<std::int8_t>(cls, "status", &Overlaps::status, {}, "int8",
@@ -124,6 +143,23 @@ void define_columns(nb::class_<Overlaps>& cls) {
       cls, "gradient", &Overlaps::gradient, {2, 6}, "float64",
       R"((p, 2, 6) d volume / d (translation, rotation vector about the body's own position) of a and of b, m² and m³;
 0 unless overlapping.)");
+  cls.def_prop_ro(
+      "patch_area",
+      [](nb::handle self) {
+        const auto& gradient = nb::cast<const Overlaps&>(self).gradient;
+        const double* first = gradient.empty() ? nullptr : &gradient[0][1][0];
+        const size_t shape[2] = {gradient.size(), 3};
+        const std::int64_t strides[2] = {12, 1};
+        return nb::ndarray<nb::numpy, const double>(first, 2, shape, self, strides);
+      },
+      nb::rv_policy::reference, nb::sig("def patch_area(self) -> numpy.typing.NDArray[numpy.float64]"),
+      "(p, 3) m², the area vector of the patch, from b to a; zeros unless overlapping.");
+  patch_column(
+      cls, "patch_centre", &Overlaps::Patches::centre, {3},
+      R"((p, 3) m, the centre of that area in the plane through the centroid; not a number without an area. It and the moments
+take some microseconds a pair when one of them is first asked for.)");
+  patch_column(cls, "patch_moments", &Overlaps::Patches::moments, {3, 3},
+               "(p, 3, 3) m⁴, ∫ x xᵀ dA of that area about its centre; zeros without an area.");
   column<int>(cls, "facets_touched", &Overlaps::facets_touched, {}, "int32",
               "(p,) how many planes of the shapes took part in building the polytope.");
   column<bool>(cls, "widened", &Overlaps::widened, {}, "bool_",

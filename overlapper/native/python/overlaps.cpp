@@ -94,6 +94,19 @@ void contact_property(nb::class_<Overlap>& cls, const char* name, Given given, G
       sig, doc);
 }
 
+/// Likewise, of the patch.
+template <class Getter, class Given>
+void patch_property(nb::class_<Overlap>& cls, const char* name, Given given, Getter getter, const nb::sig& sig,
+                    const char* doc) {
+  cls.def_prop_ro(
+      name,
+      [given, getter](const Overlap& o) -> nb::object {
+        if (!o.pair() || !given(o)) return nb::none();
+        return nb::cast(getter(computed(o, &Overlap::patch)), nb::rv_policy::move);
+      },
+      sig, doc);
+}
+
 std::string repr(const Overlap& o) {
   std::string text = "Overlap(" + std::string(status_name(o.status()));
   if (solid(o)) text += ", volume=" + number(o.volume()) + " ± " + number(o.volume_error()) + " m³";
@@ -287,6 +300,24 @@ void define_boundary(nb::class_<Overlap>& cls) {
       nb::sig("def patch(self) -> list[numpy.typing.NDArray[numpy.float64]]"),
       R"(Closed polygons (k, 3) along the ridges where the owner changes, the first point not repeated. For a pair they go
 counter-clockwise around a's part of the surface; for more bodies, around the part of each.)");
+  patch_property(
+      cls, "patch_area", [](const Overlap&) { return true; }, [](const Patch& p) { return to_numpy(p.area); },
+      nb::sig("def patch_area(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+      R"((3,) m², the area vector of b's part of the surface, which points to a as `normal` does: its length is the area within
+`patch`, seen along it, and for small overlaps what the volume grows by per metre of depth. The same as gradient[1, :3],
+and opposite to gradient[0, :3]; zeros unless overlapping. None for three or more bodies, as are the next two.)");
+  patch_property(
+      cls, "patch_centre", [](const Overlap& o) { return norm2(computed(o, &Overlap::patch).area) > 0; },
+      [](const Patch& p) { return to_numpy(p.centre); },
+      nb::sig("def patch_centre(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+      R"((3,) m, the centre of that area, in the plane through the centroid of the volume. None, too, without an area: unless
+the bodies overlap, and of a body inside the other.)");
+  patch_property(
+      cls, "patch_moments", [](const Overlap&) { return true; }, [](const Patch& p) { return to_numpy(p.moments); },
+      nb::sig("def patch_moments(self) -> numpy.typing.NDArray[numpy.float64] | None"),
+      R"((3, 3) m⁴, ∫ x xᵀ dA of that area about its centre, world axes; nothing along the area vector. Its eigenvectors and the
+roots of its eigenvalues over the area are the axes of the patch and its radii of gyration. Of round bodies it is that of
+the round patch, not of polygons.)");
   cls.def_prop_ro(
       "bounds",
       [](const Overlap& o) -> nb::object {

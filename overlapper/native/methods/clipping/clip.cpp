@@ -141,6 +141,22 @@ class Sums {
   double rounding_ = 0;
 };
 
+/// A patch that is wanted, of a body that comes second or, if swapped, first.
+struct WantedPatch {
+  bool swapped;
+  Patch patch{};
+
+  /// From the seam, which is counter-clockwise around the first body's part.
+  void find(const Workspace& w, Vec3 centroid, Vec3 force_on_first) {
+    PatchSums sums(centroid, swapped ? force_on_first : -force_on_first);
+    for (const Edge& e : w.seam) {
+      const Vec3 from = w.vertices[e.from], to = w.vertices[e.to];
+      swapped ? sums.add_edge(from, to) : sums.add_edge(to, from);
+    }
+    patch = sums.patch();
+  }
+};
+
 /// Distance of a common facet's plane from the middle of the common polytope.
 struct Slack {
   Vec3 normal;
@@ -198,7 +214,7 @@ double area_by_corners(Workspace& w) {
 /// Measures what clipping has left once more, about `middle` from corners placed in wider arithmetic. Leaves `common`
 /// as it is where even that is not enough.
 void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reach, double least_slack, Vec3 middle,
-                     Measures& measures, Pull& on_first) {
+                     Measures& measures, Pull& on_first, WantedPatch* wanted) {
   const Mat3 axes = thin_axes(w, middle);
   const std::optional<double> corner_rounding =
       place_in_wide({a, b, w.first.facets, w.apex, w.corners, middle, reach}, axes, w.vertices, w.wide_planes);
@@ -219,6 +235,9 @@ void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reac
   measures.centroid = middle + apply_transposed(axes, sums.centroid());
   const Pull pull = sums.pull();
   on_first = {apply_transposed(axes, pull.force), apply_transposed(axes, pull.moment)};
+  if (!wanted) return;
+  wanted->find(w, sums.centroid(), pull.force);
+  wanted->patch = turned(wanted->patch, transposed(axes), middle);
 }
 
 /// Measures as sums in doubles say, about `middle`. False if a plane passes that nearer than `least_slack`, which
@@ -248,7 +267,7 @@ bool comes_first(const Placed& a, const Placed& b) {
 }
 
 /// Clips in the coordinates of `a`, and finds the pull on that; false if doubles cannot tell.
-bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_first) {
+bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_first, WantedPatch* wanted = nullptr) {
   const auto [pose, reach, flat, doubt, apart] = relation(a, b);
   if (apart) return true;
   Workspace& w = workspace();
@@ -260,8 +279,14 @@ bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_
   const Sums sums(w, {1, 1, 1});
   double least_slack = 4 * doubt;  // rounding might hide what is thinner
   if (!measure(w, sums, middle, rounding(reach) + flat, least_slack, common)) return false;
-  if (common.measured) on_first = sums.pull();
-  else measure_widened(w, a, b, reach, least_slack, middle, common, on_first);
+  if (!common.measured) {
+    measure_widened(w, a, b, reach, least_slack, middle, common, on_first, wanted);
+    return true;
+  }
+  on_first = sums.pull();
+  if (!wanted) return true;
+  wanted->find(w, sums.centroid(), on_first.force);
+  wanted->patch.centre += middle;
   return true;
 }
 
@@ -321,6 +346,15 @@ std::optional<Measures> clip(const Placed& a, const Placed& b) {
     say_in_world(*common, on_first, a, b, swapped);
   else common.reset();
   return common;
+}
+
+std::optional<Patch> clipped_patch(const Placed& a, const Placed& b) {
+  WantedPatch wanted{!comes_first(a, b)};
+  const Placed &first = wanted.swapped ? b : a, &second = wanted.swapped ? a : b;
+  Measures common;
+  Pull on_first{};
+  if (!clip_in_first(first, second, common, on_first, &wanted) || !common.measured) return std::nullopt;
+  return turned(wanted.patch, first.pose.rotation, first.pose.translation);
 }
 
 std::optional<Measures> clip(std::span<const Placed> bodies) {

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "geometry/measures.h"
+#include "geometry/patch.h"
 #include "shapes/shape.h"
 
 namespace overlapper {
@@ -18,6 +19,9 @@ namespace overlapper {
 /// facets that cross, the segment between the two points that lie on both. Volume, moments and area vectors are sums
 /// over edges, in any order.
 std::optional<Measures> clip(const Placed& a, const Placed& b);
+
+/// The patch of two that clip() has measured, in coordinates of the world; otherwise there may be none.
+std::optional<Patch> clipped_patch(const Placed& a, const Placed& b);
 
 /// The same for any number of bodies: the common polytope of the first two meets the third, and so on. Nothing, too,
 /// where doubles are not enough to measure it.

@@ -147,6 +147,11 @@ class Bundle {
     sum_.terms += size * (rate + std::abs(s.x) * nx + std::abs(s.y) * ny);
     sum_.border += all * std::sqrt(norm2(normal));
     sum_.area += owned * all;
+    if (stack_.view && stack_.view->sees(line.owner)) {
+      const double facing = dot(normal, stack_.view->normal);
+      for (int k = 0; k < n_; ++k) weight[k] *= facing;
+      see(from, to, weight);
+    }
   }
 
   /// What the side of a cylinder has of them.
@@ -188,6 +193,25 @@ class Bundle {
     // A cylinder's normal has length radius / half chord, as its area has.
     sum_.border += area;
     sum_.area += area;
+    if (stack_.view && stack_.view->sees(line.owner)) {
+      const Vec3 facing = stack_.view->normal;
+      for (int k = 0; k < n_; ++k) weight[k] *= n.x * facing.x + n.y * facing.y + slope[k] * facing.z;
+      see(from, to, weight);
+    }
+  }
+
+  /// Of such edges, each as long as it looks.
+  void see(const Points& from, const Points& to, const Row& length) {
+    const View& view = *stack_.view;
+    for (int k = 0; k < n_; ++k) {
+      const double t = nodes_.t[k], w = length[k], u0 = view.u0 + view.u.z * t, v0 = view.v0 + view.v.z * t;
+      const double u = u0 + view.u.x * from.x[k] + view.u.y * from.y[k],
+                   v = v0 + view.v.x * from.x[k] + view.v.y * from.y[k];
+      const double p = u0 + view.u.x * to.x[k] + view.u.y * to.y[k], q = v0 + view.v.x * to.x[k] + view.v.y * to.y[k];
+      sum_.seen[0] += w, sum_.seen[1] += w / 2 * (u + p), sum_.seen[2] += w / 2 * (v + q);
+      sum_.seen[3] += w / 3 * (u * u + u * p + p * p), sum_.seen[5] += w / 3 * (v * v + v * q + q * q);
+      sum_.seen[4] += w / 6 * (2 * u * v + u * q + p * v + 2 * p * q);
+    }
   }
 
   /// The arcs from p to q, counter-clockwise: the segments beyond their chords, and the zone of the sphere.
@@ -196,6 +220,9 @@ class Bundle {
     const double level = ball.level, stretch = 1 + dot(ball.shear, ball.shear), along = std::abs(2 * ball.along);
     const double slack = std::abs(ball.slack);
     const Row& radius = sides_.half[stack_.ball];
+    // Nearly all of a circle lies between two lines that leave nearly all of the disc only where these are one, or turn
+    // back; else next to nothing.
+    const bool back = slicing::cross(stack_.line[before].normal, stack_.line[after].normal) <= 0;
     Row one, two;
     beyond(stack_.line[before], one), beyond(stack_.line[after], two);
     Row length, distance, ax, ay, angle, sine, cosine;
@@ -207,7 +234,7 @@ class Bundle {
           x * (0.5 * (p.x[k] + q.x[k]) - sides_.centre_x[k]) + y * (0.5 * (p.y[k] + q.y[k]) - sides_.centre_y[k]);
       // Of a chord that rounding may have turned round, what is known of the two lines that it lies between tells the
       // side.
-      const double sure = one[k] > 0 && two[k] > 0 ? -std::abs(beside) : std::abs(beside);
+      const double sure = back && one[k] > 0 && two[k] > 0 ? -std::abs(beside) : std::abs(beside);
       const double d = l < 1e-6 * radius[k] ? sure : beside, h = 0.5 * l;
       const double whole = std::max(std::sqrt(h * h + d * d), DBL_MIN);
       length[k] = l, distance[k] = d, ax[k] = x, ay[k] = y;
@@ -401,6 +428,20 @@ void add_face(const Line& plane, const Stack& stack, const Outline& outline, dou
   sum.blur += area * (std::abs(plane.offset) + std::abs(plane.rate * t)) / std::abs(plane.rate);
   if (plane.owner != kCut) sum.area += area;
   const double side = plane.rate > 0 ? 1 : -1;
+  if (stack.view && stack.view->sees(plane.owner)) {
+    const View& view = *stack.view;
+    const double facing = side * view.normal.z, u = view.u0 + view.u.z * t, v = view.v0 + view.v.z * t;
+    // In u and v, which are linear in x and y.
+    const auto first = [&](Vec3 by) { return by.x * face.first.x + by.y * face.first.y; };
+    const auto second = [&](Vec3 a, Vec3 b) {
+      return a.x * b.x * face.squares.x + a.y * b.y * face.squares.y + (a.x * b.y + a.y * b.x) * face.products.z;
+    };
+    sum.seen[0] += facing * area;
+    sum.seen[1] += facing * (u * area + first(view.u)), sum.seen[2] += facing * (v * area + first(view.v));
+    sum.seen[3] += facing * (u * u * area + 2 * u * first(view.u) + second(view.u, view.u));
+    sum.seen[4] += facing * (u * v * area + u * first(view.v) + v * first(view.u) + second(view.u, view.v));
+    sum.seen[5] += facing * (v * v * area + 2 * v * first(view.v) + second(view.v, view.v));
+  }
   sum.pull[plane.owner] += Vec3{0, 0, side * area};
   sum.across += t * side * area;
   sum.terms += std::abs(t) * area;

@@ -90,6 +90,8 @@ class Measuring {
   double extent = 0;                           ///< m: no point of the common set is farther from the one inside
   const slicing::Enclosure* common = nullptr;  ///< what lies outside of that belongs to no piece
   Bounds box;                                  ///< around what is added, if the common set is enclosed
+  PatchSums* patch = nullptr;                  ///< if wanted, of what belongs to `owner`
+  int owner = 0;
 
  private:
   /// 1 if a wall leaves nothing of one of the rounds, -1 if it leaves all of one, beyond rounding.
@@ -202,12 +204,37 @@ class Measuring {
     totals.products += {second(tip.y, tip.z, n.y, n.z), second(tip.z, tip.x, n.z, n.x), second(tip.x, tip.y, n.x, n.y)};
     // The force on the ball acts along a line through its centre and the tip.
     const Vec3 force = disc * n, moment = cross(tip, force);
-    const auto act = [&](int owner, double side) {
-      if (owner == 0) totals.pull += side * force, totals.moment += side * moment;
-      if (owner != slicing::kCut) totals.unbalanced += side * force;
+    const auto act = [&](int body, double side) {
+      if (body == 0) totals.pull += side * force, totals.moment += side * moment;
+      if (body != slicing::kCut) totals.unbalanced += side * force;
     };
     act(ball.owner, -1);
     if (wall) act(wall->owner, 1);
+    if (patch && wall && (ball.owner == owner || wall->owner == owner))
+      add_disc_to_patch(tip + height * n, n, ball.owner == owner ? -disc : disc, disc / pi);
+  }
+
+  /// A disc of that area, negative where it is seen from behind, and of a radius of which that is the square.
+  void add_disc_to_patch(Vec3 centre, Vec3 normal, double area, double square) {
+    const double w = area * dot(normal, patch->normal()), quarter = square / 4;
+    const double u = dot(centre - patch->origin(), patch->u()), v = dot(centre - patch->origin(), patch->v());
+    const double across_u = dot(normal, patch->u()), across_v = dot(normal, patch->v());
+    patch->add(w, w * u, w * v, w * (u * u + quarter * (1 - across_u * across_u)),
+               w * (u * v - quarter * across_u * across_v), w * (v * v + quarter * (1 - across_v * across_v)));
+  }
+
+  /// What the patch is seen in, in coordinates of the stack.
+  slicing::View view_of(const slicing::Stack& stack) const {
+    const Vec3 u = patch->u(), v = patch->v(), normal = patch->normal(), from = offset_ - patch->origin();
+    slicing::View view;
+    view.owner = owner;
+    view.rest = stack.ball >= 0 && stack.quadric[stack.ball].owner == owner;
+    view.u0 = dot(from, u), view.v0 = dot(from, v);
+    view.u = {dot(stack.l, u), dot(stack.m, u), dot(stack.t, u)};
+    view.v = {dot(stack.l, v), dot(stack.m, v), dot(stack.t, v)};
+    const double side = view.rest ? -1 : 1;
+    view.normal = side * Vec3{dot(stack.l, normal), dot(stack.m, normal), dot(stack.n, normal)};
+    return view;
   }
 
   /// Pieces that only planes bound, corner by corner in doubles; false, and nothing is added, if these are not sure of
@@ -218,6 +245,8 @@ class Measuring {
     for (size_t i = 0; i < walls_.size(); ++i)
       if (!polytope_.cut({rounded(walls_[i].normal), walls_[i].slack.head, static_cast<int>(i)})) return false;
     Totals piece;
+    std::optional<PatchSums> seen;
+    if (patch) seen = *patch;
     const Vec3 apex = polytope_.corners[0].at;
     bool closed = true;
     polytope_.for_faces([&](int wall, std::span<const Vec3> ring) {
@@ -229,6 +258,7 @@ class Measuring {
       for (size_t i = 2; i < ring.size(); ++i) {
         const Vec3 a = ring[0], b = ring[i - 1], c = ring[i], triangle = 0.5 * cross(b - a, c - a);
         force += triangle, moment += cross((a + b + c) / 3, triangle);
+        if (seen && walls_[wall].owner == owner) seen->add_triangle(a, b, c, triangle);
         const double tetrahedron = dot(a - apex, triangle) / 3;
         const Vec3 sum = apex + a + b + c;
         piece.volume += tetrahedron;
@@ -239,15 +269,17 @@ class Measuring {
         }
       }
       const double area = norm(force);
-      const int owner = walls_[wall].owner;
+      const int of_wall = walls_[wall].owner;
       piece.border += area;
-      if (owner != slicing::kCut) piece.area += area, piece.unbalanced += force;
-      if (owner == 0) piece.pull += force, piece.moment += moment;
+      if (of_wall != slicing::kCut) piece.area += area, piece.unbalanced += force;
+      if (of_wall == 0) piece.pull += force, piece.moment += moment;
     });
     // Every cut moves corners by some roundings of the box's numbers.
     piece.error = 16 * DBL_EPSILON * norm(max(abs(box.lower), abs(box.upper))) * piece.border;
     if (!closed || !(piece.error <= kSure * (totals.volume + piece.volume))) return false;
-    if (!outside(piece.first / piece.volume)) totals.add(piece);
+    if (outside(piece.first / piece.volume)) return true;
+    totals.add(piece);
+    if (patch) *patch = *seen;
     return true;
   }
 
@@ -279,9 +311,11 @@ class Measuring {
   bool outside(Vec3 centroid) const { return common && common->excludes(centroid + offset_); }
 
   bool add_stack() {
-    const std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent);
+    std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent);
     if (!stack || !slicing::find_intervals(*stack, false, intervals_)) return false;
     if (intervals_.empty()) return true;
+    slicing::View view;
+    if (patch) view = view_of(*stack), stack->view = &view;
     best_.integrals = {};
     double open = std::numeric_limits<double>::infinity();
     const auto closed = [&] { return open <= kClosed * (totals.volume + best_.integrals.volume); };
@@ -363,6 +397,7 @@ class Measuring {
     totals.pull += pull;
     totals.moment += turned(s.moment[0]) + cross(offset_, pull);
     totals.unbalanced += turned(s.pull[0] + s.pull[1]);
+    if (patch) patch->add(s.seen[0], s.seen[1], s.seen[2], s.seen[3], s.seen[4], s.seen[5]);
     add_second(stack, s, first, offset_, totals);
   }
 
@@ -398,13 +433,13 @@ Mat3 inertia_about(Vec3 centroid, const Totals& totals) {
   return {{yy + zz, -xy, -zx}, {-xy, xx + zz, -yz}, {-zx, -yz, xx + yy}};
 }
 
-}  // namespace
-
-std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside) {
+std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside,
+                                      int owner, PatchSums* patch) {
   thread_local slicing::Pieces of_a, of_b;
   thread_local Measuring measuring;
   of_a.clear(), of_b.clear();
   measuring.totals = {};
+  measuring.owner = owner, measuring.patch = patch;
   measuring.extent = std::min(slicing::extent(a, rounded(inside)), slicing::extent(b, rounded(inside)));
   // Of many pieces, few lie near the common set.
   thread_local slicing::Enclosure around;
@@ -450,6 +485,17 @@ std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec
     result.facets_touched += static_cast<int>(
         std::ranges::count_if(pieces->walls, [](const Wall& wall) { return wall.owner != slicing::kCut; }));
   return result;
+}
+
+}  // namespace
+
+std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside) {
+  return measured(a, b, reference, inside, 0, nullptr);
+}
+
+bool measure_round_patch(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside, int owner,
+                         PatchSums& patch) {
+  return measured(a, b, reference, inside, owner, &patch).has_value();
 }
 
 }  // namespace overlapper

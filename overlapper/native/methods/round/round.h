@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "geometry/measures.h"
+#include "geometry/patch.h"
 #include "geometry/wide.h"
 #include "shapes/shape.h"
 
@@ -29,5 +30,10 @@ struct RoundMeasures {
 /// from the point inside, found in double-double, so that a contact of any depth is measured to the same digits.
 /// Compare Strobl, Formella and Pöschel (2016), who integrate a ball over a tetrahedron in closed form.
 std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside);
+
+/// Adds to `patch`, which counts from `inside`, what of the surface is `owner`'s of a pair that measure_round()
+/// measures, to the same digits. False if that does not.
+bool measure_round_patch(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside, int owner,
+                         PatchSums& patch);
 
 }  // namespace overlapper

@@ -224,6 +224,7 @@ void Integrals::add(double weight, const Integrals& other) {
   border += weight * other.border;
   correction += weight * other.correction;
   blur += weight * other.blur;
+  for (int i = 0; i < 6; ++i) seen[i] += weight * other.seen[i];
 }
 
 }  // namespace overlapper::slicing

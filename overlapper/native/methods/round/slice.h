@@ -64,6 +64,17 @@ struct Line {
   double offset_tail = 0, rate_tail = 0;
 };
 
+/// What of a surface is seen along a direction, in coordinates u and v across it.
+struct View {
+  int owner = 0;      ///< of the surface
+  bool rest = false;  ///< instead of it, all other surfaces are seen, from behind: these have no arcs, if it has
+  double u0 = 0, v0 = 0;
+  Vec3 u, v;    ///< what u and v grow by along x, y and t
+  Vec3 normal;  ///< against the direction, along l, m and n
+
+  bool sees(int of_owner) const { return (of_owner == owner) != rest; }
+};
+
 /// The common set of a polytope, at most two cylinders and at most one ball, as a stack of slices.
 struct Stack {
   std::array<Line, kMostLines + 8> line;
@@ -75,6 +86,7 @@ struct Stack {
   std::optional<Line> low_plane, high_plane;  ///< planes parallel to the slices, if such end the stack
   Vec3 l, m, n, t;                            ///< the axes, in the world
   Point shear;                                ///< what t has along l and m
+  const View* view = nullptr;                 ///< if anything is looked at
 };
 
 /// The lines and the disc of one slice.
@@ -126,11 +138,12 @@ struct Integrals {
   double area = 0;         ///< of what the bodies own of the surface
   /// ∫ N dA and ∫ X × N dA along l, m and n: per body of its surface, and of the cuts through bodies.
   std::array<Vec3, 3> pull{}, moment{};
-  double across = 0;      ///< ∫ t N dA along n, over all of the surface: the volume, by other integrals
-  double terms = 0;       ///< the size of the terms of that
-  double border = 0;      ///< ∫ dA over all of the surface
-  double correction = 0;  ///< of the volume: what the tails of planes add to first order
-  double blur = 0;        ///< of the volume: the size of terms that lines are the sums of
+  double across = 0;             ///< ∫ t N dA along n, over all of the surface: the volume, by other integrals
+  double terms = 0;              ///< the size of the terms of that
+  double border = 0;             ///< ∫ dA over all of the surface
+  double correction = 0;         ///< of the volume: what the tails of planes add to first order
+  double blur = 0;               ///< of the volume: the size of terms that lines are the sums of
+  std::array<double, 6> seen{};  ///< ∫ 1, u, v, u², uv and v² over what a view shows
 
   void add(double weight, const Integrals& other);
 };

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "geometry/vec.h"
+
+namespace overlapper {
+
+/// What lies within the line where the surfaces of two bodies cross, seen along the area vector of either's part: every
+/// surface within that line has the same integrals of functions that do not change along that direction (Gauss).
+struct Patch {
+  Vec3 area;    ///< m²: the area vector of the second body's part of the surface, so that it points to the first
+  Vec3 centre;  ///< of that area, in the plane through the centroid of the volume; not a number without an area
+  Mat3 moments{{}, {}, {}};  ///< m⁴: ∫ x xᵀ dA about the centre
+};
+
+/// The same in other coordinates.
+inline Patch turned(const Patch& patch, const Mat3& rotation, Vec3 translation) {
+  return {rotation * patch.area, rotation * patch.centre + translation,
+          rotation * patch.moments * transposed(rotation)};
+}
+
+/// The plane that a patch is seen in, with integrals over it of 1, u, v, u², uv and v², right-handed coordinates there.
+class PatchSums {
+ public:
+  PatchSums(Vec3 origin, Vec3 area) : origin_(origin), area_(area), size_(norm(area)) {
+    normal_ = size_ > 0 ? area / size_ : Vec3{0, 0, 1};
+    u_ = any_orthogonal(normal_);
+    v_ = cross(normal_, u_);
+  }
+
+  Vec3 origin() const { return origin_; }
+  Vec3 normal() const { return normal_; }
+  Vec3 u() const { return u_; }
+  Vec3 v() const { return v_; }
+
+  /// Integrals over a part, or over all that is on the left of a line.
+  void add(double one, double u, double v, double uu, double uv, double vv) {
+    one_ += one, u1_ += u, v1_ += v, uu_ += uu, uv_ += uv, vv_ += vv;
+  }
+
+  /// Along an edge of the border, counter-clockwise seen against the normal (Green).
+  void add_edge(Vec3 from, Vec3 to) {
+    const double a = dot(from - origin_, u_), b = dot(from - origin_, v_);
+    const double c = dot(to - origin_, u_), d = dot(to - origin_, v_), twice = a * d - b * c;
+    add(twice / 2, twice / 6 * (a + c), twice / 6 * (b + d), twice / 12 * (a * a + a * c + c * c),
+        twice / 24 * (a * d + 2 * a * b + 2 * c * d + c * b), twice / 12 * (b * b + b * d + d * d));
+  }
+
+  /// A triangle of which that is the area vector.
+  void add_triangle(Vec3 p, Vec3 q, Vec3 r, Vec3 area) {
+    const double w = dot(area, normal_);
+    double au[3], av[3];
+    int i = 0;
+    for (const Vec3 corner : {p, q, r}) au[i] = dot(corner - origin_, u_), av[i] = dot(corner - origin_, v_), ++i;
+    const double su = au[0] + au[1] + au[2], sv = av[0] + av[1] + av[2];
+    const auto second = [&](const double* x, const double* y, double sums) {
+      return w / 12 * (x[0] * y[0] + x[1] * y[1] + x[2] * y[2] + sums);
+    };
+    add(w, w / 3 * su, w / 3 * sv, second(au, au, su * su), second(au, av, su * sv), second(av, av, sv * sv));
+  }
+
+  Patch patch() const {
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    Patch result{area_, {kNone, kNone, kNone}};
+    if (!(size_ > 0)) return result;
+    const double u = u1_ / one_, v = v1_ / one_;
+    result.centre = origin_ + (u * u_ + v * v_);
+    const double uu = uu_ - u * u1_, uv = uv_ - u * v1_, vv = vv_ - v * v1_;
+    const Vec3 along_u = uu * u_ + uv * v_, along_v = uv * u_ + vv * v_;
+    result.moments = {u_.x * along_u + v_.x * along_v, u_.y * along_u + v_.y * along_v,
+                      u_.z * along_u + v_.z * along_v};
+    return result;
+  }
+
+ private:
+  Vec3 origin_, area_, normal_, u_, v_;
+  double size_;
+  double one_ = 0, u1_ = 0, v1_ = 0, uu_ = 0, uv_ = 0, vv_ = 0;
+};
+
+}  // namespace overlapper

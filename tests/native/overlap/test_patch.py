@@ -1,0 +1,173 @@
+"""What is said of the patch that two bodies share a border along: its area vector, centre and second moments."""
+
+import exact
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from strategies import directions, overlapping_points, quaternion
+
+from overlapper import Batch, Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
+
+FLOOR = HalfSpace([0, 0, 1], 0)
+CUBE = Box([0.5, 0.5, 0.5])
+TETRA = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], float)
+SHAPES = {
+    "sphere": Sphere(0.5),
+    "capsule": Capsule(0.3, 0.8),
+    "cylinder": Cylinder(0.4, 0.9),
+    "box": CUBE,
+    "hull": Hull(TETRA * 0.6),
+    "rounded hull": RoundedHull(TETRA * 0.3, 0.2),
+}
+STEP = 1e-4
+TO_X = (0, np.sqrt(0.5), 0, np.sqrt(0.5))
+
+
+def disc(radius, normal):
+    across = np.eye(3) - np.outer(normal, normal)
+    return np.pi * radius**2 * np.array(normal, float), np.pi * radius**4 / 4 * across
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "patch"),
+    [
+        (Placed(CUBE, (1, 2, 0.4)), FLOOR, ([0, 0, 1], np.diag([1 / 12, 1 / 12, 0]))),
+        (Placed(CUBE, (0.6, 0, 0)), Box([0.5, 2, 1]), ([1, 0, 0], np.diag([0, 1 / 12, 1 / 12]))),
+        (Placed(Sphere(0.5), (1, 2, 0.4)), FLOOR, disc(0.3, (0, 0, 1))),
+        (Placed(Sphere(0.5), (0.6, 0, 0)), Sphere(0.5), disc(0.4, (1, 0, 0))),
+        (Placed(Capsule(0.5, 1), (0, 0, 0.9)), FLOOR, disc(0.3, (0, 0, 1))),
+        (Placed(Cylinder(0.5, 2), (1, 2, 0.9)), FLOOR, disc(0.5, (0, 0, 1))),
+        (Placed(Cylinder(0.5, 2), (0, 0, 0.4), TO_X), FLOOR, ([0, 0, 1.2], np.diag([0.4, 0.036, 0]))),
+    ],
+)
+def test_patches_of_simple_bodies(a, b, patch):
+    answer, (area, moments) = overlap(a, b), patch
+    assert_allclose(answer.patch_area, area, atol=1e-12)
+    assert_allclose(answer.patch_moments, moments, atol=1e-12)
+    assert_allclose(answer.patch_centre, answer.centroid, atol=1e-12)
+
+
+def test_of_a_plate_pierced_the_patch_is_what_two_lines_leave():
+    answer = overlap(Placed(Sphere(0.5), (1, 2, 0.4)), Box([9, 9, 1e-3]))
+    assert len(answer.patch) == 2
+    assert answer.patch_area == pytest.approx([0, 0, np.pi * (0.401**2 - 0.399**2)], abs=1e-12)
+
+
+def test_the_patch_is_that_of_the_exact_polytope():
+    for seed in range(20):
+        p, q = overlapping_points(np.random.default_rng(seed), low=4, high=10)
+        answer, truth = overlap(p, q), exact.common(exact.hull(p), exact.hull(q))
+        if answer.patch_centre is None:
+            assert len({facet.owners for facet in truth.facets}) == 1
+            continue
+        area, centre, moments = truth_of_patch(truth)
+        assert_allclose(answer.patch_area, area, atol=1e-12)
+        assert_allclose(answer.patch_centre, centre, atol=1e-12)
+        assert_allclose(answer.patch_moments, moments, atol=1e-12)
+
+
+def truth_of_patch(truth):
+    """By triangles of the second body's facets, seen along their area vector, about the centroid."""
+    about = np.array(truth.centroid, float)
+    triangles, areas = [], []
+    for facet in truth.facets:
+        if facet.owners != (1,):
+            continue
+        corners = np.array([exact.coordinates(corner) for corner in facet.ring], float) - about
+        for i in range(1, len(corners) - 1):
+            triangle = corners[[0, i, i + 1]]
+            area = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0]) / 2
+            triangles.append(triangle), areas.append(area)
+    triangles, areas = np.array(triangles), np.array(areas)
+    area = areas.sum(axis=0)
+    normal = area / np.linalg.norm(area)
+    seen = triangles @ (np.eye(3) - np.outer(normal, normal))
+    weights, sums = areas @ normal, seen.sum(axis=1)
+    centre = (weights / 3) @ sums / weights.sum()
+    second = np.einsum("t,tki,tkj->ij", weights / 12, seen, seen) + np.einsum("t,ti,tj->ij", weights / 12, sums, sums)
+    return area, about + centre, second - weights.sum() * np.outer(centre, centre)
+
+
+def second_moments(answer, about):
+    """∫ x xᵀ dV about a point."""
+    inertia, arm = answer.inertia, answer.centroid - about
+    return np.trace(inertia) / 2 * np.eye(3) - inertia + answer.volume * np.outer(arm, arm)
+
+
+def pushed(shape, position, turned, other):
+    """The overlap, that of the shape pushed a step in against the patch's normal, and that of it pulled out."""
+    answer = overlap(Placed(shape, position, turned), other)
+    step = STEP * answer.patch_area / np.linalg.norm(answer.patch_area)
+    return answer, *(overlap(Placed(shape, position + by, turned), other) for by in (-step, step))
+
+
+@pytest.mark.parametrize("first", SHAPES)
+@pytest.mark.parametrize("second", SHAPES)
+def test_moments_of_the_patch_are_slopes_of_those_of_the_volume(first, second):
+    """As a moves against the normal by a length, its surface inside b sweeps the patch, seen along the normal."""
+    rng = np.random.default_rng([ord(first[-1]), ord(second[-1]), len(first), len(second)])
+    for _ in range(3):
+        b = Placed(SHAPES[second], (0, 0, 0), quaternion(rng))
+        away, turned = directions(rng, 1)[0], quaternion(rng)
+        reach = overlap(Placed(SHAPES[first], 1e-9 * away, turned), b)
+        answer, nearer, farther = pushed(SHAPES[first], away * 0.7 * reach.depth, turned, b)
+        size = np.linalg.norm(answer.patch_area)
+        normal = answer.patch_area / size
+        about = answer.patch_centre
+        slope = (second_moments(nearer, about) - second_moments(farther, about)) / (2 * STEP)
+        across = np.eye(3) - np.outer(normal, normal)
+        assert_allclose(across @ slope @ across, answer.patch_moments, atol=3e-6 * size**2)
+        slope = (nearer.volume * nearer.centroid - farther.volume * farther.centroid) / (2 * STEP)
+        assert_allclose(across @ slope / size, across @ answer.patch_centre, atol=3e-6)
+        assert_array_equal(answer.patch_area, answer.gradient[1, :3])
+
+
+@pytest.mark.parametrize("first", SHAPES)
+@pytest.mark.parametrize("second", SHAPES)
+def test_the_patch_turns_with_the_bodies_and_knows_no_order(first, second):
+    rng = np.random.default_rng(len(first) + len(second))
+    a, b = Placed(SHAPES[first], (0.4, 0.3, 0.2), quaternion(rng)), Placed(SHAPES[second], (0, 0, 0), quaternion(rng))
+    answer, swapped = overlap(a, b), overlap(b, a)
+    assert answer
+    assert_allclose(swapped.patch_area, -answer.patch_area, atol=1e-12)
+    assert_allclose(swapped.patch_centre, answer.patch_centre, atol=1e-12)
+    assert_allclose(swapped.patch_moments, answer.patch_moments, atol=1e-12)
+    far = Placed(a.shape, np.add(a.position, 64), a.orientation), Placed(b.shape, (64, 64, 64), b.orientation)
+    assert_allclose(overlap(*far).patch_moments, answer.patch_moments, atol=1e-11)
+    assert_allclose(overlap(*far).patch_centre - 64, answer.patch_centre, atol=1e-11)
+
+
+def test_where_there_is_no_patch():
+    apart, inside = overlap(CUBE, Placed(CUBE, (3, 0, 0))), overlap(Placed(Sphere(0.1), (0.1, 0, 0)), CUBE)
+    for answer in (apart, inside):
+        assert_array_equal(answer.patch_area, np.zeros(3))
+        assert answer.patch_centre is None
+        assert_array_equal(answer.patch_moments, np.zeros((3, 3)))
+    three = overlap(CUBE, CUBE, Sphere(0.2))
+    assert three.patch_area is three.patch_centre is three.patch_moments is None
+
+
+def test_patches_of_a_batch_are_those_of_its_pairs():
+    rng = np.random.default_rng(1)
+    shapes = [*SHAPES.values(), FLOOR, Hull(rng.normal(size=(200, 3)) * 0.3)]
+    positions = rng.uniform(-0.3, 0.3, (len(shapes), 3))
+    found = Batch(shapes).overlaps(positions, np.array([quaternion(rng) for _ in shapes]), separated=True)
+    assert found.patch_area.shape == found.patch_centre.shape == (len(found), 3)
+    for row, area, centre, moments in zip(found, found.patch_area, found.patch_centre, found.patch_moments):
+        assert_array_equal(area, row.patch_area)
+        assert_array_equal(centre, np.full(3, np.nan) if row.patch_centre is None else row.patch_centre)
+        assert_array_equal(moments, row.patch_moments)
+    few = found[found.volume > np.median(found.volume)]
+    assert_array_equal(few.patch_moments, found.patch_moments[found.volume > np.median(found.volume)])
+    nothing = found[:0]
+    assert (nothing.patch_area.shape, nothing.patch_moments.shape) == ((0, 3), (0, 3, 3))
+
+
+def test_the_patch_of_the_articles_method_is_that_of_its_polytope():
+    a, b = Placed(CUBE, (0.1, 0.2, 0.8), rotation_of(3)), Placed(CUBE, (0, 0, 0), rotation_of(4))
+    paper, auto = overlap(a, b, method="paper"), overlap(a, b)
+    assert_allclose(paper.patch_moments, auto.patch_moments, atol=1e-9)
+
+
+def rotation_of(seed):
+    return quaternion(np.random.default_rng(seed))
