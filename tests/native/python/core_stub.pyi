@@ -556,6 +556,29 @@ class Overlap:
         """
 
     @property
+    def patch_area(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (3,) m², the area vector of b's part of the surface, which points to a as `normal` does: its length is the area within
+        `patch`, seen along it, and for small overlaps what the volume grows by per metre of depth. The same as gradient[1, :3],
+        and opposite to gradient[0, :3]; zeros unless overlapping. None for three or more bodies, as are the next two.
+        """
+
+    @property
+    def patch_centre(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (3,) m, the centre of that area, in the plane through the centroid of the volume. None, too, without an area: unless
+        the bodies overlap, and of a body inside the other.
+        """
+
+    @property
+    def patch_moments(self) -> numpy.typing.NDArray[numpy.float64] | None:
+        """
+        (3, 3) m⁴, ∫ x xᵀ dA of that area about its centre, world axes; nothing along the area vector. Its eigenvectors and the
+        roots of its eigenvalues over the area are the axes of the patch and its radii of gyration. Of round bodies it is that of
+        the round patch, not of polygons.
+        """
+
+    @property
     def bounds(self) -> numpy.typing.NDArray[numpy.float64] | None:
         """
         (2, 3) lower and upper corner of the box around the common polytope; None unless overlapping.
@@ -709,6 +732,25 @@ class Overlaps:
         """
         (p, 2, 6) d volume / d (translation, rotation vector about the body's own position) of a and of b, m² and m³;
         0 unless overlapping.
+        """
+
+    @property
+    def patch_area(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 3) m², the area vector of the patch, from b to a; zeros unless overlapping.
+        """
+
+    @property
+    def patch_centre(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 3) m, the centre of that area in the plane through the centroid; not a number without an area. It and the moments
+        take some microseconds a pair when one of them is first asked for.
+        """
+
+    @property
+    def patch_moments(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p, 3, 3) m⁴, ∫ x xᵀ dA of that area about its centre; zeros without an area.
         """
 
     @property
