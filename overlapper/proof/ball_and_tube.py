@@ -14,6 +14,7 @@ from flint import acb, arb, fmpq
 from overlapper.proof.corners import Polytope
 from overlapper.proof.one_quadric import root
 from overlapper.proof.pieces import Ball, Tube
+from overlapper.proof.signs import Undecided, is_positive
 from overlapper.proof.slices import (
     ZERO,
     Form,
@@ -23,13 +24,11 @@ from overlapper.proof.slices import (
     Point,
     Slices,
     T,
-    Undecided,
     along,
     at,
     combined,
     half_turn,
     integrated,
-    is_positive,
     of_form,
     points_between,
     product,

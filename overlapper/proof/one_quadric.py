@@ -2,141 +2,202 @@
 
 Every edge of the polytope spans a triangle: of a ball with the foot of the centre on the plane of a facet, of a
 cylinder with the axis in a slice across it. In polar coordinates about the apex of a triangle all integrals are
-elementary, and the signed sum over all edges is the volume. Which case of a formula holds is decided without rounding.
-No term jumps, so that nothing is lost where a corner or an edge lies on the quadric, and more bits are more digits.
+elementary, and the signed sum over all edges is the volume. Which case of a formula holds is decided in balls, and
+without rounding where these are too wide. No term jumps, so that nothing is lost where a corner or an edge lies on the
+quadric, and more bits are more digits.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
 
 from flint import arb, fmpq
 
 from overlapper.proof.corners import Polytope
 from overlapper.proof.pieces import Ball, Tube
+from overlapper.proof.signs import Undecided, is_positive, sign
 from overlapper.proof.vectors import Vector, cross, dot, minus, plus, scaled
 
+Number = Any  # fmpq, or arb
+Triple = tuple[Number, Number, Number]
 
-def root(square: fmpq) -> arb:
+
+def root(square: Number) -> arb:
     """Of what is not negative."""
-    return arb(square).nonnegative_part().sqrt()
+    found: arb = arb(square).nonnegative_part().sqrt()
+    return found
 
 
 def in_ball(ball: Ball, polytope: Polytope) -> arb:
     """A cone from the centre over a facet: as far as the facet is in the ball a third of height times area, and where
     it is outside a third of the radius times the area of the sphere that is seen."""
-    corners = [minus(corner, ball.centre) for corner in polytope.corners]
+    kinds = _in_balls_or_exactly(polytope, ball.centre)
     total = arb(0)
-    for facet in polytope.facets:
-        normal = facet.plane.normal
-        level = -facet.plane.height(ball.centre)
-        if level:
-            ring = [corners[p] for p in facet.ring]
-            cone = _Cone(ball.square, normal, level)
-            cones = sum((cone.over(p, q) for p, q in zip(ring, ring[1:] + ring[:1])), arb(0))
-            total += cones if level > 0 else -cones
+    for facet in range(len(polytope.facets)):
+        total += _decided(kinds, partial(_cone, square=ball.square, facet=facet))
     return total
-
-
-class _Cone:
-    """Between the centre of a ball and triangles in a plane, all with a corner at the foot of the centre."""
-
-    def __init__(self, square: fmpq, normal: Vector, level: fmpq) -> None:
-        self.square, self.normal = square, normal
-        self.normal_square = dot(normal, normal)
-        self.height_square = level * level / self.normal_square
-        self.disc_square = square - self.height_square
-        self.height, self.radius = root(self.height_square), root(square)
-        self.inner = self.height * (arb(self.disc_square) / 6 + arb(square) / 3) if self.disc_square > 0 else None
-
-    def over(self, p: Vector, q: Vector) -> arb:
-        edge = minus(q, p)
-        around, length = dot(cross(p, edge), self.normal), dot(edge, edge)
-        if not around:
-            return arb(0)
-        square = around * around / (self.normal_square * length)
-        ends = [self._sector(square, dot(end, edge), length, dot(end, end)) for end in (p, q)]
-        return ends[1] - ends[0] if around > 0 else ends[0] - ends[1]
-
-    def _sector(self, square: fmpq, along: fmpq, length: fmpq, end: fmpq) -> arb:
-        """From the foot on the edge, at the root of `square` from the foot on the plane, to the end, odd in `along`."""
-        if not along:
-            return arb(0)
-        h, d = self.height, root(square)
-        way = root(along * along / length)
-        if end <= self.square:
-            volume = h * d * way / 6
-        else:
-            outer = self.radius**3 / 3
-            turn, seen = arb.atan2(way, d), arb.atan2(h * way, d * root(end))
-            if self.inner is None:
-                volume = outer * (turn - seen)
-            elif square >= self.disc_square:
-                volume = self.inner * turn - outer * seen
-            else:
-                rim = root(self.disc_square - square)
-                turn, seen = turn - arb.atan2(rim, d), seen - arb.atan2(h * rim, d * self.radius)
-                volume = h * d * rim / 6 + self.inner * turn - outer * seen
-        return volume if along > 0 else -volume
 
 
 def in_tube(tube: Tube, polytope: Polytope) -> arb:
     """The height of every facet over a slice across the axis, integrated over the part of its shadow in the disc."""
-    axis, axis_square = tube.axis, dot(tube.axis, tube.axis)
-    corners = []
-    for corner in polytope.corners:
-        arm = minus(corner, tube.point)
-        corners.append(plus(arm, axis, -dot(arm, axis) / axis_square))
-    # Along the unit axis a facet is at (offset - normal · shadow) / rise times the length of the axis.
-    heights: list[tuple[fmpq, Vector] | None] = []
-    for facet in polytope.facets:
-        rise = dot(facet.plane.normal, axis)
-        level = -facet.plane.height(tube.point)
-        heights.append((level / rise, scaled(facet.plane.normal, -1 / rise)) if rise else None)
+    kinds = _in_balls_or_exactly(polytope, tube.point, tube.axis)
     total = arb(0)
-    for p, q, left, right in polytope.edges():
-        sides = heights[left], heights[right]
-        if sides == (None, None):
-            continue
-        level, slope = sides[0] or (fmpq(0), (fmpq(0),) * 3)
-        other, other_slope = sides[1] or (fmpq(0), (fmpq(0),) * 3)
-        total += _shadow(
-            tube.square, axis, axis_square, corners[p], corners[q], level - other, minus(slope, other_slope)
-        )
-    return total * root(axis_square)
+    for edge in polytope.edges():
+        total += _decided(kinds, partial(_under, square=tube.square, edge=edge))
+    return total * root(dot(tube.axis, tube.axis))
 
 
-def _shadow(square: fmpq, axis: Vector, axis_square: fmpq, p: Vector, q: Vector, level: fmpq, slope: Vector) -> arb:
-    """The integral of level + slope · x over the part in a disc of a triangle between its centre, p and q."""
-    edge = minus(q, p)
-    length = dot(edge, edge)
-    around = dot(axis, cross(p, edge))
-    if not around:
+class _Numbers:
+    """A polytope about a point, or its shadow along an axis, in numbers of one kind."""
+
+    def __init__(self, polytope: Polytope, kind: Callable[[fmpq], Number], centre: Vector, axis: Vector | None) -> None:
+        self.polytope, self.kind = polytope, kind
+        self.centre = self.triple(centre)
+        self.axis: Any = self.triple(axis) if axis else None
+        self._corners: dict[int, Triple] = {}
+        self._heights: dict[int, tuple[Number, Triple] | None] = {}
+
+    def triple(self, v: Vector) -> Triple:
+        return self.kind(v[0]), self.kind(v[1]), self.kind(v[2])
+
+    def corner(self, number: int) -> Triple:
+        if number not in self._corners:
+            arm = minus(self.triple(self.polytope.corners[number]), self.centre)
+            if self.axis:
+                arm = plus(arm, self.axis, -dot(arm, self.axis) / dot(self.axis, self.axis))
+            self._corners[number] = arm
+        return self._corners[number]
+
+    def plane(self, facet: int) -> tuple[Triple, Number]:
+        """A normal, and the level of the facet along it."""
+        plane = self.polytope.facets[facet].plane
+        normal = self.triple(plane.normal)
+        return normal, self.kind(plane.offset) - dot(normal, self.centre)
+
+    def height(self, facet: int) -> tuple[Number, Triple] | None:
+        """(level, slope): along the unit axis a facet is at level + slope · shadow, times the length of the axis."""
+        if facet not in self._heights:
+            normal, level = self.plane(facet)
+            rise = dot(normal, self.axis)
+            self._heights[facet] = (level / rise, scaled(normal, -1 / rise)) if sign(rise) else None
+        return self._heights[facet]
+
+
+def _in_balls_or_exactly(polytope: Polytope, centre: Vector, axis: Vector | None = None) -> list[_Numbers]:
+    return [_Numbers(polytope, kind, centre, axis) for kind in (arb, fmpq)]
+
+
+def _decided(kinds: list[_Numbers], ask: Callable[[_Numbers], arb]) -> arb:
+    try:
+        return ask(kinds[0])
+    except Undecided:
+        return ask(kinds[1])
+
+
+def _cone(numbers: _Numbers, square: fmpq, facet: int) -> arb:
+    """Between the centre of a ball and a facet."""
+    normal, level = numbers.plane(facet)
+    side = sign(level)
+    if side == 0:
         return arb(0)
-    foot = plus(p, edge, -dot(p, edge) / length)
-    near = dot(foot, foot)
-    ends = [_sector(square, near, dot(end, edge), length, dot(end, end)) for end in (p, q)]
-    area, outwards, sideways = (b - a for a, b in zip(*ends))
-    outer, inner = arb(dot(slope, foot)), arb(dot(slope, edge)) / root(length)
-    integral: arb = arb(level) * area + outer * outwards + inner * sideways
-    return integral if around > 0 else -integral
+    over = _Over(numbers.kind(square), normal, level)
+    ring = [numbers.corner(p) for p in numbers.polytope.facets[facet].ring]
+    return side * sum((over.triangle(p, q) for p, q in zip(ring, ring[1:] + ring[:1])), arb(0))
 
 
-def _sector(square: fmpq, near: fmpq, along: fmpq, length: fmpq, end: fmpq) -> tuple[arb, arb, arb]:
-    """From the foot on an edge, at the root of `near`, to the end: area, moment outwards by the foot, and sideways."""
-    d, r = root(near), root(square)
-    way = root(along * along / length)
-    if end <= square:
-        area, outwards, sideways = d * way / 2, d * way / 3, d * arb(along * along / length) / 6
-    else:
-        turn, far = arb.atan2(way, d), root(end)
-        third = r**3 / 3
-        if near >= square:
-            area, outwards, sideways = arb(square) / 2 * turn, third * way / (far * d), -third * d / far
-        else:
-            rim = root(square - near)
-            turn -= arb.atan2(rim, d)
-            area = d * rim / 2 + arb(square) / 2 * turn
-            outwards = d * rim / 3 + third * (way / far - rim / r) / d
-            sideways = d * arb(square - near) / 6 - third * (d / far - d / r)
-    if along < 0:
-        area, outwards = -area, -outwards
-    return area, outwards, sideways
+class _Over:
+    """Between the centre of a ball and triangles in a plane, all with a corner at the foot of the centre."""
+
+    def __init__(self, square: Number, normal: Triple, level: Number) -> None:
+        self.square, self.normal = square, normal
+        self.normal_square = dot(normal, normal)
+        height_square = level * level / self.normal_square
+        self.disc_square = square - height_square
+        self.height, self.radius = root(height_square), root(square)
+        self.meets = is_positive(self.disc_square)
+        self.inner = self.height * (arb(self.disc_square) / 6 + arb(square) / 3)
+
+    def triangle(self, p: Triple, q: Triple) -> arb:
+        edge = minus(q, p)
+        around, length = dot(cross(p, edge), self.normal), dot(edge, edge)
+        side = sign(around)
+        if side == 0:
+            return arb(0)
+        near = around * around / (self.normal_square * length)
+        low, high = (self._sector(near, dot(end, edge), length, dot(end, end)) for end in (p, q))
+        return side * (high - low)
+
+    def _sector(self, near: Number, along: Number, length: Number, end: Number) -> arb:
+        """From the foot on the edge, at the root of `near` from the foot on the plane, to the end, odd in `along`."""
+        side = sign(along)
+        if side == 0:
+            return arb(0)
+        h, d = self.height, root(near)
+        way = root(along * along / length)
+        if not is_positive(end - self.square):
+            return side * (h * d * way / 6)
+        outer = self.radius**3 / 3
+        turn, seen = arb.atan2(way, d), arb.atan2(h * way, d * root(end))
+        if not self.meets:
+            return side * outer * (turn - seen)
+        if not is_positive(self.disc_square - near):
+            return side * (self.inner * turn - outer * seen)
+        rim = root(self.disc_square - near)
+        turn, seen = turn - arb.atan2(rim, d), seen - arb.atan2(h * rim, d * self.radius)
+        return side * (h * d * rim / 6 + self.inner * turn - outer * seen)
+
+
+def _under(numbers: _Numbers, square: fmpq, edge: tuple[int, int, int, int]) -> arb:
+    """What the facets on both sides of an edge have above a triangle between the axis and the shadow of the edge."""
+    p, q, left, right = edge
+    heights = numbers.height(left), numbers.height(right)
+    total = arb(0)
+    if heights == (None, None):
+        return total
+    shadow = _Shadow(numbers.kind(square), numbers.axis, numbers.corner(p), numbers.corner(q))
+    for height, side in zip(heights, (1, -1)):
+        if height and shadow.side:
+            total += side * shadow.integral(*height)
+    return total
+
+
+class _Shadow:
+    """The part in a disc of a triangle between its centre and the ends of an edge."""
+
+    def __init__(self, square: Number, axis: Triple, p: Triple, q: Triple) -> None:
+        edge = minus(q, p)
+        self.side = sign(dot(axis, cross(p, edge)))
+        if self.side:
+            self.edge, self.length = edge, dot(edge, edge)
+            self.foot = plus(p, edge, -dot(p, edge) / self.length)
+            self.near, self.square = dot(self.foot, self.foot), square
+            ends = [list(self._sector(dot(end, edge), dot(end, end))) for end in (p, q)]
+            self.area, self.outwards, self.sideways = (self.side * (b - a) for a, b in zip(*ends))
+
+    def integral(self, level: Number, slope: Triple) -> arb:
+        """Of level + slope · x."""
+        outer, inner = arb(dot(slope, self.foot)), arb(dot(slope, self.edge)) / root(self.length)
+        found: arb = arb(level) * self.area + outer * self.outwards + inner * self.sideways
+        return found
+
+    def _sector(self, along: Number, end: Number) -> Iterator[arb]:
+        """From the foot on the edge to an end: area, moment outwards by the foot, and sideways."""
+        d, r, side = root(self.near), root(self.square), sign(along)
+        way = root(along * along / self.length)
+        if not is_positive(end - self.square):
+            yield side * d * way / 2
+            yield side * d * way / 3
+            yield d * arb(along * along / self.length) / 6
+            return
+        turn, far, third = arb.atan2(way, d), root(end), r**3 / 3
+        if not is_positive(self.square - self.near):
+            yield side * arb(self.square) / 2 * turn
+            yield side * third * way / (far * d)
+            yield -third * d / far
+            return
+        rim = root(self.square - self.near)
+        yield side * (d * rim / 2 + arb(self.square) / 2 * (turn - arb.atan2(rim, d)))
+        yield side * (d * rim / 3 + third * (way / far - rim / r) / d)
+        yield d * arb(self.square - self.near) / 6 - third * (d / far - d / r)

@@ -24,6 +24,7 @@ from typing import Any
 from flint import acb, arb, ctx, fmpq, fmpq_poly
 
 from overlapper.proof.one_quadric import root
+from overlapper.proof.signs import is_positive
 from overlapper.proof.vectors import Vector, minus
 
 # A line takes { (p, q) : normal · (p, q) <= offset }, whose offset is a combination of 1, t, ρ₁ and ρ₂.
@@ -39,18 +40,6 @@ SHARE = fmpq(3331, 7919)
 INTEGRATED = 0.75
 
 Form = list[fmpq]  # coefficients of 1, t, t², ρ₁, t ρ₁, ρ₁², ρ₂, t ρ₂, ρ₂², ρ₁ ρ₂
-
-
-class Undecided(ArithmeticError):
-    """A number is too wide to have a sign."""
-
-
-def is_positive(x: arb) -> bool:
-    if x > 0:
-        return True
-    if x < 0:
-        return False
-    raise Undecided
 
 
 @dataclass(frozen=True)

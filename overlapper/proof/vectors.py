@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from fractions import Fraction
+from typing import TypeVar
 
-from flint import fmpq
+from flint import arb, fmpq
 
 Vector = tuple[fmpq, fmpq, fmpq]
+N = TypeVar("N", fmpq, arb)
 
 ORIGIN: Vector = (fmpq(0), fmpq(0), fmpq(0))
 
@@ -26,23 +28,23 @@ def vector(numbers: Iterable[Fraction | int | float]) -> Vector:
     return x, y, z
 
 
-def dot(u: Vector, v: Vector) -> fmpq:
+def dot(u: tuple[N, N, N], v: tuple[N, N, N]) -> N:
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
-def cross(u: Vector, v: Vector) -> Vector:
+def cross(u: tuple[N, N, N], v: tuple[N, N, N]) -> tuple[N, N, N]:
     return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
 
 
-def plus(u: Vector, v: Vector, share: fmpq | int = 1) -> Vector:
+def plus(u: tuple[N, N, N], v: tuple[N, N, N], share: N | int = 1) -> tuple[N, N, N]:
     return u[0] + share * v[0], u[1] + share * v[1], u[2] + share * v[2]
 
 
-def minus(u: Vector, v: Vector) -> Vector:
+def minus(u: tuple[N, N, N], v: tuple[N, N, N]) -> tuple[N, N, N]:
     return u[0] - v[0], u[1] - v[1], u[2] - v[2]
 
 
-def scaled(u: Vector, share: fmpq | int) -> Vector:
+def scaled(u: tuple[N, N, N], share: N | int) -> tuple[N, N, N]:
     return share * u[0], share * u[1], share * u[2]
 
 

@@ -20,7 +20,8 @@ from overlapper.proof.corners import Polytope, below
 from overlapper.proof.pieces import DOUBT, Ball, Floats, Piece, Plane, Quadric, Tube, pieces
 from overlapper.proof.rational import RationalBody
 from overlapper.proof.refusal import Bounds, CertificateError
-from overlapper.proof.slices import Slices, Undecided
+from overlapper.proof.signs import Undecided
+from overlapper.proof.slices import Slices
 from overlapper.proof.two_tubes import TwoTubes
 from overlapper.proof.vectors import cross, dot, fraction, minus, plus, scaled
 
@@ -104,14 +105,26 @@ class _Pieces:
     def __init__(self, found: list[Piece]) -> None:
         self.pieces = found
         self.boxes = np.array([box(piece) for piece in found])
+        self._planes: dict[int, Floats] = {}
 
     def near(self, other: _Pieces) -> Iterator[tuple[int, int]]:
         """Pairs of pieces that doubles do not see apart."""
         lower, upper = self.boxes[:, None, 0], self.boxes[:, None, 1]
         apart = (lower >= other.boxes[None, :, 1]) | (upper <= other.boxes[None, :, 0])
         for i, j in np.argwhere(~apart.any(axis=2)):
-            if not any(parted(p, q) for p, q in ((self.pieces[i], other.pieces[j]), (other.pieces[j], self.pieces[i]))):
+            if not self._parted(i, other, j) and not other._parted(j, self, i):
                 yield int(i), int(j)
+
+    def _parted(self, i: int, other: _Pieces, j: int) -> bool:
+        """Whether all of the other's piece is beyond one plane of the piece."""
+        spine, reach = other.pieces[j].spine, other.pieces[j].reach
+        if spine is None:
+            return False
+        if i not in self._planes:
+            self._planes[i] = np.array([in_doubles(plane) for plane in self.pieces[i].planes]).reshape(-1, 4)
+        normals, levels = self._planes[i][:, :3], self._planes[i][:, 3]
+        least = (spine @ normals.T).min(axis=0) - reach * np.linalg.norm(normals, axis=1)
+        return bool((least > levels + DOUBT * 4.0 * (np.abs(spine).max() + reach + np.abs(levels))).any())
 
 
 def box(piece: Piece) -> Floats:
@@ -123,18 +136,11 @@ def box(piece: Piece) -> Floats:
     return np.array([low - margin, high + margin])
 
 
-def parted(piece: Piece, other: Piece) -> bool:
-    """Whether all of the other is beyond one plane of the piece."""
-    if other.spine is None:
-        return False
-    for plane in piece.planes:
-        size = max(abs(x) for x in plane.normal)
-        x, y, z, level = (float(fraction(number / size)) for number in (*plane.normal, plane.offset))
-        normal = np.array([x, y, z])
-        least = (other.spine @ normal).min() - other.reach * np.linalg.norm(normal)
-        if least > level + DOUBT * 4.0 * (np.abs(other.spine).max() + other.reach + abs(level)):
-            return True
-    return False
+def in_doubles(plane: Plane) -> list[float]:
+    """Normal and offset, by the largest coordinate of the normal."""
+    size = max(abs(x) for x in plane.normal)
+    ratios = (number / size for number in (*plane.normal, plane.offset))
+    return [int(x.p) / int(x.q) for x in ratios]
 
 
 def parts(one: Piece, other: Piece) -> list[Part]:

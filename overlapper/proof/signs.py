@@ -1,0 +1,28 @@
+"""Signs of numbers that are exact, or known to lie in a ball that may be too wide to tell."""
+
+from __future__ import annotations
+
+from flint import arb, fmpq
+
+
+class Undecided(ArithmeticError):
+    """A ball is too wide for a sign."""
+
+
+def is_positive(x: arb | fmpq) -> bool:
+    """Of what is not zero in a ball, for which there is no telling; exact numbers may be zero."""
+    if x > 0:
+        return True
+    if x < 0 or x == 0:
+        return False
+    raise Undecided
+
+
+def sign(x: arb | fmpq) -> int:
+    if x > 0:
+        return 1
+    if x < 0:
+        return -1
+    if x == 0:
+        return 0
+    raise Undecided
