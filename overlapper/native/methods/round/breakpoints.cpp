@@ -313,6 +313,11 @@ class Settling {
   static constexpr int kMostEvents = 40;
 
   Outline at(double t) const { return outline(Slice(stack_, t)); }
+  /// That outline may be it.
+  Outline at(double t, const Outline& likely) const {
+    const Slice slice(stack_, t);
+    return !likely.empty() && is_outline(slice, likely) ? likely : outline(slice);
+  }
 
   void append(double low, double high, const Outline& between) {
     if (between.empty()) return;
@@ -344,7 +349,11 @@ class Settling {
       std::sort(t.begin(), t.begin() + samples);
     }
     std::array<Outline, kMostInner + 2> seen;
-    for (int i = 0; i < samples; ++i) seen[i] = at(t[i]);
+    const int in_the_middle = samples / 2;
+    seen[in_the_middle] = at(t[in_the_middle], latest_);
+    latest_ = seen[in_the_middle];
+    for (int i = 0; i < samples; ++i)
+      if (i != in_the_middle) seen[i] = at(t[i], latest_);
     double from = low;
     for (int i = 0; i + 1 < samples; ++i) {
       double here = t[i];
@@ -405,6 +414,7 @@ class Settling {
   double low_, high_;                                        ///< beyond which there is nothing
   double inside_ = std::numeric_limits<double>::infinity();  ///< at which there is something
   int events_ = 0;
+  Outline latest_;
 };
 
 }  // namespace

@@ -27,12 +27,6 @@ Slice::Slice(const Stack& stack_, double t_) : stack(stack_), t(t_) {
   }
 }
 
-Point Slice::corner(int first, int second) const {
-  const Point a = stack.line[first].normal, b = stack.line[second].normal;
-  const double p = side(first), q = side(second), inverse = 1 / slicing::cross(a, b);
-  return {(p * b.y - q * a.y) * inverse, (a.x * q - b.x * p) * inverse};
-}
-
 namespace {
 
 /// Where a line crosses the circle, as lengths along the line from its point nearest to the origin.
@@ -81,24 +75,21 @@ bool along_one_another(const Slice& slice, int edge, int other, Point p, Point q
   return !(along >= 0 && along <= dot(q - p, q - p));
 }
 
-/// Cuts off what lies beyond the line, with `spare` to work in; false if nothing is left, and then by how much the
-/// nearest corner misses it.
-bool clip(Polygon& polygon, Polygon& spare, const Slice& slice, int line, double& missed) {
+/// Cuts off what lies beyond the line, with `spare` to work in and to be exchanged; false if nothing is left.
+bool clip(Polygon*& now, Polygon*& spare_one, const Slice& slice, int line) {
+  const Polygon& polygon = *now;
+  Polygon& spare = *spare_one;
   const Stack& stack = slice.stack;
   const Point normal = stack.line[line].normal;
   const double side = slice.side(line);
   const int size = polygon.size;
   std::array<bool, kMostLines + 8> kept;
   int count = 0;
-  double most = -std::numeric_limits<double>::infinity();
   for (int i = 0; i < size; ++i) {
-    const double slack = side - dot(normal, polygon.corner(i));
-    most = std::max(most, slack);
-    kept[i] = slack >= 0;
+    kept[i] = side - dot(normal, polygon.corner(i)) >= 0;
     count += kept[i];
   }
   if (count == size) return true;
-  missed = most;
   if (count == 0) return false;
   int first = 0;
   while (!kept[first] || kept[first > 0 ? first - 1 : size - 1]) ++first;
@@ -122,10 +113,7 @@ bool clip(Polygon& polygon, Polygon& spare, const Slice& slice, int line, double
   const int leaves = polygon.line[wrapped(first + count)], enters = polygon.line[first];
   spare.append(leaves, slice.corner(leaves, line));
   spare.append(line, slice.corner(line, enters));
-  std::swap(polygon.size, spare.size);
-  std::copy_n(spare.line.begin(), polygon.size, polygon.line.begin());
-  std::copy_n(spare.x.begin(), polygon.size, polygon.x.begin());
-  std::copy_n(spare.y.begin(), polygon.size, polygon.y.begin());
+  std::swap(now, spare_one);
   return true;
 }
 
@@ -181,32 +169,81 @@ void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
 Outline outline(const Slice& slice) {
   const Stack& stack = slice.stack;
   Outline result;
-  Polygon polygon, spare;
+  Polygon one, other, *polygon = &one, *spare = &other;
   // The last four lines form a square around everything.
   const int square = stack.lines - 4;
-  for (int i = 0; i < 4; ++i) polygon.append(square + i, slice.corner(square + i, square + (i + 1) % 4));
-  for (int i = 0; i < stack.lines - 4; ++i) {
-    if (clip(polygon, spare, slice, i, result.missed)) continue;
-    result.failed = i;
-    return result;
-  }
+  for (int i = 0; i < 4; ++i) polygon->append(square + i, slice.corner(square + i, square + (i + 1) % 4));
+  for (int i = 0; i < square; ++i)
+    if (!clip(polygon, spare, slice, i)) return result;
   if (stack.ball >= 0) {
-    cut_by_disc(polygon, slice, result);
-    result.failed = stack.lines;
-    if (result.empty()) {
-      // How far the disc misses the polygon, roughly: it is enough to compare slices.
-      double worst = 0;
-      for (int i = 0; i < polygon.size; ++i) {
-        const Crossing crossing(slice, polygon.line[i]);
-        worst = std::min(worst, crossing.height - dot(crossing.normal, slice.centre) + slice.radius);
-      }
-      result.missed = worst;
-    }
+    cut_by_disc(*polygon, slice, result);
     return result;
   }
-  result.edges = polygon.size;
-  for (int i = 0; i < polygon.size; ++i) result.edge[i] = {polygon.line[i], false, false};
+  result.edges = polygon->size;
+  for (int i = 0; i < polygon->size; ++i) result.edge[i] = {polygon->line[i], false, false};
   return result;
+}
+
+bool is_outline(const Slice& slice, const Outline& outline) {
+  const Stack& stack = slice.stack;
+  const int lines = stack.lines - 4, edges = outline.edges;
+  std::array<double, kMostLines + 8> side;
+  for (int i = 0; i < lines; ++i) side[i] = slice.side(i);
+  const auto slack = [&](int i, Point p) { return side[i] - dot(stack.line[i].normal, p); };
+  if (outline.whole_disc) {
+    for (int i = 0; i < lines; ++i)
+      if (!(slack(i, slice.centre) > slice.radius * stack.line[i].length)) return false;
+    return slice.radius > 0;
+  }
+  const auto inside = [&](Point p, int but, int and_but) {
+    for (int i = 0; i < lines; ++i)
+      if (!(slack(i, p) > 0) && i != but && i != and_but) return false;
+    return true;
+  };
+  Point first, last;
+  // The arc between two points of the circle and lines is inside of other lines if their farthest points are not on it.
+  const auto arc_inside = [&](Point p, Point q, int before, int after) {
+    const Point chord = q - p;
+    if (!(dot(chord, chord) > 1e-12 * slice.radius * slice.radius)) return false;
+    for (int i = 0; i < lines; ++i) {
+      const Line& line = stack.line[i];
+      if (i == before || i == after || slack(i, slice.centre) > slice.radius * line.length) continue;
+      const Point farthest = slice.centre + (slice.radius / line.length) * line.normal;
+      if (!(slicing::cross(chord, farthest - p) > 0)) return false;
+    }
+    return true;
+  };
+  for (int i = 0; i < edges; ++i) {
+    const Outline::Edge& edge = outline.edge[i];
+    const int before = outline.edge[i > 0 ? i - 1 : edges - 1].line, after = outline.edge[i + 1 < edges ? i + 1 : 0].line;
+    if (edge.line >= lines) return false;
+    Point from = last, to;
+    if (edge.from_circle || edge.to_circle) {
+      const Crossing crossing(slice, edge.line);
+      if (!(crossing.discriminant > 0)) return false;
+      if (edge.from_circle) from = crossing.at(crossing.enter);
+      if (edge.to_circle) to = crossing.at(crossing.leave);
+    }
+    if (!edge.from_circle && i == 0) from = slice.corner(before, edge.line);
+    if (!edge.to_circle) {
+      to = i + 1 < edges ? slice.corner(edge.line, after) : first;
+      if (i + 1 == edges && edges == 1) return false;
+    }
+    if (i == 0) first = from;
+    const Point normal = stack.line[edge.line].normal, way = to - from;
+    if (!(normal.x * way.y - normal.y * way.x > 0)) return false;
+    if (edge.from_circle && (!inside(from, edge.line, edge.line) ||
+                             (i > 0 && !arc_inside(last, from, before, edge.line))))
+      return false;
+    if (edge.to_circle ? !inside(to, edge.line, edge.line) : !inside(to, edge.line, after)) return false;
+    if (stack.ball >= 0 && !edge.to_circle) {
+      const Point beside = to - slice.centre;
+      if (!(dot(beside, beside) < slice.radius * slice.radius)) return false;
+    }
+    if (i + 1 == edges && edge.to_circle && !arc_inside(to, first, edge.line, outline.edge[0].line)) return false;
+    last = to;
+  }
+  return edges > 0;
 }
 
 void Integrals::add(double weight, const Integrals& other) {

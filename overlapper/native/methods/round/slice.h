@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -104,7 +105,11 @@ struct Slice {
     if (l.quadric < 0) return l.offset - l.rate * t;
     return l.upper ? upper[l.quadric] : -lower[l.quadric];
   }
-  Point corner(int first, int second) const;
+  Point corner(int first, int second) const {
+    const Point a = stack.line[first].normal, b = stack.line[second].normal;
+    const double p = side(first), q = side(second), inverse = 1 / slicing::cross(a, b);
+    return {(p * b.y - q * a.y) * inverse, (a.x * q - b.x * p) * inverse};
+  }
 };
 
 /// What bounds a slice, counter-clockwise: pieces of lines, and arcs wherever one of these ends on the circle.
@@ -117,10 +122,13 @@ struct Outline {
   std::array<Edge, kMostLines + 8> edge;
   int edges = 0;
   bool whole_disc = false;
-  /// Of an empty slice: the line that left nothing, and by how much it did; the later the line, the nearer the slice is
-  /// to having something.
-  int failed = 0;
-  double missed = 0;
+  Outline() = default;
+  Outline(const Outline& other) { *this = other; }
+  Outline& operator=(const Outline& other) {
+    if (this != &other) std::copy_n(other.edge.begin(), other.edges, edge.begin());
+    edges = other.edges, whole_disc = other.whole_disc;
+    return *this;
+  }
 
   bool empty() const { return edges == 0 && !whole_disc; }
   friend bool operator==(const Outline& a, const Outline& b) {
@@ -129,6 +137,9 @@ struct Outline {
   }
 };
 Outline outline(const Slice& slice);
+
+/// Whether a slice surely has that outline, which is found sooner than the outline itself.
+bool is_outline(const Slice& slice, const Outline& outline);
 
 /// Integrals over a slice, or over slices: the volume's, and those of the surfaces.
 struct Integrals {
