@@ -278,6 +278,7 @@ class Settling {
  public:
   Settling(const Stack& stack, bool closely, std::vector<Interval>& intervals)
       : stack_(stack),
+        closely_(closely),
         beside_(closely ? 1e-13 : 1e-5),
         inner_(closely ? kMostInner : 2),
         intervals_(intervals),
@@ -339,6 +340,13 @@ class Settling {
 
   bool settle(double low, double high) {
     const double width = high - low;
+    // If a change between the two is not known, the surface that is measured does not close.
+    if (const Outline middle = at(low + width / 2, latest_); !closely_ && !middle.empty()) {
+      latest_ = middle;
+      append(low, high, middle);
+      return true;
+    }
+    if (!closely_ && !(low < inside_ && inside_ < high)) return true;
     std::array<double, kMostInner + 2> t;
     t[0] = low + beside_ * width;
     for (int i = 1; i < inner_; ++i) t[i] = low + width * i / inner_;
@@ -406,6 +414,7 @@ class Settling {
   }
 
   const Stack& stack_;
+  bool closely_;
   /// Of an interval: where its ends are looked at. The root of a slice's area is concave, so that what begins or ends
   /// nearer than that holds no more than its cube of the volume.
   double beside_;
