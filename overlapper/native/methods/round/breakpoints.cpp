@@ -31,6 +31,9 @@ void for_roots(double a, double h, double c, Use use) {
 }
 
 class Candidates {
+  static constexpr int kSamples = 24;
+  using Samples = std::array<double, kSamples>;
+
  public:
   Candidates(const Stack& stack, std::vector<double>& values) : stack_(stack), values_(values) {}
 
@@ -59,9 +62,15 @@ class Candidates {
     const Quadric &p = stack_.quadric[0], &q = stack_.quadric[1];
     if (stack_.quadrics < 2 || (!p.ball && !q.ball && parallel(p, q))) return;
     const double middle = low + (high - low) / 2, half = (high - low) / 2;
-    for (int k = 0; k < kMostNodes; ++k)
-      samples_[k] = middle - half * std::cos(std::numbers::pi * (k + 0.5) / kMostNodes);
-    find_sides(stack_, samples_, kMostNodes, sides_);
+    for (int k = 0; k < kSamples; ++k) {
+      static const std::array<double, kSamples> kPlaces = places();
+      samples_[k] = middle + half * kPlaces[k];
+    }
+    for (int row = 0; row < kSamples / kRow; ++row) {
+      Row t;
+      std::copy_n(samples_.begin() + row * kRow, kRow, t.begin());
+      find_sides(stack_, t, sides_[row]);
+    }
     for (int i = 0; i < stack_.lines - 4; ++i) {
       const Line& side = stack_.line[i];
       if (plane(i) || (stack_.ball < 0 && side.quadric != 0)) continue;
@@ -76,6 +85,13 @@ class Candidates {
   }
 
  private:
+  /// Denser towards both ends, where sides are steep.
+  static Samples places() {
+    Samples result;
+    for (int k = 0; k < kSamples; ++k) result[k] = -std::cos(std::numbers::pi * (k + 0.5) / kSamples);
+    return result;
+  }
+
   bool plane(int i) const { return stack_.line[i].quadric < 0; }
   static Place gradient(const Line& line) { return {line.normal.x, line.normal.y, line.rate}; }
 
@@ -105,18 +121,20 @@ class Candidates {
   void find_corners(int i, int j) {
     const Point a = stack_.line[i].normal, b = stack_.line[j].normal;
     const double inverse = 1 / cross(a, b);
-    Row p, q;
+    Samples p, q;
     for (const bool first : {true, false}) {
       const Line& line = stack_.line[first ? i : j];
-      Row& side = first ? p : q;
+      Samples& side = first ? p : q;
       const double offset = line.offset, rate = line.rate;
       if (line.quadric < 0)
-        for (int k = 0; k < kMostNodes; ++k) side[k] = offset - rate * samples_[k];
-      else if (line.upper) side = sides_.upper[line.quadric];
+        for (int k = 0; k < kSamples; ++k) side[k] = offset - rate * samples_[k];
       else
-        for (int k = 0; k < kMostNodes; ++k) side[k] = -sides_.lower[line.quadric][k];
+        for (int k = 0; k < kSamples; ++k) {
+          const Sides& sides = sides_[k / kRow];
+          side[k] = line.upper ? sides.upper[line.quadric][k % kRow] : -sides.lower[line.quadric][k % kRow];
+        }
     }
-    for (int k = 0; k < kMostNodes; ++k) {
+    for (int k = 0; k < kSamples; ++k) {
       x_[k] = (p[k] * b.y - q[k] * a.y) * inverse;
       y_[k] = (a.x * q[k] - b.x * p[k]) * inverse;
     }
@@ -129,8 +147,8 @@ class Candidates {
       const Line& l = stack_.line[k];
       const Point n = l.normal;
       const double offset = l.offset, rate = l.rate;
-      Row slack;
-      for (int s = 0; s < kMostNodes; ++s) slack[s] = offset - rate * samples_[s] - (n.x * x_[s] + n.y * y_[s]);
+      Samples slack;
+      for (int s = 0; s < kSamples; ++s) slack[s] = offset - rate * samples_[s] - (n.x * x_[s] + n.y * y_[s]);
       for_changes(slack, i, j, [&](Point p, double t) { return offset - rate * t - dot(n, p); });
     }
   }
@@ -141,21 +159,24 @@ class Candidates {
     if (std::abs(cross(a, b)) < 1e-9 * stack_.line[j].length) return;
     find_corners(i, j);
     const Quadric& ball = stack_.quadric[stack_.ball];
-    Row value;
-    for (int s = 0; s < kMostNodes; ++s)
-      value[s] = x_[s] * x_[s] + y_[s] * y_[s] - 2 * (x_[s] * sides_.centre_x[s] + y_[s] * sides_.centre_y[s]) +
-                 sides_.slack[s];
+    Samples value;
+    for (int s = 0; s < kSamples; ++s) {
+      const Sides& sides = sides_[s / kRow];
+      const int k = s % kRow;
+      value[s] =
+          x_[s] * x_[s] + y_[s] * y_[s] - 2 * (x_[s] * sides.centre_x[k] + y_[s] * sides.centre_y[k]) + sides.slack[k];
+    }
     for_changes(value, i, j, [&](Point p, double t) { return ball.value(p, t); });
   }
 
   /// Where a function of a corner is zero. Where it turns before it is, two values may hide between samples.
   template <class Function>
-  void for_changes(const Row& value, int i, int j, Function function) {
+  void for_changes(const Samples& value, int i, int j, Function function) {
     const auto at = [&](double t) { return function(Slice(stack_, t).corner(i, j), t); };
     const auto between = [&](double low, double high, double at_low, double at_high) {
       if ((at_low < 0) != (at_high < 0)) add_zero(low, high, at_low, at_high, i, j, at);
     };
-    for (int k = 0; k + 1 < kMostNodes; ++k) {
+    for (int k = 0; k + 1 < kSamples; ++k) {
       between(samples_[k], samples_[k + 1], value[k], value[k + 1]);
       if (k == 0) continue;
       const double before = value[k - 1], here = value[k], after = value[k + 1], side = here < 0 ? -1 : 1;
@@ -269,8 +290,8 @@ class Candidates {
 
   const Stack& stack_;
   std::vector<double>& values_;
-  Row samples_, x_, y_;  ///< of t, and a corner there
-  Sides sides_;
+  Samples samples_, x_, y_;  ///< of t, and a corner there
+  std::array<Sides, kSamples / kRow> sides_;
 };
 
 /// Finds what the closed forms have not, and puts intervals together that have the same outline.
@@ -387,7 +408,13 @@ class Settling {
     return true;
   }
 
-  bool holds(double t) const { return !at(t).empty(); }
+  /// The slice there is looked at first.
+  bool holds(double t) {
+    const Outline found = at(t, latest_);
+    if (found.empty()) return false;
+    latest_ = found;
+    return true;
+  }
 
   /// False if no slice holds something: one in the middle between two breakpoints would.
   bool find_inside(const std::vector<double>& values) {

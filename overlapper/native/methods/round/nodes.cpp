@@ -15,29 +15,33 @@ struct Points {
   Row x, y;
 };
 
-/// The slices of one outline at the nodes.
+double sum(const Row& row) { return ((row[0] + row[1]) + (row[2] + row[3])) + ((row[4] + row[5]) + (row[6] + row[7])); }
+
+/// Slices of one outline, a row of them after the other.
 class Bundle {
  public:
-  Bundle(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices)
-      : stack_(stack), outline_(outline), nodes_(nodes), area_(slices.volume), surface_(slices.area), n_(nodes.size) {}
+  Bundle(const Stack& stack, const Outline& outline) : stack_(stack), outline_(outline) {}
 
-  Integrals measure() {
-    for (int k = 0; k < n_; ++k) area_[k] = x_[k] = y_[k] = xx_[k] = yy_[k] = xy_[k] = surface_[k] = 0;
-    find_sides(stack_, nodes_.t, n_, sides_);
+  void add(const Row& t, const Row& counts) {
+    t_ = t, counts_ = counts;
+    area_ = x_ = y_ = xx_ = yy_ = xy_ = surface_ = {};
+    find_sides(stack_, t_, sides_);
     if (outline_.whole_disc) add_disc();
     else go_round();
     finish();
-    return sum_;
   }
+  const Integrals& integrals() const { return sum_; }
+  const Row& areas() const { return area_; }
+  const Row& surfaces() const { return surface_; }
 
  private:
   void side(const Line& line, Row& result) const {
     const double offset = line.offset, rate = line.rate;
     if (line.quadric < 0)
-      for (int k = 0; k < n_; ++k) result[k] = offset - rate * nodes_.t[k];
+      for (int k = 0; k < kRow; ++k) result[k] = offset - rate * t_[k];
     else if (line.upper) result = sides_.upper[line.quadric];
     else
-      for (int k = 0; k < n_; ++k) result[k] = -sides_.lower[line.quadric][k];
+      for (int k = 0; k < kRow; ++k) result[k] = -sides_.lower[line.quadric][k];
   }
 
   void corner(int first, int second, Points& result) const {
@@ -45,7 +49,7 @@ class Bundle {
     const double inverse = 1 / slicing::cross(a, b);
     Row p, q;
     side(stack_.line[first], p), side(stack_.line[second], q);
-    for (int k = 0; k < n_; ++k) {
+    for (int k = 0; k < kRow; ++k) {
       result.x[k] = (p[k] * b.y - q[k] * a.y) * inverse;
       result.y[k] = (a.x * q[k] - b.x * p[k]) * inverse;
     }
@@ -57,7 +61,7 @@ class Bundle {
     const double length = line.length;
     Row height;
     side(line, height);
-    for (int k = 0; k < n_; ++k) {
+    for (int k = 0; k < kRow; ++k) {
       const double h = height[k] / length, cx = sides_.centre_x[k], cy = sides_.centre_y[k];
       const double middle = u.x * cy - u.y * cx, constant = h * (h - 2 * (u.x * cx + u.y * cy)) + sides_.slack[k];
       const double discriminant = middle * middle - constant, root = std::sqrt(std::max(0.0, discriminant));
@@ -101,7 +105,7 @@ class Bundle {
   }
 
   void add_triangle(const Points& a, const Points& b, const Points& c) {
-    for (int k = 0; k < n_; ++k) {
+    for (int k = 0; k < kRow; ++k) {
       const double ax = a.x[k], ay = a.y[k], bx = b.x[k], by = b.y[k], cx = c.x[k], cy = c.y[k];
       const double w = ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / 2, third = w * (1.0 / 3),
                    part = w * (1.0 / 12);
@@ -120,36 +124,33 @@ class Bundle {
     const Point d = (1 / line.length) * Point{-line.normal.y, line.normal.x};
     const double inverse = 1 / line.length, offset = std::abs(line.offset), rate = std::abs(line.rate);
     const double nx = std::abs(line.normal.x), ny = std::abs(line.normal.y), owned = line.owner != kCut ? 1 : 0;
-    Row weight, x, y, blur;
-    for (int k = 0; k < n_; ++k) {
-      const double px = from.x[k], py = from.y[k], qx = to.x[k], qy = to.y[k], t = nodes_.t[k];
-      const double w = ((qx - px) * d.x + (qy - py) * d.y) * inverse, counts = w * nodes_.weight[k];
+    Row weight, x, y, up, size, blur;
+    for (int k = 0; k < kRow; ++k) {
+      const double px = from.x[k], py = from.y[k], qx = to.x[k], qy = to.y[k], t = t_[k];
+      const double w = ((qx - px) * d.x + (qy - py) * d.y) * inverse, counts = w * counts_[k];
       surface_[k] += owned * w;
       weight[k] = counts;
       x[k] = counts * (0.5 * (px + qx)), y[k] = counts * (0.5 * (py + qy));
+      up[k] = t * counts, size[k] = std::abs(t) * counts;
       blur[k] = counts * (offset + rate * std::abs(t) + nx * std::max(std::abs(px), std::abs(qx)) +
                           ny * std::max(std::abs(py), std::abs(qy)));
     }
-    double all = 0, mx = 0, my = 0, mt = 0, size = 0, blurs = 0;
-    for (int k = 0; k < n_; ++k) {
-      const double t = nodes_.t[k];
-      all += weight[k], mx += x[k], my += y[k], mt += t * weight[k], size += std::abs(t) * weight[k], blurs += blur[k];
-    }
+    const double all = sum(weight), mx = sum(x), my = sum(y), mt = sum(up);
     const Point s = stack_.shear;
     // In the orthogonal axes l, m, n.
     const Vec3 normal{line.normal.x, line.normal.y, line.rate - dot(s, line.normal)};
     const Vec3 place{mx + s.x * mt, my + s.y * mt, mt};
     sum_.correction += line.offset_tail * all - line.rate_tail * mt - line.normal_tail.x * mx - line.normal_tail.y * my;
-    sum_.blur += blurs;
+    sum_.blur += sum(blur);
     sum_.pull[line.owner] += all * normal;
     sum_.moment[line.owner] += cross(place, normal);
     sum_.across += mt * normal.z;
-    sum_.terms += size * (rate + std::abs(s.x) * nx + std::abs(s.y) * ny);
+    sum_.terms += sum(size) * (rate + std::abs(s.x) * nx + std::abs(s.y) * ny);
     sum_.border += all * std::sqrt(norm2(normal));
     sum_.area += owned * all;
     if (stack_.view && stack_.view->sees(line.owner)) {
       const double facing = dot(normal, stack_.view->normal);
-      for (int k = 0; k < n_; ++k) weight[k] *= facing;
+      for (int k = 0; k < kRow; ++k) weight[k] *= facing;
       see(from, to, weight);
     }
   }
@@ -163,39 +164,34 @@ class Bundle {
     const Row &half = sides_.half[line.quadric], &upper = sides_.upper[line.quadric],
               &lower = sides_.lower[line.quadric];
     const Row& here = line.upper ? upper : lower;
-    Row weight, x, y, slope, rise, blur;
-    for (int k = 0; k < n_; ++k) {
-      const double px = from.x[k], py = from.y[k], qx = to.x[k], qy = to.y[k], t = nodes_.t[k], h = half[k];
-      const double w = (qy - py) * n.x - (qx - px) * n.y, counts = w * nodes_.weight[k];
+    Row weight, x, y, up, x_up, y_up, t_up, along_t, size, area, blur;
+    for (int k = 0; k < kRow; ++k) {
+      const double px = from.x[k], py = from.y[k], qx = to.x[k], qy = to.y[k], t = t_[k], h = half[k];
+      const double w = (qy - py) * n.x - (qx - px) * n.y, counts = w * counts_[k];
       const double far = std::max(std::abs(upper[k]), std::abs(lower[k]));
       const double terms = stretch * t * t + along * std::abs(t) + slack, inverse = h > 0 ? 1 / h : 0;
+      const double mx = 0.5 * (px + qx) + s.x * t, my = 0.5 * (py + qy) + s.y * t, z = counts * (t - level) * inverse;
       surface_[k] += w * radius * inverse;
       weight[k] = counts;
-      x[k] = 0.5 * (px + qx) + s.x * t, y[k] = 0.5 * (py + qy) + s.y * t;
-      slope[k] = (t - level) * inverse;
-      rise[k] = radius * inverse;
+      x[k] = counts * mx, y[k] = counts * my, along_t[k] = counts * t;
+      up[k] = z, x_up[k] = z * mx, y_up[k] = z * my, t_up[k] = z * t;
+      area[k] = counts * radius * inverse;
+      size[k] = std::abs(t) * (std::abs(t) + std::abs(level)) * counts * inverse;
       blur[k] = counts * (std::abs(here[k]) + (far > 0 ? terms / far : 0) + nx * std::max(std::abs(px), std::abs(qx)) +
                           ny * std::max(std::abs(py), std::abs(qy)));
     }
-    double all = 0, mx = 0, my = 0, mt = 0, up = 0, x_up = 0, y_up = 0, t_up = 0, size = 0, area = 0, blurs = 0;
-    for (int k = 0; k < n_; ++k) {
-      const double t = nodes_.t[k], w = weight[k], z = w * slope[k];
-      all += w, mx += w * x[k], my += w * y[k], mt += w * t;
-      up += z, x_up += z * x[k], y_up += z * y[k], t_up += z * t;
-      size += std::abs(t) * (std::abs(t) + std::abs(level)) * (w * rise[k]);
-      area += w * rise[k], blurs += blur[k];
-    }
-    sum_.blur += blurs;
-    sum_.pull[line.owner] += Vec3{all * n.x, all * n.y, up};
-    sum_.moment[line.owner] += Vec3{y_up - mt * n.y, mt * n.x - x_up, mx * n.y - my * n.x};
-    sum_.across += t_up;
-    sum_.terms += radius > 0 ? size / radius : 0;
+    const double all = sum(weight), mt = sum(along_t), of_side = sum(area);
+    sum_.blur += sum(blur);
+    sum_.pull[line.owner] += Vec3{all * n.x, all * n.y, sum(up)};
+    sum_.moment[line.owner] += Vec3{sum(y_up) - mt * n.y, mt * n.x - sum(x_up), sum(x) * n.y - sum(y) * n.x};
+    sum_.across += sum(t_up);
+    sum_.terms += sum(size);
     // A cylinder's normal has length radius / half chord, as its area has.
-    sum_.border += area;
-    sum_.area += area;
+    sum_.border += of_side;
+    sum_.area += of_side;
     if (stack_.view && stack_.view->sees(line.owner)) {
       const Vec3 facing = stack_.view->normal;
-      for (int k = 0; k < n_; ++k) weight[k] *= n.x * facing.x + n.y * facing.y + slope[k] * facing.z;
+      for (int k = 0; k < kRow; ++k) weight[k] = weight[k] * (n.x * facing.x + n.y * facing.y) + up[k] * facing.z;
       see(from, to, weight);
     }
   }
@@ -203,8 +199,8 @@ class Bundle {
   /// Of such edges, each as long as it looks.
   void see(const Points& from, const Points& to, const Row& length) {
     const View& view = *stack_.view;
-    for (int k = 0; k < n_; ++k) {
-      const double t = nodes_.t[k], w = length[k], u0 = view.u0 + view.u.z * t, v0 = view.v0 + view.v.z * t;
+    for (int k = 0; k < kRow; ++k) {
+      const double t = t_[k], w = length[k], u0 = view.u0 + view.u.z * t, v0 = view.v0 + view.v.z * t;
       const double u = u0 + view.u.x * from.x[k] + view.u.y * from.y[k],
                    v = v0 + view.v.x * from.x[k] + view.v.y * from.y[k];
       const double p = u0 + view.u.x * to.x[k] + view.u.y * to.y[k], q = v0 + view.v.x * to.x[k] + view.v.y * to.y[k];
@@ -227,7 +223,7 @@ class Bundle {
     beyond(stack_.line[before], one), beyond(stack_.line[after], two);
     Row length, distance, ax, ay, angle, sine, cosine;
     double least = 4, most = 0;
-    for (int k = 0; k < n_; ++k) {
+    for (int k = 0; k < kRow; ++k) {
       const double cx = q.x[k] - p.x[k], cy = q.y[k] - p.y[k], l = std::sqrt(cx * cx + cy * cy);
       const double inverse = l > 0 ? 1 / l : 0, x = cy * inverse, y = -cx * inverse;
       const double beside =
@@ -241,29 +237,18 @@ class Bundle {
       sine[k] = h / whole, cosine[k] = d / whole;
       angle[k] = half_turn_angle(h / whole, d / whole);
     }
-    for (int k = 0; k < n_; ++k) least = std::min(least, angle[k]), most = std::max(most, angle[k]);
-    Row segment_area, first_across, second_across, second_along;
-    if (least < kNarrow) {
-      const int terms = most < 0.1 ? 8 : SegmentSeries::kTerms;
-      static constexpr SegmentSeries kSeries;
-      for (int k = 0; k < n_; ++k) segment_area[k] = first_across[k] = second_across[k] = second_along[k] = 0;
-      for (int i = terms - 1; i >= 0; --i) {
-        const Segment term = kSeries.term[i];
-        for (int k = 0; k < n_; ++k) {
-          const double square = angle[k] * angle[k];
-          segment_area[k] = segment_area[k] * square + term.area;
-          first_across[k] = first_across[k] * square + term.first_across;
-          second_across[k] = second_across[k] * square + term.second_across;
-          second_along[k] = second_along[k] * square + term.second_along;
-        }
+    for (int k = 0; k < kRow; ++k) least = std::min(least, angle[k]), most = std::max(most, angle[k]);
+    Row segment_area{}, first_across{}, second_across{}, second_along{};
+    if (least < kNarrow)
+      for (int k = 0; k < kRow; ++k) {
+        const double a = angle[k], cube = a * a * a;
+        const Segment narrow = most < 0.1 ? series(a * a, std::make_index_sequence<8>{})
+                                          : series(a * a, std::make_index_sequence<SegmentSeries::kTerms>{});
+        segment_area[k] = cube * narrow.area, first_across[k] = cube * narrow.first_across;
+        second_across[k] = cube * narrow.second_across, second_along[k] = cube * narrow.second_along;
       }
-      for (int k = 0; k < n_; ++k) {
-        const double cube = angle[k] * angle[k] * angle[k];
-        segment_area[k] *= cube, first_across[k] *= cube, second_across[k] *= cube, second_along[k] *= cube;
-      }
-    }
     if (most >= kNarrow) {
-      for (int k = 0; k < n_; ++k) {
+      for (int k = 0; k < kRow; ++k) {
         const double s = sine[k], c = cosine[k], cube = s * s * s, area = angle[k] - s * c;
         const bool wide = angle[k] >= kNarrow;
         segment_area[k] = wide ? area : segment_area[k];
@@ -272,30 +257,40 @@ class Bundle {
         second_along[k] = wide ? (3 * area - 2 * cube * c) / 12 : second_along[k];
       }
     }
-    Row strip, blur;
-    for (int k = 0; k < n_; ++k) {
+    Row strip, blur, px, py, up, t_up, size;
+    for (int k = 0; k < kRow; ++k) {
       const double r = radius[k], r2 = r * r, w = segment_area[k] * r2, f = first_across[k] * r2 * r;
       const double a = second_across[k] * r2 * r2, b = second_along[k] * r2 * r2, x = ax[k], y = ay[k];
-      const double mx = 0.5 * (p.x[k] + q.x[k]), my = 0.5 * (p.y[k] + q.y[k]), t = nodes_.t[k];
+      const double mx = 0.5 * (p.x[k] + q.x[k]), my = 0.5 * (p.y[k] + q.y[k]), t = t_[k];
       area_[k] += w;
       x_[k] += w * mx + f * x;
       y_[k] += w * my + f * y;
       xx_[k] += w * mx * mx + 2 * f * mx * x + a * x * x + b * y * y;
       yy_[k] += w * my * my + 2 * f * my * y + a * y * y + b * x * x;
       xy_[k] += w * mx * my + f * (mx * y + my * x) + (a - b) * x * y;
-      const double turned = nodes_.weight[k] * 2 * angle[k];
+      const double turned = counts_[k] * 2 * angle[k];
       surface_[k] += 2 * angle[k] * ball.radius;
+      const double z = (t - level) * turned;
       strip[k] = turned;
+      px[k] = counts_[k] * length[k] * x, py[k] = counts_[k] * length[k] * y;
+      up[k] = z, t_up[k] = t * z, size[k] = std::abs(t) * (std::abs(t) + std::abs(level)) * turned;
       blur[k] = 0.5 * turned * (stretch * t * t + along * std::abs(t) + slack + length[k] * length[k]);
     }
-    double x = 0, y = 0, up = 0, all = 0, t_up = 0, size = 0, blurs = 0;
-    for (int k = 0; k < n_; ++k) {
-      const double t = nodes_.t[k], w = nodes_.weight[k] * length[k], z = (t - level) * strip[k];
-      x += w * ax[k], y += w * ay[k], up += z, all += strip[k], t_up += t * z;
-      size += std::abs(t) * (std::abs(t) + std::abs(level)) * strip[k], blurs += blur[k];
-    }
-    sum_.blur += blurs;
-    add_zone(ball, {x, y, up}, all, t_up, size);
+    sum_.blur += sum(blur);
+    add_zone(ball, {sum(px), sum(py), sum(up)}, sum(strip), sum(t_up), sum(size));
+  }
+
+  /// The polynomials of the first terms.
+  template <size_t... Index>
+  static Segment series(double square, std::index_sequence<Index...>) {
+    static constexpr SegmentSeries kSeries;
+    constexpr size_t kLast = sizeof...(Index) - 1;
+    Segment sum{};
+    ((sum.area = sum.area * square + kSeries.term[kLast - Index].area), ...);
+    ((sum.first_across = sum.first_across * square + kSeries.term[kLast - Index].first_across), ...);
+    ((sum.second_across = sum.second_across * square + kSeries.term[kLast - Index].second_across), ...);
+    ((sum.second_along = sum.second_along * square + kSeries.term[kLast - Index].second_along), ...);
+    return sum;
   }
 
   /// Of the disc's centre, positive where a line leaves nearly all of the disc.
@@ -305,7 +300,7 @@ class Bundle {
     const Row& radius = sides_.half[stack_.ball];
     Row sides;
     side(line, sides);
-    for (int k = 0; k < n_; ++k)
+    for (int k = 0; k < kRow; ++k)
       result[k] = sides[k] - (n.x * sides_.centre_x[k] + n.y * sides_.centre_y[k]) - 0.9 * radius[k] * length;
   }
 
@@ -313,10 +308,10 @@ class Bundle {
     const Quadric& ball = stack_.quadric[stack_.ball];
     const double pi = std::numbers::pi;
     double up = 0, all = 0, t_up = 0, size = 0;
-    for (int k = 0; k < n_; ++k) {
+    for (int k = 0; k < kRow; ++k) {
       const double r2 = sides_.half[stack_.ball][k] * sides_.half[stack_.ball][k], w = pi * r2, x = sides_.centre_x[k],
                    y = sides_.centre_y[k];
-      const double t = nodes_.t[k], turned = 2 * pi * nodes_.weight[k], z = turned * (t - ball.level);
+      const double t = t_[k], turned = 2 * pi * counts_[k], z = turned * (t - ball.level);
       area_[k] = w, x_[k] = w * x, y_[k] = w * y;
       xx_[k] = w * (x * x + r2 / 4), yy_[k] = w * (y * y + r2 / 4), xy_[k] = w * x * y;
       surface_[k] = 2 * pi * ball.radius;
@@ -338,17 +333,17 @@ class Bundle {
   }
 
   void finish() {
-    double volume = 0, x = 0, y = 0, z = 0, xx = 0, yy = 0, zz = 0, yz = 0, zx = 0, xy = 0;
-    for (int k = 0; k < n_; ++k) {
-      const double t = nodes_.t[k], w = nodes_.weight[k], a = w * area_[k], ax = w * x_[k], ay = w * y_[k];
-      volume += a, x += ax, y += ay, z += a * t;
-      xx += w * xx_[k], yy += w * yy_[k], zz += a * t * t;
-      yz += ay * t, zx += ax * t, xy += w * xy_[k];
+    Row a, x, y, z, xx, yy, zz, yz, zx, xy;
+    for (int k = 0; k < kRow; ++k) {
+      const double t = t_[k], w = counts_[k];
+      a[k] = w * area_[k], x[k] = w * x_[k], y[k] = w * y_[k], z[k] = a[k] * t;
+      xx[k] = w * xx_[k], yy[k] = w * yy_[k], xy[k] = w * xy_[k];
+      zz[k] = z[k] * t, yz[k] = y[k] * t, zx[k] = x[k] * t;
     }
-    sum_.volume = volume;
-    sum_.first = {x, y, z};
-    sum_.squares = {xx, yy, zz};
-    sum_.products = {yz, zx, xy};
+    sum_.volume += sum(a);
+    sum_.first += Vec3{sum(x), sum(y), sum(z)};
+    sum_.squares += Vec3{sum(xx), sum(yy), sum(zz)};
+    sum_.products += Vec3{sum(yz), sum(zx), sum(xy)};
   }
 
   /// atan2(sine, cosine) for a sine that is not negative, after Cephes: of half the angle, a rational approximation. It
@@ -373,31 +368,29 @@ class Bundle {
 
   const Stack& stack_;
   const Outline& outline_;
-  const Nodes& nodes_;
-  Row &area_, &surface_;
-  int n_;
+  Row t_, counts_;
   Sides sides_;
-  Row x_, y_, xx_, yy_, xy_;
+  Row area_, x_, y_, xx_, yy_, xy_, surface_;  ///< per slice
   Integrals sum_;
 };
 
 }  // namespace
 
-void find_sides(const Stack& stack, const Row& t, int count, Sides& sides) {
+void find_sides(const Stack& stack, const Row& t, Sides& sides) {
   for (int i = 0; i < stack.quadrics; ++i) {
     const Quadric& q = stack.quadric[i];
     const double low = q.low, high = q.high, stretch = 1 + dot(q.shear, q.shear), along = q.along, slack = q.slack;
     const Point c = q.centre, s = q.shear;
     Row &half = sides.half[i], &upper = sides.upper[i], &lower = sides.lower[i];
-    for (int k = 0; k < count; ++k) half[k] = std::sqrt(std::max(0.0, (t[k] - low) * (high - t[k])));
+    for (int k = 0; k < kRow; ++k) half[k] = std::sqrt(std::max(0.0, (t[k] - low) * (high - t[k])));
     if (q.ball) {
-      for (int k = 0; k < count; ++k) {
+      for (int k = 0; k < kRow; ++k) {
         sides.centre_x[k] = c.x - t[k] * s.x, sides.centre_y[k] = c.y - t[k] * s.y;
         sides.slack[k] = stretch * t[k] * t[k] - 2 * along * t[k] + slack;
       }
       continue;
     }
-    for (int k = 0; k < count; ++k) {
+    for (int k = 0; k < kRow; ++k) {
       const double constant = stretch * t[k] * t[k] - 2 * along * t[k] + slack, middle = c.x - s.x * t[k];
       // The nearer of the two roots of y² − 2 middle y + constant: not as a difference.
       const double far = middle > 0 ? middle + half[k] : middle - half[k], near = far != 0 ? constant / far : 0;
@@ -407,14 +400,26 @@ void find_sides(const Stack& stack, const Row& t, int count, Sides& sides) {
 }
 
 Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices) {
-  return Bundle(stack, outline, nodes, slices).measure();
+  Bundle bundle(stack, outline);
+  for (int first = 0; first < nodes.size; first += kRow) {
+    Row t, counts;
+    for (int k = 0; k < kRow; ++k) {
+      const int node = std::min(first + k, nodes.size - 1);
+      t[k] = nodes.t[node], counts[k] = first + k < nodes.size ? nodes.weight[node] : 0;
+    }
+    bundle.add(t, counts);
+    for (int k = 0; k < kRow && first + k < nodes.size; ++k)
+      slices.volume[first + k] = bundle.areas()[k], slices.area[first + k] = bundle.surfaces()[k];
+  }
+  return bundle.integrals();
 }
 
 Integrals measure(const Stack& stack, const Outline& outline, double t) {
-  Nodes one;
-  one.append(t, 1);
-  Slices slices;
-  return measure(stack, outline, one, slices);
+  Bundle bundle(stack, outline);
+  Row row;
+  row.fill(t);
+  bundle.add(row, {1});
+  return bundle.integrals();
 }
 
 void add_face(const Line& plane, const Stack& stack, const Outline& outline, double t, Integrals& sum) {

@@ -6,33 +6,33 @@
 
 namespace overlapper::slicing {
 
-inline constexpr int kMostNodes = 20;
+inline constexpr int kMostNodes = 24;
 
-/// A number for each node of a rule.
-using Row = std::array<double, kMostNodes>;
+/// A number for each of eight slices, which compilers take two or four at a time.
+inline constexpr int kRow = 8;
+using Row = std::array<double, kRow>;
 
 /// Of each slice, per quadric: half its chord, and the sides of a cylinder or the disc.
 struct Sides {
   std::array<Row, 2> half, upper, lower;
   Row centre_x, centre_y, slack;  ///< of the disc; |centre|² − radius²
 };
-void find_sides(const Stack& stack, const Row& t, int count, Sides& sides);
+void find_sides(const Stack& stack, const Row& t, Sides& sides);
 
 /// Where a rule looks at slices, and what each of them counts.
 struct Nodes {
   int size = 0;
-  Row t, weight;
+  std::array<double, kMostNodes> t, weight;
 
   void append(double at, double counts) { t[size] = at, weight[size] = counts, ++size; }
 };
 
 /// Of each slice: its area, and that of the surface per unit of t.
 struct Slices {
-  Row volume, area;
+  std::array<double, kMostNodes> volume, area;
 };
 
-/// What slices give that all have that outline, weighted and summed. What is bound for each node by itself is done for
-/// all of them before the next, so that compilers take several at a time.
+/// What slices give that all have that outline, weighted and summed.
 Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices);
 
 /// What a single slice gives per unit of t.

@@ -33,7 +33,7 @@ bool integrate(const Stack& stack, std::span<const Interval> intervals, double v
 /// Whether the volume between two values of t agrees with the samples. The root of the area of slices of a convex set
 /// is concave (Brunn and Minkowski), so that chords between samples bound the volume from below, and chords drawn out
 /// beyond them from above: no wrong outline and no value of t missed passes unless what it makes is smaller than the
-/// gap, about a hundredth. Thins the samples out.
+/// gap, about a hundredth. Uses the samples up.
 bool within_chords(double begin, double end, Sum& sum);
 
 }  // namespace overlapper::slicing

@@ -318,19 +318,21 @@ class Measuring {
     if (patch) view = view_of(*stack), stack->view = &view;
     best_.integrals = {};
     double open = std::numeric_limits<double>::infinity();
-    const auto closed = [&] { return open <= kClosed * (totals.volume + best_.integrals.volume); };
+    const auto closed = [&](double part = 1) {
+      return open <= part * kClosed * (totals.volume + best_.integrals.volume);
+    };
     const auto better = [&](bool few, double strictness) {
       const double less = integrate(*stack, few, strictness), ratio = less / open;
       if (less < open) open = less, std::swap(best_, sum_);
       return ratio;
     };
     better(true, 0);
+    if (!closed(0.1) && move_near(*stack)) return true;
     if (!closed()) better(false, 0);
-    if (!closed() && move_near(*stack)) return true;
     // The rules end where the volume is exact. Where areas are not yet, the surface does not close.
     if (!closed() && !slicing::find_intervals(*stack, true, intervals_)) return false;
     for (double strictness = 1; strictness < 1e9 && !closed(); strictness *= 1e3)
-      if (!(better(false, strictness) < 0.5) && strictness > 1) break;
+      if (!(better(false, strictness) < 0.5) && strictness > 1e3) break;
     if (outside(in_world(*stack, best_.integrals.first) / best_.integrals.volume)) return true;
     totals.open += open;
     add_sum(*stack, best_);

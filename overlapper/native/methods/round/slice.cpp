@@ -215,7 +215,8 @@ bool is_outline(const Slice& slice, const Outline& outline) {
   };
   for (int i = 0; i < edges; ++i) {
     const Outline::Edge& edge = outline.edge[i];
-    const int before = outline.edge[i > 0 ? i - 1 : edges - 1].line, after = outline.edge[i + 1 < edges ? i + 1 : 0].line;
+    const int before = outline.edge[i > 0 ? i - 1 : edges - 1].line,
+              after = outline.edge[i + 1 < edges ? i + 1 : 0].line;
     if (edge.line >= lines) return false;
     Point from = last, to;
     if (edge.from_circle || edge.to_circle) {
@@ -232,8 +233,8 @@ bool is_outline(const Slice& slice, const Outline& outline) {
     if (i == 0) first = from;
     const Point normal = stack.line[edge.line].normal, way = to - from;
     if (!(normal.x * way.y - normal.y * way.x > 0)) return false;
-    if (edge.from_circle && (!inside(from, edge.line, edge.line) ||
-                             (i > 0 && !arc_inside(last, from, before, edge.line))))
+    if (edge.from_circle &&
+        (!inside(from, edge.line, edge.line) || (i > 0 && !arc_inside(last, from, before, edge.line))))
       return false;
     if (edge.to_circle ? !inside(to, edge.line, edge.line) : !inside(to, edge.line, after)) return false;
     if (stack.ball >= 0 && !edge.to_circle) {
