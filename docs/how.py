@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/how.md: the steps of the article, the round frame, and four other ways.
+"""Makes the pictures of docs/how.md: the steps of the article, the round frame, four other ways, and slices.
 
 python docs/how.py
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
@@ -21,12 +22,12 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from PIL import Image
 from scipy.spatial import ConvexHull
 
-from overlapper import Box, Cylinder, HalfSpace, Hull, Overlap, Placed, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, Placed, Sphere, overlap
 from overlapper.viewer.look import LIGHT, OWNER_COLORS
 from overlapper.viewer.outline import outline
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parent / "benchmarks"), str(HERE.parent / "tests" / "support")]
+sys.path[:0] = [str(HERE.parent / "benchmarks" / "paper"), str(HERE.parent / "tests" / "support")]
 
 from families import DODECAHEDRON, icosphere  # noqa: E402
 from paper_steps import common_point  # noqa: E402
@@ -377,10 +378,11 @@ def draw_closed_form(figure: plt.Figure) -> None:
 
 
 def draw_tangent_planes(figure: plt.Figure) -> None:
+    room = Placed(Box([9, 9, 9]))  # three bodies have no slices
     bodies = Placed(Cylinder(0.5, 1.4)), Placed(Sphere(0.55), (0.3, -0.3, 0.6))
-    axes = stage(figure, (2, 2, 4), "dual hull", "Round bodies add tangent planes where the polytope still\n"
-                 "reaches too far out; here to a tolerance of 0.05.")  # fmt: skip
-    common = overlap(*bodies, tolerance=0.05)
+    axes = stage(figure, (2, 2, 4), "dual hull", "In a group, round bodies add tangent planes where the polytope\n"
+                 "still reaches too far out; here to a tolerance of 0.05.")  # fmt: skip
+    common = overlap(*bodies, room, tolerance=0.05)
     assert common.way == "dual hull"
     seen = [ghost(axes, placed, color, 0.10) for placed, color in zip(bodies, OWNER_COLORS)]
     solid(axes, rings(common), [OWNER_COLORS[o] for o in common.owner], 1.0, zorder=3)
@@ -388,10 +390,90 @@ def draw_tangent_planes(figure: plt.Figure) -> None:
     frame(axes, np.concatenate(seen))
 
 
+# --------------------------------------------------------------------------------------------------------------- slices
+
+RADIUS, HEIGHT, CUT = 0.3, 0.12, 0.05  # of a capsule along x: its axis over the edge, and where the cylinder ends
+
+
+def slice_of(t: float) -> tuple[Ring, Ring]:
+    """Outlines in the plane y = t of what the wedge z <= -|x| shares with the cylinder, and with the half ball."""
+    reach = np.sqrt(max(0.0, RADIUS**2 - t**2))
+    low = HEIGHT - reach
+    right = min(-low, CUT)
+    of_cylinder = np.array([[low, low], [right, low], [right, -right], [0, 0]])
+    # From the cut along the face to where that leaves the disc, and back along the arc.
+    a, b = CUT, HEIGHT
+    half = (a - b) / 2 + np.sqrt(max(0.0, (a - b) ** 2 / 4 - (a * a + b * b - reach**2) / 2))
+    if not low < -CUT:
+        return of_cylinder, np.zeros((0, 2))
+    end = np.arctan2(-half - b, half - a)
+    arc = np.linspace(end, -np.pi / 2, 24)
+    of_ball = np.column_stack([a + reach * np.cos(arc), b + reach * np.sin(arc)])
+    return of_cylinder, np.vstack([[CUT, -CUT], of_ball])
+
+
+def area_of(ring: Ring) -> float:
+    x, z = ring.T
+    return abs(x @ np.roll(z, -1) - z @ np.roll(x, -1)) / 2 if len(ring) else 0.0
+
+
+def draw_slices() -> None:
+    capsule = Placed(Capsule(RADIUS, 1.0), (CUT - 0.5, 0, HEIGHT), (0, np.sqrt(0.5), 0, np.sqrt(0.5)))
+    box = Placed(Box([0.55, 0.55, 0.55]), (0, 0, -0.55 * np.sqrt(2)), (0, np.sin(np.pi / 8), 0, np.cos(np.pi / 8)))
+    common = overlap(capsule, box)
+    end, corner = np.sqrt(RADIUS**2 - HEIGHT**2), np.sqrt(RADIUS**2 - (HEIGHT + CUT) ** 2)
+    levels = np.array([-end, -corner, corner, end])
+    turn, half_ball = (18, -62), (0.55, 0.36, 0.05)
+    spread = np.array([1, 2.2, 1])
+
+    figure = plt.figure(figsize=(11, 4.4))
+    axes = stage(figure, (1, 3, 1), "A capsule on the edge of a box", "It is cut into a cylinder and two half balls\n"
+                 "(dashed); pieces that reach nothing are left out.", turn)  # fmt: skip
+    seen = [ghost(axes, placed, color) for placed, color in zip((capsule, box), OWNER_COLORS)]
+    around = np.linspace(0, 2 * np.pi, 60)
+    circle = np.column_stack([np.full(60, CUT), RADIUS * np.cos(around), HEIGHT + RADIUS * np.sin(around)])
+    lines(axes, [circle], INK, 0.9, 1, 5, "--")
+    solid(axes, rings(common), [OWNER_COLORS[o] for o in common.owner], 1.0, edge="none", zorder=3)
+    frame(axes, np.concatenate(seen), 1.2, 0.15)
+
+    axes = stage(figure, (1, 3, 2), "Slices along the axis", "Of the cylinder each is a polygon, of the half ball\n"
+                 "a polygon cut by one disc (dark); here drawn apart.", (14, -50))  # fmt: skip
+    for t in np.linspace(-end, end, 11)[1:-1][::-1]:
+        for ring, color in zip(slice_of(t), (OWNER_COLORS[0], half_ball)):
+            if len(ring):
+                placed = spread * np.insert(ring, 1, t, axis=1)
+                drawn = Poly3DCollection([placed], facecolors=[(*color, 0.9)], edgecolors=INK, linewidths=0.6)
+                axes.add_collection3d(drawn)
+    corners = np.concatenate([np.insert(slice_of(t)[0], 1, t, axis=1) for t in (-end, 0, end)])
+    frame(axes, spread * corners, 2.0, 0.05)
+
+    axes = figure.add_axes((0.715, 0.13, 0.27, 0.62))
+    axes.set_title("Their areas, integrated", fontsize=11, fontweight="bold", color=INK, loc="left", y=1.2)
+    said = "Between the lines no outline changes, and a rule of\nGauss and Legendre in the angle is soon exact (dots)."
+    axes.text(0, 1.18, said, transform=axes.transAxes, fontsize=8.5, color=INK, va="top", linespacing=1.35)
+    ts = np.linspace(-end, end, 400)
+    angles, _ = np.polynomial.legendre.leggauss(8)
+    for piece, (color, name) in enumerate(((OWNER_COLORS[0], "of the cylinder"), (half_ball, "of the half ball"))):
+        axes.plot(ts, [1e4 * area_of(slice_of(t)[piece]) for t in ts], color=color, lw=1.6, label=name)
+        for low, high in pairwise(levels):
+            at = (low + high) / 2 - (high - low) / 2 * np.cos(np.pi / 2 * (angles + 1))
+            values = [1e4 * area_of(slice_of(t)[piece]) for t in at]
+            if max(values) > 0:
+                axes.plot(at, values, "o", ms=3, color=color)
+    for level in levels:
+        axes.axvline(level, color=GREY, lw=0.8, ls=":")
+    axes.set(xlabel="t (m)", ylabel="area of the slice (cm²)")
+    axes.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 0.42))
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.subplots_adjust(0.0, 0.02, 1.0, 0.92, 0.0, 0)
+    save(figure, "how_slices.png")
+
+
 def main() -> None:
     draw_steps()
     draw_frame()
     draw_ways()
+    draw_slices()
 
 
 if __name__ == "__main__":
