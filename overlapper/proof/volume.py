@@ -27,6 +27,8 @@ from overlapper.proof.vectors import cross, dot, fraction, minus, plus, scaled
 
 # Bits of a first try, and of a last one, after which doubt is taken for a fault of the input.
 FIRST, LAST = 128, 1 << 11
+# What share of the whole the doubt of all parts together may be before any is computed again.
+ENOUGH = 1 << 60
 # Bits at which a sign that is not decided is taken for one that never is.
 TIED = 512
 
@@ -46,26 +48,28 @@ class Common:
             one, other = first.pieces[i], second.pieces[j]
             self._parts += parts(one, other)
             self.lost += one.lost + other.lost
+        self._enough = arb(0)
         self._known: list[arb | None] = [None] * len(self._parts)
 
     def bounds(self, bits: int) -> Bounds | None:
         """With numbers of so many bits; None if these are too few for one of the parts.
 
-        Of a part that is known much better than another, what was found before is kept.
+        Of a part that is known well enough beside the whole, what was found before is kept.
         """
         with ctx.workprec(bits):
-            widest = max((volume.rad() for volume in self._known if volume is not None), default=arb(0))
-            least = widest / (64 * len(self._known) + 1)
-            for k, part in enumerate(self._parts):
+            wide = [k for k, volume in enumerate(self._known) if volume is None or volume.rad() > self._enough]
+            for k in wide or range(len(self._parts)):
                 known = self._known[k]
-                if known is None or known.rad() > least:
-                    with suppress(Undecided):
-                        self._known[k] = part(bits)
-            found = [volume for volume in self._known if volume is not None]
-            if len(found) < len(self._parts):
+                with suppress(Undecided):
+                    found = self._parts[k](bits)
+                    if known is None or found.rad() < known.rad():
+                        self._known[k] = found
+            volumes = [volume for volume in self._known if volume is not None]
+            if len(volumes) < len(self._parts):
                 return None
-            total = sum(found, arb(0))
-        lower, upper = dyadic(total.lower()), dyadic(total.upper()) + fraction(self.lost)
+            total = sum(volumes, arb(0))
+            self._enough = total.lower().nonnegative_part() / (ENOUGH * len(volumes) + 1)
+            lower, upper = dyadic(total.lower()), dyadic(total.upper()) + fraction(self.lost)
         return max(lower, Fraction(0)), upper
 
 

@@ -124,12 +124,31 @@ def test_bounds_are_where_integrals_along_the_axis_are(first, second):
     assert abs(float((lower + upper) / 2) - truth) <= 4e-16 * truth
 
 
-def sunk(rng, first, second, turns):
+def enlarged(shape, by):
+    match shape:
+        case Sphere():
+            return Sphere(by * shape.radius)
+        case Capsule() | Cylinder():
+            return type(shape)(by * shape.radius, by * shape.length)
+        case RoundedHull():
+            return RoundedHull(by * shape.core.vertices, by * shape.radius)
+        case Box():
+            return Box(by * shape.half_extents)
+        case Hull():
+            return Hull(by * shape.vertices)
+        case _:
+            return shape
+
+
+def sunk(rng, first, second, turns, larger=1.0, away=0.0):
     """Two bodies of which the one is as deep in the other as chance will have it, from 1e-1 to 1e-10 m or any depth."""
     places = [rng.normal(size=3) * 0.3 for _ in range(2)]
     if turns != "general" and rng.random() < 0.5:
         places = [np.round(8 * place * (rng.random(3) < 0.5)) / 8 for place in places]
-    a, b = (Placed(SHAPES[name](rng), place, TURNS[turns](rng)) for name, place in zip((first, second), places))
+    a, b = (
+        Placed(enlarged(SHAPES[name](rng), by), place + away, TURNS[turns](rng))
+        for name, place, by in zip((first, second), places, (1.0, larger))
+    )
     if turns != "general" and first == second and rng.random() < 0.3:
         b = Placed(a.shape, b.position, b.orientation)
     if rng.random() < 0.7:
@@ -163,6 +182,19 @@ def test_what_is_measured_lies_around_what_is_proved(first, second, turns):
     wrong = {}
     for _ in range(3):
         a, b = sunk(rng, first, second, turns)
+        found = overlap(a, b)
+        if found:
+            wrong[a, b] = disagreement(found)
+    assert not any(wrong.values()), wrong
+
+
+@pytest.mark.parametrize("first", ROUND)
+@pytest.mark.parametrize("larger", [1e-3, 30.0, 1e3])
+def test_neither_size_nor_place_costs_digits(first, larger):
+    rng = np.random.default_rng([13, *map(ord, first), int(larger)])
+    wrong = {}
+    for second in SHAPES:
+        a, b = sunk(rng, first, second, "general", larger, rng.normal(size=3) * rng.choice([0, 1e4]))
         found = overlap(a, b)
         if found:
             wrong[a, b] = disagreement(found)
@@ -216,6 +248,9 @@ def test_a_lie_in_the_last_digit_is_found():
     lower, upper = bounds(a, b)
     step = lower / 10**12
     assert Bracketed((a, b), lower - step, upper + step).verify() == (lower - step, upper + step)
+    both = proved_bounds(a, b, lambda found: found[1] - found[0] <= found[0] / 10**60)
+    assert lower <= both[0] <= both[1] <= upper
+    assert Bracketed((a, b), *both).verify() == both
     for low, high in ((upper, upper + step), (lower - step, lower), (lower - 2 * step, lower - step)):
         with pytest.raises(CertificateError, match="the common volume must lie between"):
             Bracketed((a, b), low, high).verify()
