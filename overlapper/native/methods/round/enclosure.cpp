@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace overlapper::slicing {
 
@@ -23,8 +24,8 @@ void Enclosure::become(const Bounds& box) {
 }
 
 bool Enclosure::cut(const Face& face) {
-  thread_local std::vector<double> left;
-  thread_local std::vector<int> place;
+  thread_local std::pair<std::vector<double>, std::vector<int>> of_thread;
+  auto& [left, place] = of_thread;  // every use of what is a thread's own looks for it
   const int before = static_cast<int>(corners.size());
   left.resize(before);
   int kept = 0;

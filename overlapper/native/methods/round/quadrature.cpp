@@ -58,7 +58,7 @@ constexpr std::array<Rule, 3> kRules{kNodes8, kNodes16, kNodes24};
 static_assert(2 * kNodes24.size() == kMostNodes);
 
 /// The relative errors of a rule that are not worth another one, at first.
-constexpr double kVolumeError = 1e-14, kAreaError = 1e-13;
+constexpr double kVolumeError = 1e-14, kAreaError = 1e-12;
 /// The relative size at which the last coefficients of the series leave no error worth halving for: a rule of n nodes
 /// integrates the first 2 n terms, so that its error is as small as the square of the n-th.
 constexpr double kVolumeTail = 2e-9, kAreaTail = 1e-7;
