@@ -15,9 +15,10 @@ struct Interval {
 /// The intervals in which the slices of a stack hold something, one beside the other; false if they cannot be told.
 ///
 /// Where three planes, two planes and a quadric, or a plane and a quadric whose section is extremal meet, and where two
-/// discs cross, t has a closed form. A root too many costs time and moves nothing. Whatever else changes an outline, a
-/// corner of a plane and two quadrics above all, shows by slices of an interval that have other outlines, and is found
-/// by bisection. `closely` looks at more slices, and nearer to the ends of intervals.
+/// discs cross, t has a closed form; where a plane meets a corner of two quadrics, samples of the corner and of where it
+/// turns lead to it. A root too many costs time and moves nothing. Of what lies between two values of t, the slice in
+/// the middle tells the outline: with another one at the ends, the surface that is measured does not close. `closely`
+/// looks at many slices, up to the ends of intervals, and finds whatever else changes an outline by bisection.
 bool find_intervals(const Stack& stack, bool closely, std::vector<Interval>& intervals);
 
 }  // namespace overlapper::slicing
