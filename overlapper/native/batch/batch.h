@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "batch/box_tree.h"
-#include "overlap/once.h"
+#include "geometry/once.h"
 #include "overlap/overlap.h"
 #include "shapes/shape.h"
 

@@ -7,6 +7,7 @@
 #include "geometry/cancellation.h"
 #include "geometry/ridges.h"
 #include "geometry/sum_in_pairs.h"
+#include "overlap/plane_tree.h"
 
 namespace overlapper {
 namespace {
@@ -87,16 +88,17 @@ std::vector<int> representatives(const Polytope& p, std::span<const int> group, 
   std::vector<int> chosen(groups);
   for (int g = 0; g < groups; ++g) {
     cancellation_point();
+    const std::vector<int>& vertices = members[g];
+    chosen[g] = vertices[0];
+    if (vertices.size() == 1) continue;
+    const Vec3 centre = p.vertices[vertices[0]];
+    double radius = 0;
+    for (int v : vertices) radius = std::max(radius, norm(p.vertices[v] - centre));
+    PlaneTree planes(p, facets_of[g], centre, radius);
     double least = std::numeric_limits<double>::infinity();
-    for (int v : members[g]) {
-      double misfit = 0;
-      std::vector<int>& facets = facets_of[g];
-      for (size_t i = 0; i < facets.size() && misfit < least; ++i) {
-        const int f = facets[i];
-        misfit = std::max(misfit, std::abs(dot(p.dual[f], p.vertices[v]) - 1) / norm(p.dual[f]));
-        // What has ruled one out is sooner asked about the next: most of a large group are ruled out at once.
-        if (misfit >= least) std::swap(facets[i], facets[i / 2]);
-      }
+    for (int v : vertices) {
+      cancellation_point();
+      const double misfit = planes.misfit(p.vertices[v], least);
       if (misfit < least) least = misfit, chosen[g] = v;
     }
   }

@@ -264,17 +264,35 @@ class Sandwich {
     for (size_t f = 0; f < facets_.size(); ++f) {
       cancellation_point();
       const std::vector<Vec3> corners = polygon(f);
-      const std::vector<int> all = numbers(corners);
       double doubtful = beside_smooth(corners, facets_[f]) ? kInfinity : 0;
+      const double all = area(f);
       const auto ring = region_.polytope.facet(static_cast<int>(f));
-      for (size_t i = 0; i < ring.size(); ++i) {
+      for (size_t i = 0; i < ring.size() && !(doubtful >= all); ++i) {
         const Seen& plane = facets_[ridges.left_of(ring[(i + 1) % ring.size()], ring[i])];
-        if (plane.owner != facets_[f].owner)
-          doubtful += area_within(corners, all, plane, facets_[f].moved + plane.moved);
+        if (plane.owner == facets_[f].owner) continue;
+        const double moved = facets_[f].moved + plane.moved;
+        const std::vector<int> near = near_edge(corners, i, plane, moved);
+        if (!near.empty()) doubtful += area_within(corners, near, plane, moved);
       }
       areas.push_back(doubtful);
     }
     return areas;
+  }
+
+  /// The corners of a convex polygon where a plane through its edge number `edge` is no farther than that, in order. On
+  /// the way from either end of the edge, the plane is farther and farther off until the way turns back to it.
+  static std::vector<int> near_edge(const std::vector<Vec3>& polygon, size_t edge, const Seen& plane, double distance) {
+    const size_t corners = polygon.size();
+    std::vector<int> near;
+    const auto add = [&](size_t place) {
+      if (near.size() == corners || !(plane.slack_at(polygon[place % corners]) - distance <= 0)) return false;
+      near.push_back(static_cast<int>(place % corners));
+      return true;
+    };
+    for (size_t ahead = 1; add(edge + ahead);) ++ahead;
+    for (size_t back = 0; add(edge + corners - back);) ++back;
+    std::ranges::sort(near);
+    return near;
   }
 
   /// Planes that may pass through the polytope's facets, each of them once: a facet of many corners has a triangle for

@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "geometry/measures.h"
+#include "geometry/once.h"
 #include "methods/choose.h"
 #include "methods/dual/region.h"
 #include "overlap/boundary.h"
 #include "overlap/contact.h"
 #include "overlap/errors.h"
-#include "overlap/once.h"
 #include "shapes/shape.h"
 
 namespace overlapper {

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "shapes/facet_tree.h"
 #include "shapes/shape.h"
 
 namespace overlapper {
@@ -11,43 +12,34 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A point of a polytope, and a direction out of it there along which no other point of the polytope lies farther.
-struct Foot {
-  Vec3 point, outward;
-  double height2;  ///< squared distance from where it was asked
-};
+/// Facets up to which looking at each takes no longer than a tree.
+constexpr size_t kMostScanned = 64;
 
-/// The foot on a facet of a point above its plane.
-Foot foot_on_facet(const HullData& hull, int f, Vec3 x) {
-  const Plane& plane = hull.planes[f];
-  const Vec3 flat = x - signed_distance(plane, x) * plane.normal;
-  const auto ring = hull.facet(f);
-  Foot best{flat, plane.normal, kInfinity};
-  bool inside = true;
-  for (size_t i = 0; i < ring.size(); ++i) {
-    const Vec3 a = hull.vertices[ring[i]], edge = hull.vertices[ring[(i + 1) % ring.size()]] - a;
-    if (dot(cross(edge, plane.normal), flat - a) <= 0) continue;
-    inside = false;
-    const double length2 = norm2(edge), share = std::clamp(dot(x - a, edge) / length2, 0.0, 1.0);
-    const Vec3 point = a + share * edge;
-    Vec3 outward = x - point;
-    // Rounding must not tilt the direction along the edge: the polytope would reach farther that way.
-    if (share > 0 && share < 1) outward -= dot(outward, edge) / length2 * edge;
-    if (norm2(x - point) < best.height2) best = {point, outward, norm2(x - point)};
-  }
-  if (inside) best.height2 = norm2(x - flat);
-  return best;
-}
+bool scanned(const HullData& hull) { return !hull.graph || hull.ring.size() <= 6 * kMostScanned; }
 
-/// The nearest point of the polytope to a point outside of it. It lies on a facet that the point sees.
-Foot foot(const HullData& hull, Vec3 x) {
+/// The nearest point of the core to a point outside of it. It lies on a facet that the point sees.
+Foot foot(const RoundedHull& rounded, Vec3 x) {
+  const HullData& hull = *rounded.core.data;
   Foot nearest{x, {}, kInfinity};
-  for (int f = 0; f < static_cast<int>(hull.planes.size()); ++f) {
-    const double height = signed_distance(hull.planes[f], x);
-    if (height <= 0 || height * height >= nearest.height2) continue;
-    const Foot found = foot_on_facet(hull, f, x);
-    if (found.height2 < nearest.height2) nearest = found;
+  if (scanned(hull)) {
+    for (int f = 0; f < static_cast<int>(hull.planes.size()); ++f) {
+      const double height = signed_distance(hull.planes[f], x);
+      if (height <= 0 || height * height >= nearest.height2) continue;
+      const Foot found = foot_on_part(hull, whole_facet(hull, f), x);
+      if (found.height2 < nearest.height2) nearest = found;
+    }
+    return nearest;
   }
+  // The surface on the way to the centroid is not nearer, but for rounding.
+  const double from_centroid = norm(x - hull.centroid);
+  const double rounding = 64 * DBL_EPSILON * (from_centroid + hull.radius) / hull.graph->inradius;
+  double gauge;
+  hull.graph->facet_towards(hull, x, gauge);
+  if (gauge < 1 - rounding) return nearest;
+  const double within = from_centroid * (std::max(0.0, 1 - 1 / gauge) + rounding);
+  const FacetTree& tree = rounded.parts->get([&] { return FacetTree(hull); });
+  nearest = tree.foot(hull, x, within * within);
+  if (gauge > 1 + rounding && !(norm2(nearest.outward) > 0)) nearest = tree.foot(hull, x, kInfinity);
   return nearest;
 }
 
@@ -118,7 +110,7 @@ Vec3 RoundedHull::centroid() const {
 }
 
 Plane RoundedHull::tightest(Vec3 point) const {
-  const Foot nearest = foot(*core.data, point);
+  const Foot nearest = foot(*this, point);
   if (norm2(nearest.outward) > 0) return supporting(nearest.outward);
   Plane plane = highest_plane(*core.data, point);
   plane.offset += radius;
@@ -139,13 +131,19 @@ Plane RoundedHull::ray_exit(Vec3 origin, Vec3 direction) const {
   };
   Plane exit{};
   double t = kInfinity;
-  for (Plane plane : core.data->planes) {
-    plane.offset += radius;
-    if (leave(plane) < t) t = leave(plane), exit = plane;
+  if (scanned(*core.data)) {
+    for (Plane plane : core.data->planes) {
+      plane.offset += radius;
+      if (leave(plane) < t) t = leave(plane), exit = plane;
+    }
+  } else {
+    exit = supporting(direction), t = leave(exit);
   }
   constexpr int kMostSteps = 64;
   for (int step = 0; step < kMostSteps; ++step) {
-    const Plane plane = tightest(origin + t * direction);
+    const Foot nearest = foot(*this, origin + t * direction);
+    if (!(norm2(nearest.outward) > 0)) break;
+    const Plane plane = supporting(nearest.outward);
     const double sooner = leave(plane);
     if (!(sooner < t)) break;
     exit = plane;

@@ -6,6 +6,8 @@
 #include <variant>
 #include <vector>
 
+#include "geometry/once.h"
+#include "shapes/facet_tree.h"
 #include "shapes/hull.h"
 
 namespace overlapper {
@@ -83,6 +85,7 @@ struct HalfSpace {
 struct RoundedHull {
   Hull core;
   double radius;
+  std::shared_ptr<const Once<FacetTree>> parts = std::make_shared<Once<FacetTree>>();  ///< of the core
 
   Vec3 support(Vec3 direction) const { return core.support(direction) + radius * unit(direction); }
   Plane ray_exit(Vec3 origin, Vec3 direction) const;
