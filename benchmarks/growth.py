@@ -145,7 +145,19 @@ ROUND: dict[str, Callable[[float], Any]] = {
     "cylinder": lambda extent: overlapper.Cylinder(extent / 3, extent / 2),
     "small_ball": lambda extent: overlapper.Sphere(extent / 50),
 }
-QUESTIONS = ("hull", "volume", "depth", "vertices", "errors", "distance", "paper", "rounded", *ROUND)
+QUESTIONS = (
+    "hull",
+    "volume",
+    "depth",
+    "vertices",
+    "errors",
+    "distance",
+    "paper",
+    "rounded",
+    "rounded_errors",
+    "ball_errors",
+    *ROUND,
+)
 
 
 @dataclass(frozen=True)
@@ -183,10 +195,13 @@ def seconds(given: Input, n: int) -> tuple[float, int]:
             distance(body, Placed(body, (2 * extent, 0.1 * extent, 0), given.turn))
         elif given.ask == "paper":
             overlap(body, other, method="paper")
-        elif given.ask == "rounded":
+        elif given.ask in ("rounded", "rounded_errors"):
             rounded = Placed(RoundedHull(points, extent / 100), (extent, 0, 0), given.turn)
             start = time.process_time()
-            assert overlap(Sphere(extent / 2), rounded).volume_error >= 0
+            common = overlap(Sphere(extent / 2), rounded)
+            assert (common.errors.volume if given.ask == "rounded_errors" else common.volume_error) >= 0
+        elif given.ask == "ball_errors":
+            assert overlap(body, Placed(Sphere(extent / 2), given.away, given.turn)).errors.volume >= 0
         elif given.ask in ROUND:
             assert overlap(body, Placed(ROUND[given.ask](extent), given.away, given.turn)).volume_error >= 0
         else:

@@ -88,12 +88,12 @@ class PolytopeSearch {
     b_.cut(-outward, -farthest_a - room);
     if (static_cast<double>(a_.ridges.size()) * static_cast<double>(b_.ridges.size()) > kMostRidgesCompared)
       return false;
-    for (int f = 0; f < static_cast<int>(a_.facets.size()); ++f)
+    for (int f = 0; f < static_cast<int>(a_.facets.size()) && !asked_too_many(); ++f)
       consider({0, Candidate::kFacetOfA, f, -1, 1}, a_.facets[f].normal);
-    for (int f = 0; f < static_cast<int>(b_.facets.size()); ++f)
+    for (int f = 0; f < static_cast<int>(b_.facets.size()) && !asked_too_many(); ++f)
       consider({0, Candidate::kFacetOfB, -1, f, 1}, -b_.facets[f].normal);
     consider_ridges();
-    if (corners_asked_ > kMostCornersAsked) return false;
+    if (asked_too_many()) return false;
     std::ranges::sort(candidates_, {}, &Candidate::least);
     for (const Candidate& candidate : candidates_) {
       cancellation_point();
@@ -122,7 +122,10 @@ class PolytopeSearch {
     return along(c.sign * ridges.direction, ridges.lost);
   }
 
+  bool asked_too_many() const { return corners_asked_ > kMostCornersAsked; }
+
   void consider(Candidate candidate, Vec3 direction) {
+    cancellation_point(a_.corners.size() + b_.corners.size());
     corners_asked_ += static_cast<double>(a_.corners.size() + b_.corners.size());
     candidate.least = a_.least_reach(direction) + b_.least_reach(-direction) - ways.lost();
     if (candidate.least <= way()) candidates_.push_back(candidate);
@@ -140,7 +143,7 @@ class PolytopeSearch {
     std::vector<double> rises(b_.facets.size());
     for (int i = 0; i < static_cast<int>(a_.ridges.size()); ++i) {
       cancellation_point();
-      if (corners_asked_ > kMostCornersAsked) return;
+      if (asked_too_many()) return;
       const NearRidge& ridge = a_.ridges[i];
       if (!near(ridge, b_)) continue;
       for (size_t f = 0; f < rises.size(); ++f) rises[f] = dot(b_.facets[f].normal, ridge.along);
