@@ -41,7 +41,8 @@ inline void look_at_clock() {
 }  // namespace cancellation
 
 /// Where a computation may end early: in each loop that may go on for a tenth of a second and more. As what is asked
-/// may be a signal handler that computes something itself, there are none where scratch memory of the thread is in use.
+/// may be a signal handler that computes something itself, there are none where a thread_local of ours is in use, but
+/// for what a Scratch has lent.
 inline void cancellation_point() {
   if (--cancellation::points_left <= 0) cancellation::look_at_clock();
 }

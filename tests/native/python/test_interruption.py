@@ -27,7 +27,8 @@ def clump(count):
     return [Placed(ROUND[0], rng.normal(size=3) * 1e-3, rng.normal(size=4)) for _ in range(count)]
 
 
-ROUND = []  # the hull of a ball of many points, in the process that is interrupted
+# The hulls of balls of many points, in the process that is interrupted.
+ROUND, LARGE = [], []
 
 
 def hull(count=300_000):
@@ -76,6 +77,59 @@ def polytope():
     return lambda: common.vertices
 
 
+def errors():
+    a, b = clump(2)
+    common = overlap(a, b)
+    assert common.volume > 0
+    return lambda: common.errors
+
+
+def traced_pair():
+    a = Placed(LARGE[0], (0.01, 0.02, 0.005), TURNED)
+    return lambda: overlap(LARGE[0], a).volume
+
+
+def errors_beside_a_ball():
+    common = overlap(ROUND[0], Placed(Sphere(1), (0.01, 0.02, 0.005)))
+    assert common.volume > 0
+    return lambda: common.errors
+
+
+def certificate():
+    a, b = clump(2)
+    common = overlap(a, b)
+    return lambda: common.certificate().verify()
+
+
+def finely_rounded(other):
+    """With whatever lies across a good part of it, by slices or by a polytope of tangent planes."""
+    a = RoundedHull(ball(20_000), 0.05)
+    b = Placed(other(a), (0.7, 0.1, 0.05), TURNED)
+    return lambda: overlap(a, b).volume
+
+
+def rounded_hull_and_ball():
+    return finely_rounded(lambda _: Sphere(1))
+
+
+def rounded_hull_and_cylinder():
+    return finely_rounded(lambda _: Cylinder(0.5, 1))
+
+
+def rounded_hull_and_its_core():
+    return finely_rounded(lambda a: a.core)
+
+
+def rounded_hulls():
+    return finely_rounded(lambda a: a)
+
+
+def errors_of_rounded_hulls():
+    a = RoundedHull(ball(20_000), 0.05)
+    common = overlap(a, Placed(a, (0.7, 0.1, 0.05), TURNED))
+    return lambda: common.errors
+
+
 def round_bodies_to_a_fine_tolerance():
     bodies = Capsule(1, 1), Placed(Cylinder(1, 1), (0.3, 0.2, 0.1), TURNED)
     return lambda: overlap(*bodies, tolerance=1e-7).vertices
@@ -102,14 +156,16 @@ def overlaps_before_the_first_pair():
 
 
 JOBS = [
-    hull, rounded_hull, points_for_a_hull, unpickled_hull, pair, group, group_by_the_article, polytope,
-    round_bodies_to_a_fine_tolerance, one_long_row, long_rows_of_many_threads, pairs_of_boxes,
-    overlaps_before_the_first_pair,
+    hull, rounded_hull, points_for_a_hull, unpickled_hull, pair, traced_pair, group, group_by_the_article, polytope,
+    errors, errors_beside_a_ball, certificate, rounded_hull_and_ball, rounded_hull_and_cylinder,
+    rounded_hull_and_its_core, rounded_hulls, errors_of_rounded_hulls, round_bodies_to_a_fine_tolerance, one_long_row,
+    long_rows_of_many_threads, pairs_of_boxes, overlaps_before_the_first_pair,
 ]  # fmt: skip
 
 
 def prepare():
     ROUND.append(Hull(ball(50_000)))
+    LARGE.append(Hull(ball(300_000)))
 
 
 @pytest.fixture(scope="module")
@@ -150,19 +206,36 @@ def test_ctrl_c_is_answered_within_a_second(another_process, job):
     assert right
 
 
-def handled():
-    """What a long answer is if a signal handler computes something meanwhile, and what it is alone."""
-    found = []
-    alone = overlap(*clump(2)).volume
-    signal.signal(signal.SIGALRM, lambda *_: found.append(overlap(*clump(2)).volume))
+def three_bodies():
     a, b, c = clump(3)
+    return lambda: overlap(a, b, c).volume
+
+
+def other_pair():
+    a, b = clump(2)
+    return lambda: overlap(a, b).volume
+
+
+def coarsely_rounded_hulls():
+    a, b = RoundedHull(ball(300), 0.05), RoundedHull(ball(200), 0.1)
+    return lambda: [overlap(a, Placed(b, (x, 0.1, 0.05), TURNED)).volume for x in np.linspace(1.2, 1.3, 20)]
+
+
+def handled(long, short):
+    """What a long answer is if a signal handler computes something meanwhile, and what both are alone."""
+    found, compute, meanwhile = [], long(), short()
+    alone = meanwhile()
+    signal.signal(signal.SIGALRM, lambda *_: found.append(meanwhile()))
     signal.setitimer(signal.ITIMER_REAL, 0.05)
-    volume = overlap(a, b, c).volume
-    return volume, overlap(a, b, c).volume, found, alone
+    return compute(), long()(), found, alone
 
 
-def test_a_signal_handler_may_compute_while_something_else_is_computed(another_process):
-    volume, again, found, alone = another_process(handled)
+@pytest.mark.parametrize(
+    ("long", "short"),
+    [(three_bodies, other_pair), (traced_pair, other_pair), (coarsely_rounded_hulls, coarsely_rounded_hulls)],
+)
+def test_a_signal_handler_may_compute_while_something_else_is_computed(another_process, long, short):
+    volume, again, found, alone = another_process(handled, long, short)
     assert volume == again
     assert found == [alone]
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "geometry/cancellation.h"
+
 namespace overlapper::slicing {
 namespace {
 
@@ -30,12 +32,14 @@ void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side)
   side.pieces = &pieces;
   if (side.parts.size() < pieces.pieces.size()) side.parts.resize(pieces.pieces.size());
   for (size_t i = 0; i < pieces.pieces.size(); ++i) {
+    cancellation_point(common.corners.size());
     const Piece& piece = pieces.pieces[i];
     Part& part = side.parts[i];
     part.around = common;
     part.walls.clear();
     bool something = true;
     for (int w = piece.first_wall; something && w < piece.first_wall + piece.walls; ++w) {
+      cancellation_point(part.around.corners.size());
       const Wall& wall = pieces.walls[w];
       something = part.around.cut({rounded(wall.normal), wall.slack.head + margin_, w});
     }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "geometry/cancellation.h"
+
 namespace overlapper::slicing {
 namespace {
 
@@ -103,9 +105,9 @@ class Cutter {
     const Bounds near = local_bounds(hull.radius);
     for (int f = 0; f < facets(core); ++f)
       if (meets(near, core.vertices, core.facet(f))) prism(core, f, hull.radius);
-    thread_local std::vector<std::pair<int, int>> beside;
-    beside.clear();
+    std::vector<std::pair<int, int>> beside;
     for (const Edge& edge : core.edges) {
+      cancellation_point();
       const std::array<int, 2> ends{edge.from, edge.to};
       if (!meets(near, core.vertices, ends)) continue;
       edge_wedge(core, edge, hull.radius);
@@ -181,6 +183,7 @@ class Cutter {
     const Vec3 n = rounded(normal);
     const double here = dot(n, inside_) + slack.head;
     if (common_) {
+      cancellation_point(common_->corners.size());
       if (common_->least(n) > slack.head + margin_) {
         empty_ = true;
         return;
@@ -207,6 +210,7 @@ class Cutter {
   }
   void facet_wall(const HullData& hull, int f, double radius, int owner) {
     if (empty_) return;
+    cancellation_point();
     const Plane& plane = hull.planes[f];
     // A look in doubles first.
     const Vec3 n = rounded(rotation_) * plane.normal;
@@ -287,6 +291,7 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result) {
   for (const Placed* body : {&a, &b}) {
     const Vec3 origin = body->pose.translation - inside;
     const auto cut = [&](const Plane& plane, double more) {
+      cancellation_point(result.corners.size());
       const Vec3 normal = body->pose.rotation * plane.normal;
       result.cut({normal, plane.offset + dot(normal, origin) + more + margin, kNoWall});
     };

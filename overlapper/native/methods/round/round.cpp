@@ -6,6 +6,8 @@
 #include <numbers>
 #include <vector>
 
+#include "geometry/cancellation.h"
+#include "geometry/scratch.h"
 #include "methods/round/culling.h"
 #include "methods/round/nodes.h"
 #include "methods/round/quadrature.h"
@@ -242,8 +244,10 @@ class Measuring {
   bool add_polytope() {
     const Vec3 wider = 0.1 * (box.upper - box.lower);
     polytope_.become({box.lower - wider, box.upper + wider});
-    for (size_t i = 0; i < walls_.size(); ++i)
+    for (size_t i = 0; i < walls_.size(); ++i) {
+      cancellation_point(polytope_.corners.size());
       if (!polytope_.cut({rounded(walls_[i].normal), walls_[i].slack.head, static_cast<int>(i)})) return false;
+    }
     Totals piece;
     std::optional<PatchSums> seen;
     if (patch) seen = *patch;
@@ -435,29 +439,35 @@ Mat3 inertia_about(Vec3 centroid, const Totals& totals) {
   return {{yy + zz, -xy, -zx}, {-xy, xx + zz, -yz}, {-zx, -yz, xx + yy}};
 }
 
+struct Workspace {
+  slicing::Pieces of_a, of_b;
+  Measuring measuring;
+  slicing::Enclosure around;
+  slicing::Culling culling;
+  std::vector<Round> rounds;
+  std::vector<Wall> walls;
+};
+
 std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside,
                                       int owner, PatchSums* patch) {
-  thread_local slicing::Pieces of_a, of_b;
-  thread_local Measuring measuring;
+  const Scratch<Workspace> scratch;
+  auto& [of_a, of_b, measuring, around, culling, rounds, walls] = *scratch;
   of_a.clear(), of_b.clear();
   measuring.totals = {};
   measuring.owner = owner, measuring.patch = patch;
   measuring.extent = std::min(slicing::extent(a, rounded(inside)), slicing::extent(b, rounded(inside)));
   // Of many pieces, few lie near the common set.
-  thread_local slicing::Enclosure around;
-  thread_local slicing::Culling culling;
   const bool many = std::holds_alternative<RoundedHull>(a.shape) || std::holds_alternative<RoundedHull>(b.shape);
   if (many) slicing::enclose(a, b, rounded(inside), around);
   measuring.common = many ? &around : nullptr;
   slicing::cut(a, b, measuring.common, 0, reference, inside, of_a);
   slicing::cut(b, a, measuring.common, 1, reference, inside, of_b);
   if (many) culling.look_at(of_a, of_b, around);
-  thread_local std::vector<Round> rounds;
-  thread_local std::vector<Wall> walls;
   // Pieces without rounds first: others then need to be exact only to a fraction of what these hold.
   for (const int round_ones : {0, 1, 2})
     for (int i = 0; i < static_cast<int>(of_a.pieces.size()); ++i)
       for (int j = 0; j < static_cast<int>(of_b.pieces.size()); ++j) {
+        cancellation_point();
         const slicing::Piece &p = of_a.pieces[i], &q = of_b.pieces[j];
         if ((p.round >= 0) + (q.round >= 0) != round_ones) continue;
         rounds.clear(), walls.clear();

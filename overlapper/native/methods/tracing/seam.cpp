@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "geometry/cancellation.h"
+
 namespace overlapper {
 
 void Seam::begin(CloseBody& first, CloseBody& second) {
@@ -138,6 +140,7 @@ bool Seam::follow(CrossingFacets start) {
   const int first = static_cast<int>(corners_.size());
   Line line{first, {false, false}};
   do {
+    cancellation_point();
     for (int body : {0, 1}) {
       const int facet = body == 0 ? at.first : at.second;
       marks_[body].farthest = std::max(marks_[body].farthest, bodies_[body]->side(facet).farthest);

@@ -3,6 +3,8 @@
 #include <limits>
 
 #include "distance/portal.h"
+#include "geometry/cancellation.h"
+#include "geometry/scratch.h"
 #include "methods/tracing/seam.h"
 #include "shapes/canonical_order.h"
 #include "shapes/local_measures.h"
@@ -290,6 +292,7 @@ bool Tracing::add_cut_facet(int body, int first_corner) {
     const int begin = corners[c].edge;
     int h = begin;
     while ((c = seam_.entry(body, self.twin(h))) < 0) {
+      cancellation_point();
       if (!keep(body, h)) return false;
       if (h != begin) open_[body].push_back(self.twin(h));
       h = self.graph().next[h];
@@ -312,6 +315,7 @@ bool Tracing::spread(int body) {
 }
 
 bool Tracing::add_whole_facet(int body, int half_edge) {
+  cancellation_point();
   const CloseBody& self = bodies_[body];
   const int facet = self.facet(half_edge);
   done_[body][facet] = now_;
@@ -376,6 +380,7 @@ bool Tracing::measure(double least, Measures& common, Pull& on_first) const {
   double least_slack = kInfinity;
   size_t in_block = 0, most_in_block = 0;
   for (size_t f = 0; f < facets_.size(); ++f) {
+    cancellation_point();
     const int* ring = &ring_[ring_start_[f]];
     const size_t corners = ring_start_[f + 1] - ring_start_[f];
     most_in_block = std::max(most_in_block, in_block += corners - 2);
@@ -473,6 +478,7 @@ Region Tracing::region(const Placed& a, Vec3 reference) {
   region.polytope.ring = ring_;
   region.polytope.ring_start = ring_start_;
   for (size_t f = 0; f < facets_.size(); ++f) {
+    cancellation_point();
     const CloseBody::Side& side = bodies_[facets_[f].body].side(facets_[f].facet);
     const double slack = dot(side.normal, side.through - origin);
     region.polytope.dual.push_back(apply_transposed(l, side.normal) / slack);
@@ -484,11 +490,6 @@ Region Tracing::region(const Placed& a, Vec3 reference) {
   return region;
 }
 
-Tracing& of_this_thread() {
-  thread_local Tracing tracing;
-  return tracing;
-}
-
 }  // namespace
 
 std::optional<Measures> trace(const Placed& a, const Placed& b) {
@@ -496,13 +497,13 @@ std::optional<Measures> trace(const Placed& a, const Placed& b) {
   const Placed &first = swapped ? b : a, &second = swapped ? a : b;
   const Relation at = relation(first, second);
   if (at.apart) return Measures{};
-  Tracing& tracing = of_this_thread();
-  const Tracing::Answer answer = tracing.run(first, second, at.pose, at.doubt);
+  const Scratch<Tracing> tracing;
+  const Tracing::Answer answer = tracing->run(first, second, at.pose, at.doubt);
   if (answer == Tracing::Answer::kApart) return Measures{};
   if (answer == Tracing::Answer::kUnknown) return std::nullopt;
   std::optional<Measures> common(std::in_place);
   Pull on_first{};
-  if (tracing.measure(at.doubt, *common, on_first)) say_in_world(*common, on_first, a, b, swapped);
+  if (tracing->measure(at.doubt, *common, on_first)) say_in_world(*common, on_first, a, b, swapped);
   else common.reset();
   return common;
 }
@@ -511,9 +512,9 @@ std::optional<Region> traced_region(const Placed& a, const Placed& b, Vec3 refer
   const bool swapped = comes_before(b, a);
   const Placed &first = swapped ? b : a, &second = swapped ? a : b;
   const Relation at = relation(first, second);
-  Tracing& tracing = of_this_thread();
-  if (tracing.run(first, second, at.pose, at.doubt) != Tracing::Answer::kTraced) return std::nullopt;
-  return tracing.region(first, reference);
+  const Scratch<Tracing> tracing;
+  if (tracing->run(first, second, at.pose, at.doubt) != Tracing::Answer::kTraced) return std::nullopt;
+  return tracing->region(first, reference);
 }
 
 }  // namespace overlapper
