@@ -23,6 +23,16 @@ Overlap::Overlap(const Placed& a, const Placed& b, double tolerance, Method meth
   start();
 }
 
+Overlap::Overlap(const Overlap& other)
+    : two_(other.two_),
+      bodies_(other.bodies_),
+      tolerance_(other.tolerance_),
+      method_(other.method_),
+      status_(other.status_),
+      at_once_(other.at_once_) {
+  lazy_.get([&] { return other.shared_lazy(); });
+}
+
 Overlap::Overlap(Overlap&& other) noexcept
     : two_(std::move(other.two_)),
       bodies_(std::move(other.bodies_)),
@@ -51,8 +61,8 @@ void Overlap::start_as_in_paper() {
   lazy().region.get([&] { return std::move(*result.region); });
 }
 
-const Overlap::Lazy& Overlap::lazy() const {
-  return lazy_.get([] { return Lazy{}; });
+const std::shared_ptr<const Overlap::Lazy>& Overlap::shared_lazy() const {
+  return lazy_.get([] { return std::make_shared<const Lazy>(); });
 }
 
 const Arrangement& Overlap::arrangement() const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -26,6 +27,7 @@ class Overlap {
   /// which the polytope of smooth shapes may be off; polyhedra are exact whatever it is.
   Overlap(std::vector<Placed> bodies, double tolerance, Method method);
   Overlap(const Placed& a, const Placed& b, double tolerance, Method method);
+  Overlap(const Overlap& other);  ///< what either computes from then on, both have
   Overlap(Overlap&& other) noexcept;
 
   std::span<const Placed> bodies() const { return bodies_.empty() ? std::span<const Placed>(two_) : bodies_; }
@@ -93,7 +95,8 @@ class Overlap {
     Once<Overlap> judge_of_paper;
   };
 
-  const Lazy& lazy() const;
+  const std::shared_ptr<const Lazy>& shared_lazy() const;
+  const Lazy& lazy() const { return *shared_lazy(); }
   const Arrangement& arrangement() const;
   const Search& search() const;
   const Inside& inside() const;
@@ -119,7 +122,7 @@ class Overlap {
   Method method_;
   Status status_ = Status::kSeparated;
   std::optional<Measures> at_once_;  ///< where that decided the status
-  Once<Lazy> lazy_;
+  Once<std::shared_ptr<const Lazy>> lazy_;
 };
 
 }  // namespace overlapper

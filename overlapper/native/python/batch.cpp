@@ -1,7 +1,5 @@
 #include "batch/batch.h"
 
-#include <nanobind/stl/shared_ptr.h>
-
 #include <thread>
 
 #include "python/arrays.h"
@@ -166,15 +164,18 @@ take some microseconds a pair when one of them is first asked for.)");
                "(p,) True where the volume was computed again in wider arithmetic.");
 }
 
-/// One that nobody else has is moved into its Python object: nanobind ends the process if it has no memory to share
-/// one.
+/// One that others have as well is copied to where Python keeps it: nanobind ends the process if it has no memory to
+/// share one.
 nb::object overlap_of_row(const Overlaps& overlaps, size_t row) {
   std::shared_ptr<Overlap> found;
   {
     const nb::gil_scoped_release release;
     found = overlaps.overlap(row);
   }
-  return found.use_count() == 1 ? nb::cast(std::move(*found)) : nb::cast(found);
+  nb::object answer = nb::inst_alloc(nb::type<Overlap>());
+  new (nb::inst_ptr<Overlap>(answer)) Overlap(found.use_count() == 1 ? Overlap(std::move(*found)) : Overlap(*found));
+  nb::inst_mark_ready(answer);
+  return answer;
 }
 
 void define_overlaps_class(nb::module_& m) {

@@ -42,6 +42,14 @@ def of_many(batch: Batch) -> list:
     return [as_compared(array) for array in (found.pairs, found.volume, found.depth, found.gradient)]
 
 
+def kept_row() -> Overlap:
+    """One that took long, so that its batch keeps it."""
+    batch = Batch(LONG)
+    found = batch.overlaps([[0, 0, 0], [0.3, 0.2, 0.1]], [[0, 0, 0, 1], [1, 2, 3, 4]], tolerance=0.1, threads=1)
+    return found[0]
+
+
+LONG = [Cylinder(0.3, 1), Hull(POINTS)]
 WARM = Batch(SHAPES)
 
 SCENES = {
@@ -66,6 +74,7 @@ SCENES = {
     "a row of a batch": lambda: figures(
         Batch(SHAPES[:4]).overlaps(POSES[0][:4], POSES[1][:4], tolerance=0.1, threads=1)[0]
     ),
+    "a row that its batch has, too": lambda: figures(kept_row()),
 }
 
 
