@@ -138,6 +138,15 @@ Plane RoundedHull::ray_exit(Vec3 origin, Vec3 direction) const {
     }
   } else {
     exit = supporting(direction), t = leave(exit);
+    // Where the ray leaves the core, the plane there is nearer.
+    const HullGraph& graph = *core.data->graph;
+    double gauge, rate;
+    graph.facet_towards(*core.data, origin, gauge);
+    if (gauge < 1 - 0x1p-20) {
+      Plane plane = core.data->planes[graph.ray_exit(*core.data, origin, direction, rate)];
+      plane.offset += radius;
+      if (leave(plane) < t) t = leave(plane), exit = plane;
+    }
   }
   constexpr int kMostSteps = 64;
   for (int step = 0; step < kMostSteps; ++step) {
