@@ -87,10 +87,19 @@ TYPICAL = {
     "a ball in the floor": Typical((Placed(Sphere(0.5), (0, 0, 0.3)), FLOOR), "closed form"),
     "a cylinder, tilted, in the floor": Typical((Placed(Cylinder(0.5, 1), (0, 0, 0.3), TURN), FLOOR), "closed form"),
     "a ball on the face of a box": Typical((Placed(Sphere(0.5), (0.01, 0.02, 0.9)), Placed(CUBE)), "closed form"),
+    "a ball over the corner of a box": Typical(
+        (Placed(Sphere(0.5), (0.6, 0.4, 0.5)), Placed(CUBE, (0, 0, 0), TURN)), "closed form"
+    ),
+    "a cylinder in the corner of a box": Typical(
+        (Placed(Cylinder(0.3, 1), (0.3, 0.2, 0.5), TURN), Placed(CUBE)), "closed form"
+    ),
+    "a capsule in the corner of a box": Typical(
+        (Placed(Capsule(0.3, 1), (0.3, 0.2, 0.5), TURN), Placed(CUBE)), "closed form"
+    ),
     "two balls": Typical((Placed(Sphere(0.5)), Placed(Sphere(0.5), (0.6, 0, 0))), "closed form"),
     "two cylinders": Typical((Placed(Cylinder(0.5, 1)), Placed(Cylinder(0.5, 1), (0.3, 0.2, 0.1), TURN)), "slicing"),
-    "a capsule in the corner of a box": Typical(
-        (Placed(Capsule(0.3, 1), (0.3, 0.2, 0.5), TURN), Placed(CUBE)), "slicing"
+    "a ball on the side of a capsule": Typical(
+        (Placed(Sphere(0.5)), Placed(Capsule(0.3, 1), (0.6, 0, 0.1), TURN)), "slicing"
     ),
     "a rounded hull of 80 facets and a box": Typical(
         (Placed(RoundedHull(icosphere(1), 0.05)), Placed(CUBE, (0.9, 0.3, 0.4), TURN)), "slicing"

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "methods/quadric/ball.h"
+#include "methods/quadric/cylinder.h"
 #include "shapes/solid.h"
 
 namespace overlapper {
@@ -410,9 +411,9 @@ class OwnPolyhedron {
     if (const Box* box = std::get_if<Box>(&shape)) {
       for (int i = 0; i < 8; ++i) corners_[i] = corner(*box, i);
       for (int f = 0; f < 6; ++f) planes_[f] = side(*box, f);
-      polyhedron_ = {corners_, planes_, edges(shape)};
+      polyhedron_ = {corners_, planes_, edges(shape), 6};
     } else if (const Hull* hull = std::get_if<Hull>(&shape)) {
-      polyhedron_ = {hull->data->vertices, hull->data->planes, edges(shape)};
+      polyhedron_ = {hull->data->vertices, hull->data->planes, edges(shape), hull->data->planes.size()};
     }
   }
   /// Without edges if there is none.
@@ -457,6 +458,53 @@ std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, cons
   return MeasuresAndInertia{std::move(q), rotation * inertia(*part) * transposed(rotation)};
 }
 
+/// A cylinder, or a capsule as a cylinder and two half balls. They are faces of the cylinder where the planes of its
+/// ends cut the polyhedron, and none of the capsule.
+std::optional<MeasuresAndInertia> long_body_and_polyhedron(const Revolved& body, const Placed& placed,
+                                                           const Placed& other, int self, double rounding,
+                                                           Vec3 reference, const std::array<Vec3, 2>& positions) {
+  thread_local quadric::Rings polyhedron, part;
+  if (!polyhedron.become(other.shape, relative_pose(placed.pose, other.pose))) return std::nullopt;
+  const double r = body.radius, h = body.half_length;
+  part = polyhedron;
+  if (!part.cut(h, true) || !part.cut(-h, false)) return std::nullopt;
+  Measures q = by_formula();
+  Vec3 first;
+  Pull on_body{};  // about its centre, along its axes
+  if (!part.empty()) {
+    const auto middle = quadric::measure_cylinder(part, r);
+    if (!middle) return std::nullopt;
+    q.volume = middle->volume, q.volume_error = middle->error, q.area = middle->area, q.facets_touched = middle->faces;
+    first = middle->first;
+    on_body = body.round ? middle->curved : Pull{-middle->flat.force, -middle->flat.moment};
+    if (!body.round) q.area = middle->whole_area;
+  }
+  for (const double end : {h, -h}) {
+    if (!body.round) break;
+    part = polyhedron;
+    if (!part.cut(end, end < 0)) return std::nullopt;
+    if (part.empty()) continue;
+    const quadric::Polyhedron rest = part.polyhedron();
+    if (rest.edges.empty()) return std::nullopt;
+    const Vec3 centre{0, 0, end};
+    const auto ball = quadric::measure_ball(rest, centre, r, false);
+    if (!ball) continue;
+    q.volume += ball->volume, q.volume_error += ball->error, q.area += ball->area, q.facets_touched += ball->faces;
+    first += ball->first + ball->volume * centre;
+    on_body.force += -ball->flat, on_body.moment += cross(centre, -ball->flat);
+  }
+  if (!(q.volume > 0)) return std::nullopt;
+  q.volume_error += rounding * q.area;
+  if (!std::isfinite(q.volume_error)) return std::nullopt;
+  q.centroid = reference + placed.pose * (first / q.volume);
+  const Pull turned{placed.pose.rotation * on_body.force, placed.pose.rotation * on_body.moment};
+  for (const int i : {0, 1}) {
+    const double side = i == self ? 1 : -1;
+    q.pulls[i] = about({side * turned.force, side * turned.moment}, placed.pose.translation, positions[i]);
+  }
+  return MeasuresAndInertia{std::move(q), {}};
+}
+
 std::optional<MeasuresAndInertia> without_inertia(const std::optional<Measures>& measures) {
   return measures ? std::optional(MeasuresAndInertia{*measures, {}}) : std::nullopt;
 }
@@ -476,9 +524,10 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
   const Revolved& body = smooth_a ? *smooth_a : *smooth_b;
   const int self = smooth_a ? 0 : 1;
   std::optional<MeasuresAndInertia> several;
+  const auto error = [](const Measures& m) { return m.volume_error / m.volume; };
   if (body.round && body.half_length == 0)
     several = ball_and_polyhedron(body, other, self, rounding, reference, positions);
-  const auto error = [](const Measures& m) { return m.volume_error / m.volume; };
+  else several = long_body_and_polyhedron(body, smooth_a ? a : b, other, self, rounding, reference, positions);
   if (several && error(several->measures) <= kEnough) return several;
   std::vector<Plane> planes;
   append_planes(other.shape, planes);

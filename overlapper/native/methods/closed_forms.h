@@ -13,7 +13,7 @@ namespace overlapper {
 /// - a ball, a capsule or a cylinder cut by one plane: that of a half-space, or the only one of a box's or a hull's
 /// that
 ///   cuts off anything which the others leave;
-/// - a ball of which several planes of a box or a hull cut off something;
+/// - a ball, a capsule or a cylinder of which several planes of a box or a hull cut off something;
 /// - a ball, a capsule or a cylinder that lies inside a ball, a half-space, a box or a hull.
 ///
 /// Nothing for every other pair. Bodies relative to `reference`, in any order; `rounding` is how far a surface may be

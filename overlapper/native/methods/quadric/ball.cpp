@@ -162,7 +162,7 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     partial += std::abs(curved) + std::abs(arcs);
     sizes += (turn + disc.sizes) * std::abs(h) / r + 2 * kPi;
     cone_sizes += std::abs(h) * (disc.square * (turn + disc.sizes) + std::abs(disc.twice)) / 2;
-    part.area += face;
+    if (f < polyhedron.faces) part.area += face;
     part.flat += face * n;
     const double on_face = (disc.second - disc.square * disc.square * arcs) / 4 - disc.square * disc.twice / 2;
     part.first += on_face / 2 * n;
@@ -172,6 +172,8 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     part.squares += {n.x * w.x, n.y * w.y, n.z * w.z};
     part.products += 0.5 * Vec3{n.y * w.z + n.z * w.y, n.z * w.x + n.x * w.z, n.x * w.y + n.y * w.x};
   }
+  const bool holds_centre = std::ranges::none_of(discs, [](const Disc& disc) { return disc.height < 0; });
+  if (part.faces == 0 && !holds_centre) return BallPart{};
   part.area += r2 * curved;
   part.volume = (cones + r3 * curved) / 3;
   part.error += kUnit * (10 * (cone_sizes + r3 * sizes) / 3 + r3 * partial);

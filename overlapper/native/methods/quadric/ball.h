@@ -13,7 +13,7 @@ struct BallPart {
   Vec3 first;              ///< ∫ x dV
   Vec3 squares, products;  ///< ∫ x², y², z² dV and ∫ yz, zx, xy dV, if asked for
   Vec3 flat;               ///< ∫ n dA over the polyhedron's faces; over the curved part, its opposite
-  double area = 0;         ///< m², of all of the surface
+  double area = 0;         ///< m², of the surface without cuts
   int faces = 0;           ///< of the polyhedron, that take part
 };
 

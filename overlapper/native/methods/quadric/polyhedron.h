@@ -1,17 +1,52 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
-#include "shapes/hull.h"
+#include "shapes/shape.h"
 
 namespace overlapper::quadric {
 
-/// A convex polyhedron that planes leave of a quadric, in coordinates of its own: those of a box or a hull, which need
-/// not be turned.
+/// A convex polyhedron whose inside a quadric shares.
 struct Polyhedron {
   std::span<const Vec3> corners;
   std::span<const Plane> planes;
   std::span<const Edge> edges;
+  size_t faces = 0;  ///< the first of the planes; where others have cut it, its surface goes on in the next piece
+};
+
+/// A convex polyhedron by the corners around each of its faces, counter-clockwise from outside, which planes cut.
+class Rings {
+ public:
+  /// Those of a box or a hull, placed; false if there are none.
+  bool become(const Shape& shape, const Pose& pose);
+  /// Keeps what is not above the height, or not below it; false if a face is not convex, by rounding.
+  bool cut(double height, bool keep_below);
+
+  bool empty() const { return planes_.empty(); }
+  std::span<const Vec3> corners() const { return corners_; }
+  std::span<const Plane> planes() const { return planes_; }
+  std::span<const int> ring(size_t face) const {
+    return std::span(ring_).subspan(start_[face], start_[face + 1] - start_[face]);
+  }
+  /// Whether that is a face, and not a cut.
+  bool face(size_t plane) const { return plane < planes_.size() - cuts_; }
+  /// With edges; good until it changes.
+  Polyhedron polyhedron();
+
+ private:
+  int between(int above, int below, double height);
+
+  std::vector<Vec3> corners_;
+  std::vector<Plane> planes_;
+  std::vector<int> ring_, start_;
+  size_t cuts_ = 0;
+  std::vector<Edge> edges_;
+  std::vector<Vec3> left_;
+  // To work in.
+  std::vector<Plane> kept_;
+  std::vector<int> kept_ring_, kept_start_, after_, number_;
+  std::vector<Edge> crossed_;
 };
 
 }  // namespace overlapper::quadric

@@ -1,0 +1,139 @@
+#include "methods/quadric/polyhedron.h"
+
+#include <algorithm>
+#include <array>
+
+namespace overlapper::quadric {
+namespace {
+
+constexpr int kNone = -1;
+
+/// The corners around the sides of a box, by the numbers of corner() and side().
+constexpr std::array<std::array<int, 4>, 6> box_rings() {
+  std::array<std::array<int, 4>, 6> rings{};
+  for (int k = 0; k < 3; ++k) {
+    const int i = 1 << (k + 1) % 3, j = 1 << (k + 2) % 3, up = 1 << k;
+    rings[2 * k] = {0, j, i | j, i};
+    rings[2 * k + 1] = {up, up | i, up | i | j, up | j};
+  }
+  return rings;
+}
+constexpr auto kBoxRings = box_rings();
+
+}  // namespace
+
+bool Rings::become(const Shape& shape, const Pose& pose) {
+  corners_.clear(), planes_.clear(), ring_.clear(), start_.assign(1, 0), cuts_ = 0;
+  if (const Box* box = std::get_if<Box>(&shape)) {
+    for (int i = 0; i < 8; ++i) corners_.push_back(pose * corner(*box, i));
+    for (int f = 0; f < 6; ++f) {
+      planes_.push_back(pose * side(*box, f));
+      ring_.insert(ring_.end(), kBoxRings[f].begin(), kBoxRings[f].end());
+      start_.push_back(static_cast<int>(ring_.size()));
+    }
+    return true;
+  }
+  const Hull* hull = std::get_if<Hull>(&shape);
+  if (!hull || hull->data->edges.empty()) return false;
+  for (const Vec3 v : hull->data->vertices) corners_.push_back(pose * v);
+  for (const Plane& plane : hull->data->planes) planes_.push_back(pose * plane);
+  ring_ = hull->data->ring, start_ = hull->data->ring_start;
+  return true;
+}
+
+/// The corner where an edge that is cut passes the height, the same for both of its faces.
+int Rings::between(int above, int below, double height) {
+  for (const Edge& edge : crossed_)
+    if (edge.from == above && edge.to == below) return edge.left;
+  const Vec3 p = corners_[above], q = corners_[below];
+  Vec3 at = p + (p.z - height) / (p.z - q.z) * (q - p);
+  at.z = height;
+  corners_.push_back(at);
+  crossed_.push_back({above, below, static_cast<int>(corners_.size()) - 1, 0});
+  return crossed_.back().left;
+}
+
+bool Rings::cut(double height, bool keep_below) {
+  const auto outside = [&](int i) { return keep_below ? corners_[i].z > height : corners_[i].z < height; };
+  const int before = static_cast<int>(corners_.size());
+  bool some = false, all = true;
+  for (int i = 0; i < before; ++i) (outside(i) ? some : all) = outside(i);
+  if (!some) return true;
+  if (all) {
+    planes_.clear(), cuts_ = 0;
+    return true;
+  }
+  kept_.clear(), kept_ring_.clear(), kept_start_.assign(1, 0), crossed_.clear();
+  size_t cuts = 0;
+  // Around the new face, from each corner to the next.
+  after_.clear();
+  for (size_t f = 0; f < planes_.size(); ++f) {
+    const size_t begin = kept_ring_.size();
+    int leaves = kNone, enters = kNone;
+    const auto corners = ring(f);
+    for (size_t k = 0; k < corners.size(); ++k) {
+      const int i = corners[k], j = corners[k + 1 < corners.size() ? k + 1 : 0];
+      if (!outside(i)) kept_ring_.push_back(i);
+      if (outside(i) == outside(j)) continue;
+      const int corner = outside(i) ? between(i, j, height) : between(j, i, height);
+      kept_ring_.push_back(corner);
+      int& side = outside(i) ? enters : leaves;
+      if (side != kNone) return false;
+      side = corner;
+    }
+    if (kept_ring_.size() == begin) continue;
+    if (enters != kNone) {
+      after_.resize(corners_.size() - before, kNone);
+      after_[enters - before] = leaves;
+    }
+    kept_.push_back(planes_[f]);
+    kept_start_.push_back(static_cast<int>(kept_ring_.size()));
+    cuts += !face(f);
+  }
+  const double side = keep_below ? 1 : -1;
+  kept_.push_back({{0, 0, side}, side * height});
+  const int first = before;
+  int at = first;
+  for (size_t k = 0; k < after_.size(); ++k, at = after_[at - before]) {
+    if (at == kNone || (k > 0 && at == first)) return false;
+    kept_ring_.push_back(at);
+  }
+  if (at != first) return false;
+  kept_start_.push_back(static_cast<int>(kept_ring_.size()));
+  cuts_ = cuts + 1;
+  std::swap(planes_, kept_), std::swap(ring_, kept_ring_), std::swap(start_, kept_start_);
+  return true;
+}
+
+Polyhedron Rings::polyhedron() {
+  edges_.clear();
+  // The face on the other side of each edge from a lower corner to a higher one.
+  thread_local std::vector<std::array<int, 3>> back;
+  back.clear();
+  for (size_t f = 0; f < planes_.size(); ++f) {
+    const auto corners = ring(f);
+    for (size_t k = 0; k < corners.size(); ++k) {
+      const int i = corners[k], j = corners[k + 1 < corners.size() ? k + 1 : 0];
+      if (i < j) edges_.push_back({i, j, static_cast<int>(f), kNone});
+      else back.push_back({j, i, static_cast<int>(f)});
+    }
+  }
+  if (edges_.size() != back.size()) return {};
+  std::ranges::sort(edges_, {}, [](const Edge& e) { return std::array{e.from, e.to}; });
+  std::ranges::sort(back);
+  for (size_t k = 0; k < edges_.size(); ++k) edges_[k].right = back[k][2];
+  // Without the corners that were cut off.
+  number_.assign(corners_.size(), kNone);
+  left_.clear();
+  const auto number = [&](int corner) {
+    if (number_[corner] == kNone) {
+      number_[corner] = static_cast<int>(left_.size());
+      left_.push_back(corners_[corner]);
+    }
+    return number_[corner];
+  };
+  for (Edge& edge : edges_) edge.from = number(edge.from), edge.to = number(edge.to);
+  return {left_, planes_, edges_, planes_.size() - cuts_};
+}
+
+}  // namespace overlapper::quadric
