@@ -159,15 +159,32 @@ def test_all_measures_are_exact_where_surfaces_pass_through_middles_or_along_eac
     rng = np.random.default_rng(3)
     on_box, away = np.array(PLACES[place])
     half = np.array([0.5, 0.6, 0.7])
-    shapes = Sphere(0.45), Capsule(0.45, 0.3), Cylinder(0.45, 0.7)
-    for shape, turn in zip(shapes, ((0.5, 0.5, 0.5, 0.5), quaternion(rng), (0, 0, 0, 1))):
+    for turn in ((0, 0, 0, 1), (0.5, 0.5, 0.5, 0.5), quaternion(rng)):
         box = Placed(Box(half), rng.normal(size=3), turn)
-        centre = on_box * half + shape.radius * away + off * rng.normal(size=3)
-        a = Placed(shape, box.position + rotation(turn) @ centre, turn)
+        centre = on_box * half + 0.45 * away + off * rng.normal(size=3)
+        a = Placed(Sphere(0.45), box.position + rotation(turn) @ centre, turn)
         found = overlap(a, box)
-        if found:
-            assert found.way in ("slicing", "closed form")
-            assert_all_is_exact(a, box, found, 2)
+        assert found.way in ("slicing", "closed form")
+        assert_all_is_exact(a, box, found, 2)
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("off", [0, 1e-15, 1e-6])
+def test_parts_of_a_box_add_up_where_surfaces_pass_through_axes_or_along_each_other(place, off):
+    rng = np.random.default_rng(4)
+    on_box, away = np.array(PLACES[place])
+    half = np.array([0.5, 0.6, 0.7])
+    for shape in (Sphere(0.45), Capsule(0.45, 0.3), Cylinder(0.45, 0.7)):
+        for turn in ((0, 0, 0, 1), (0.5, 0.5, 0.5, 0.5), quaternion(rng)):
+            # In coordinates of the box, whose planes are then the same for all parts.
+            a = Placed(shape, on_box * half + 0.45 * away + off * rng.normal(size=3), turn)
+            whole = overlap(a, Box(half))
+            parts = [overlap(a, Hull(CORNERS * [0.5, 0.6, 0.35] + [0, 0, z])) for z in (-0.35, 0.35)]
+            assert abs(whole.volume - sum(p.volume for p in parts)) <= sum(p.volume_error for p in (whole, *parts))
+            if whole:
+                moments = sum(p.volume * p.centroid for p in parts if p)
+                assert_allclose(whole.volume * whole.centroid, moments, atol=1e-12 * whole.volume)
+                assert_allclose(whole.gradient[0], sum(p.gradient[0] for p in parts), atol=1e-11)
 
 
 @pytest.mark.parametrize("first", ["sphere", "capsule", "cylinder"])

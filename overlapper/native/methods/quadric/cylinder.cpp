@@ -15,6 +15,7 @@ constexpr double kUnit = 0x1p-53;        ///< of rounding
 constexpr double kPlacing = 16 * kUnit;  ///< of how far numbers reach: where an edge leaves the cylinder
 constexpr double kNearlyWhole = 1e-5;    ///< rad: an arc of less may be the rest of a turn
 constexpr double kUpright = 1e-12;       ///< of a plane's normal along the axis: its arcs are straight
+constexpr double kGrazing = 1e-6;        ///< the square of the sine between a face and the surface
 constexpr double kOpen = 1e-9;           ///< of what sums to zero, without a wrong turn
 
 /// Functions of half an arc's angle x that closed forms leave to rounding where it is small.
@@ -190,8 +191,13 @@ class Measuring {
   }
 
   /// An arc of a face's border, counter-clockwise seen along the axis from where its normal leads, and the segment
-  /// between it and its chord. False if that may be nothing as well as a whole turn.
+  /// between it and its chord. False if that may be nothing as well as a whole turn, or if the face lies along the
+  /// surface, where its area is as uncertain as the root of where it lies.
   bool add_arc(Vec3 n, Vec3 p, Vec3 q, double border, Section& section) {
+    for (const Vec3 end : {p, q}) {
+      const double sine = dot2(n, end) / radius_;
+      if (!(1 - sine * sine > kGrazing)) return false;
+    }
     double angle = std::atan2(cross2(p, q), dot2(p, q));
     const bool upright = std::abs(n.z) < kUpright;
     if (std::abs(angle) < kNearlyWhole) {

@@ -19,7 +19,7 @@ struct CylinderPart {
   int faces = 0;          ///< that take part
 };
 
-/// In closed form; nothing where rounding leaves open which way round a face's border goes.
+/// In closed form; nothing where rounding leaves open which way round a face's border goes, or how wide it is.
 std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius);
 
 }  // namespace overlapper::quadric
