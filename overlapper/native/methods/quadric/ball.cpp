@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -13,6 +14,7 @@ constexpr double kUnit = 0x1p-53;  ///< of rounding
 /// Lengths are right to this fraction of how far the numbers reach that they are made of: a unit vector to 4 roundings,
 /// a difference to one, their product to 3.
 constexpr double kPlacing = 8 * kUnit;
+constexpr double kOpen = 1e-9;  ///< of the radius' square: areas are right to less, without a wrong turn
 
 /// A disc that the plane of a face cuts from the ball, and what is known of the face's part of it, from edge to edge:
 /// a polygon seen from the middle, as angles and triangles, and sectors for what the angles leave of the whole turn.
@@ -148,6 +150,7 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
   }
   double curved = 2 * kPi * characteristic - turns, cones = 0;
   double sizes = 2 * kPi * std::abs(characteristic) + turns, cone_sizes = 0;
+  double flats = 0;     // m², of all faces
   double pressure = 0;  // Σ h ∫ (|x|² − r²) dA
   for (size_t f = 0; f < discs.size(); ++f) {
     const Disc& disc = discs[f];
@@ -162,6 +165,7 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     partial += std::abs(curved) + std::abs(arcs);
     sizes += (turn + disc.sizes) * std::abs(h) / r + 2 * kPi;
     cone_sizes += std::abs(h) * (disc.square * (turn + disc.sizes) + std::abs(disc.twice)) / 2;
+    flats += face;
     if (f < polyhedron.faces) part.area += face;
     part.flat += face * n;
     const double on_face = (disc.second - disc.square * disc.square * arcs) / 4 - disc.square * disc.twice / 2;
@@ -174,6 +178,14 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
   }
   const bool holds_centre = std::ranges::none_of(discs, [](const Disc& disc) { return disc.height < 0; });
   if (part.faces == 0 && !holds_centre) return BallPart{};
+  // A ball that no face reaches no plane reaches either, unless the polyhedron is nothing but rounding.
+  const bool reached = std::ranges::any_of(discs, [](const Disc& disc) { return disc.square > 0; });
+  if (part.faces == 0 && reached) part.error = std::numeric_limits<double>::infinity();
+  // What lies beyond the faces is farther around the ball than they are, and the curved part than its vector is long;
+  // by a wrong turn, one of them would not be so.
+  const double slack = kOpen * r2;
+  if (!(r2 * curved + flats <= 4 * kPi * r2 + slack && norm(part.flat) <= r2 * curved + slack))
+    part.error = std::numeric_limits<double>::infinity();
   part.area += r2 * curved;
   part.volume = (cones + r3 * curved) / 3;
   part.error += kUnit * (10 * (cone_sizes + r3 * sizes) / 3 + r3 * partial);
