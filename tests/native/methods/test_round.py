@@ -246,6 +246,32 @@ def test_what_a_cap_cuts_off_is_missing_however_little_it_is(tilt, other):
         assert sum(beyond(cut, side).volume for side in (1, -1)) == pytest.approx(whole, rel=3e-12)
 
 
+@pytest.mark.parametrize(
+    ("position", "orientation", "other_orientation"),
+    [
+        # Between two lines that cross near the circle is an arc of next to nothing, and not all of it.
+        (
+            [-0.43436357378896684, -0.38434965235243074, 0.09831378035535544],
+            [-0.54631616, -0.39484729, 0.692984, 0.25574879],
+            [-0.39641784, 0.88297753, 0.13829544, 0.20994749],
+        ),
+        # At an end of three intervals, what a slice holds has another outline than in the middle.
+        (
+            [0.2771765996888893, 0.24184267666737802, 0.2647599087503266],
+            [0.5446746741351163, -0.5425123049067997, -1.2720372718127473, 1.5949979667062097],
+            [-0.4977982044604572, -0.5080083919002721, 0.03924345808050567, -0.6536796272177162],
+        ),
+    ],
+)
+def test_rounded_tetrahedra_deep_in_each_other_are_sliced(position, orientation, other_orientation):
+    rounded = RoundedHull(0.3 * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]), 0.2)
+    answer = overlap(Placed(rounded, position, orientation), Placed(rounded, (0, 0, 0), other_orientation))
+    assert answer.way == "slicing"
+    lower, upper = answer.certificate().verify()
+    assert float(lower) == pytest.approx(answer.volume, rel=1e-13) == float(upper)
+    assert answer.volume_error < 1e-11 * answer.volume
+
+
 def test_a_ball_over_the_corner_of_a_box_is_an_eighth_of_it():
     found = overlap(Placed(Sphere(0.5), (1, 1, 1)), Box([1, 1, 1]))
     assert_is(found, arb.pi() / 48)

@@ -92,6 +92,7 @@ class Measuring {
   double extent = 0;                           ///< m: no point of the common set is farther from the one inside
   const slicing::Enclosure* common = nullptr;  ///< what lies outside of that belongs to no piece
   Bounds box;                                  ///< around what is added, if the common set is enclosed
+  bool closely = false;                        ///< looks at all of every interval
   PatchSums* patch = nullptr;                  ///< if wanted, of what belongs to `owner`
   int owner = 0;
 
@@ -316,7 +317,7 @@ class Measuring {
 
   bool add_stack() {
     std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent);
-    if (!stack || !slicing::find_intervals(*stack, false, intervals_)) return false;
+    if (!stack || !slicing::find_intervals(*stack, closely, intervals_)) return false;
     if (intervals_.empty()) return true;
     slicing::View view;
     if (patch) view = view_of(*stack), stack->view = &view;
@@ -419,6 +420,8 @@ class Measuring {
   bool moved_ = false;  ///< whether that is another
 };
 
+/// The fraction of a volume that may stay open before all of every interval is looked at.
+constexpr double kMostOpen = 1e-11;
 /// Beyond that fraction of a volume, something is wrong. Polytopes of tangent planes take seconds to be as good.
 constexpr double kMostError = 1e-8;
 
@@ -453,7 +456,6 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   const Scratch<Workspace> scratch;
   auto& [of_a, of_b, measuring, around, culling, rounds, walls] = *scratch;
   of_a.clear(), of_b.clear();
-  measuring.totals = {};
   measuring.owner = owner, measuring.patch = patch;
   measuring.extent = std::min(slicing::extent(a, rounded(inside)), slicing::extent(b, rounded(inside)));
   // Of many pieces, few lie near the common set.
@@ -463,29 +465,42 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   slicing::cut(a, b, measuring.common, 0, reference, inside, of_a);
   slicing::cut(b, a, measuring.common, 1, reference, inside, of_b);
   if (many) culling.look_at(of_a, of_b, around);
-  // Pieces without rounds first: others then need to be exact only to a fraction of what these hold.
-  for (const int round_ones : {0, 1, 2})
-    for (int i = 0; i < static_cast<int>(of_a.pieces.size()); ++i)
-      for (int j = 0; j < static_cast<int>(of_b.pieces.size()); ++j) {
-        cancellation_point();
-        const slicing::Piece &p = of_a.pieces[i], &q = of_b.pieces[j];
-        if ((p.round >= 0) + (q.round >= 0) != round_ones) continue;
-        rounds.clear(), walls.clear();
-        if (many) {
-          if (!culling.meet(i, j, walls, measuring.box)) continue;
-        } else {
-          walls.insert(walls.end(), of_a.walls.begin() + p.first_wall, of_a.walls.begin() + p.first_wall + p.walls);
-          walls.insert(walls.end(), of_b.walls.begin() + q.first_wall, of_b.walls.begin() + q.first_wall + q.walls);
+  const auto add_pieces = [&] {
+    measuring.totals = {};
+    // Pieces without rounds first: others then need to be exact only to a fraction of what these hold.
+    for (const int round_ones : {0, 1, 2})
+      for (int i = 0; i < static_cast<int>(of_a.pieces.size()); ++i)
+        for (int j = 0; j < static_cast<int>(of_b.pieces.size()); ++j) {
+          cancellation_point();
+          const slicing::Piece &p = of_a.pieces[i], &q = of_b.pieces[j];
+          if ((p.round >= 0) + (q.round >= 0) != round_ones) continue;
+          rounds.clear(), walls.clear();
+          if (many) {
+            if (!culling.meet(i, j, walls, measuring.box)) continue;
+          } else {
+            walls.insert(walls.end(), of_a.walls.begin() + p.first_wall, of_a.walls.begin() + p.first_wall + p.walls);
+            walls.insert(walls.end(), of_b.walls.begin() + q.first_wall, of_b.walls.begin() + q.first_wall + q.walls);
+          }
+          if (p.round >= 0) rounds.push_back(of_a.rounds[p.round]);
+          if (q.round >= 0) rounds.push_back(of_b.rounds[q.round]);
+          if (!measuring.add(rounds, walls)) return false;
         }
-        if (p.round >= 0) rounds.push_back(of_a.rounds[p.round]);
-        if (q.round >= 0) rounds.push_back(of_b.rounds[q.round]);
-        if (!measuring.add(rounds, walls)) return std::nullopt;
-      }
+    return measuring.totals.volume > 0;
+  };
   const Totals& totals = measuring.totals;
-  if (!(totals.volume > 0)) return std::nullopt;
+  const auto open = [&] { return 2 * std::max(totals.open, missing(totals)); };
+  const std::optional<PatchSums> patch_before = patch ? std::optional(*patch) : std::nullopt;
+  measuring.closely = false;
+  if (!add_pieces()) return std::nullopt;
+  // Where a surface that is open says so, something is hidden in an interval of which the middle alone was looked at.
+  if (!(open() <= kMostOpen * totals.volume)) {
+    measuring.closely = true;
+    if (patch) *patch = *patch_before;
+    if (!add_pieces()) return std::nullopt;
+  }
   RoundMeasures result;
   result.volume = totals.volume;
-  result.volume_error = totals.error + 2 * std::max(totals.open, missing(totals));
+  result.volume_error = totals.error + open();
   if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
   result.volume_error += (of_a.flatness + of_b.flatness) * totals.area;
   result.area = totals.area;
