@@ -788,7 +788,8 @@ def test_corners_of_facets_at_small_angles_lie_in_their_planes():
         ([Box([1, 1, 1]), Box([1, 0.5, 1])], "clipping"),
         ([Box([1, 1, 1]), Box([1, 0.5, 1]), Box([0.5, 1, 1])], "clipping"),
         ([Sphere(1), Sphere(0.75)], "closed form"),
-        ([Box([1, 1, 1]), Cylinder(0.75, 1)], "slicing"),
+        ([Box([1, 1, 1]), Cylinder(0.75, 1)], "closed form"),
+        ([Cylinder(1.5, 1), Cylinder(0.75, 2)], "slicing"),
     ],
 )
 def test_gradients_are_as_good_far_from_the_origin_as_near(shapes, way, far):

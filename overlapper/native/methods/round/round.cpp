@@ -454,7 +454,12 @@ struct Workspace {
 std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside,
                                       int owner, PatchSums* patch) {
   const Scratch<Workspace> scratch;
-  auto& [of_a, of_b, measuring, around, culling, rounds, walls] = *scratch;
+  slicing::Pieces &of_a = scratch->of_a, &of_b = scratch->of_b;
+  Measuring& measuring = scratch->measuring;
+  slicing::Enclosure& around = scratch->around;
+  slicing::Culling& culling = scratch->culling;
+  std::vector<Round>& rounds = scratch->rounds;
+  std::vector<Wall>& walls = scratch->walls;
   of_a.clear(), of_b.clear();
   measuring.owner = owner, measuring.patch = patch;
   measuring.extent = std::min(slicing::extent(a, rounded(inside)), slicing::extent(b, rounded(inside)));
