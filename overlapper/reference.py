@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, RoundedHull, Shape, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Overlap, RoundedHull, Shape, Sphere
 from overlapper.install import hint
 from overlapper.process import Ended, NotStarted, Worker
 from overlapper.proof.signed_distance import signed_distance_bounds
@@ -187,6 +187,8 @@ def _model(shape: Shape) -> Model:
             return "Cylinder", (shape.radius, shape.length)
         case RoundedHull():
             raise TypeError("shape must not be a rounded hull, of which FCL has none")
+        case Ellipsoid():
+            raise TypeError("shape must not be an ellipsoid, of which no exact distance is known")
         case HalfSpace():
             return "Halfspace", (*shape.normal, shape.offset)
         case Hull():
@@ -203,6 +205,8 @@ def _unsupported(overlap: Overlap) -> str | None:
         return f"FCL is asked about two bodies at a time, not {len(overlap.shapes)}."
     if any(isinstance(body.shape, RoundedHull) for body in overlap.shapes):
         return "FCL has no rounded hulls."
+    if any(isinstance(body.shape, Ellipsoid) for body in overlap.shapes):
+        return "FCL is not asked about ellipsoids, of which no exact distance is known to judge it by."
     if all(isinstance(body.shape, HalfSpace) for body in overlap.shapes):
         return "FCL gives no depth or distance of two half-spaces."
     return None

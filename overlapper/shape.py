@@ -1,5 +1,5 @@
 """The closed set of shapes."""
 
-from overlapper._core import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Sphere
+from overlapper._core import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Sphere
 
-Shape = Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace
+Shape = Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace

@@ -10,7 +10,7 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper._core import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Sphere
+from overlapper._core import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Sphere
 from overlapper.printable import first_line
 from overlapper.shape import Shape
 
@@ -19,6 +19,7 @@ PARAMETERS: dict[type, tuple[str, ...]] = {
     Sphere: ("radius",),
     Capsule: ("radius", "length"),
     Cylinder: ("radius", "length"),
+    Ellipsoid: ("half_axes",),
     HalfSpace: ("normal", "offset"),
 }
 LARGEST = 24 * 1_000_000  # bytes of the vertices of a hull: a million, of which Hull itself needs seconds

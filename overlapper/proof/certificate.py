@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Capsule, Cylinder, HalfSpace, Overlap, RoundedHull, Sphere
+from overlapper import Capsule, Cylinder, Ellipsoid, HalfSpace, Overlap, RoundedHull, Sphere
 from overlapper.proof.body_planes import BodyPlanes, Floats, supporting
 from overlapper.proof.claims import (
     Bounds,
@@ -50,6 +50,8 @@ def certificate(overlap: Overlap) -> Certificate:
     `verify()` of the result checks it in rational arithmetic, without the core, and returns (lower, upper) bounds of
     the common volume in m³ as fractions. CertificateError says why there is no certificate.
     """
+    if any(isinstance(body.shape, Ellipsoid) for body in overlap.shapes):
+        raise CertificateError("ellipsoids have no certificate")
     bodies = [RationalBody(shape) for shape in overlap.shapes]
     match overlap.status:
         case "separated":

@@ -16,7 +16,7 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Sphere
 from overlapper.proof.rational import RationalBody
 from overlapper.proof.refusal import CertificateError
 from overlapper.proof.vectors import ORIGIN, Vector, cross, dot, minus, plus, rational, scaled, vector
@@ -113,6 +113,8 @@ def pieces(body: RationalBody, home: RationalBody) -> list[Piece]:
             return [Piece(None, (frame.plane(vector(half.given_normal), rational(half.given_offset)),), None)]
         case Hull() | RoundedHull():
             return _Facets(body, frame).pieces()
+        case Ellipsoid():
+            raise TypeError("shape must not be an ellipsoid, which has no certificate")
 
 
 def _ball(centre: Vector, radius: float, planes: tuple[Plane, ...]) -> Piece:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere
 from overlapper.proof.nearest import nearest_weights
 
 Exact = NDArray[np.object_]  # of Fraction
@@ -149,6 +149,8 @@ class RationalBody:
                     return None
                 level = Fraction(half.given_offset) * (local @ normal) / (normal @ normal)
                 return base + level / scale, Fraction(0)
+            case Ellipsoid():
+                raise TypeError("shape must not be an ellipsoid, which has no certificate")
 
     @property
     def hull(self) -> Hull:

@@ -24,7 +24,7 @@ from itertools import combinations_with_replacement, product
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere
 from overlapper.proof.nearest import nearest_weights
 from overlapper.proof.rational import Exact, RationalBody, cross, exact
 
@@ -182,6 +182,8 @@ def _support(shape: Shape, direction: Floats) -> Floats:
             farthest = shape.length / 2 * tip
         case Cylinder():
             farthest = shape.length / 2 * tip + shape.radius * radial / (np.linalg.norm(radial) or 1.0)
+        case Ellipsoid():
+            raise TypeError("shape must not be an ellipsoid, of which no exact distance is known")
         case _:
             raise TypeError(f"shape must be bounded, not {shape!r}")
     return farthest

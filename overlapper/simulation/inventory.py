@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere
 from overlapper.process import Ended, Worker
 from overlapper.quaternion import composed, rotated
 
@@ -220,6 +220,8 @@ def _listed(placed: Placed) -> ListedShape:
             size = f"radius {shape.radius:.4g}"
         case Capsule() | Cylinder():
             size = f"radius {shape.radius:.4g}, length {shape.length:.4g}"
+        case Ellipsoid():
+            size = f"half axes {_product(shape.half_axes)}"
         case HalfSpace():
             kind, size = "plane", f"normal {', '.join(f'{x:.4g}' for x in shape.normal)}"
         case Hull() | RoundedHull():

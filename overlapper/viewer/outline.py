@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Sphere
 
 Array = NDArray[np.float64]
 Facets = Sequence[NDArray[np.integer[Any]]]
@@ -31,7 +31,7 @@ class Outline:
     wires: Array
 
 
-def outline(shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull) -> Outline:
+def outline(shape: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull) -> Outline:
     """The surface of a bounded shape; round ones within 0.3 % of the radius, rounded hulls with bevelled edges."""
     if isinstance(shape, RoundedHull):
         core = shape.core
@@ -45,10 +45,21 @@ def outline(shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull) -> Ou
         slopes = np.deg2rad([-90, -90, 0, 0, 90, 90])
         radii, rims = shape.radius * np.array([0, 1, 1, 1, 1, 0]), (1, 4)
         return _revolved(radii, np.repeat([-half, half], 3), slopes, rims, rims)
+    if isinstance(shape, Ellipsoid):
+        return _stretched(outline(Sphere(1.0)), shape.half_axes)
     half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
     slopes = np.concatenate([np.linspace(-np.pi / 2, 0, 13), np.linspace(0, np.pi / 2, 13)])
     heights = shape.radius * np.sin(slopes) + np.repeat([-half, half], 13)
     return _revolved(shape.radius * np.cos(slopes), heights, slopes, circles=(4, 8, 12, 13, 17, 21))
+
+
+def _stretched(ball: Outline, half_axes: Array) -> Outline:
+    """What a ball of radius 1 becomes; normals keep to the surface."""
+    assert ball.normals is not None
+    normals = ball.normals / half_axes
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    vertices, edges, wires = (half_axes * points for points in (ball.vertices, ball.edges, ball.wires))
+    return replace(ball, vertices=vertices, normals=normals, edges=edges, wires=wires)
 
 
 def plate(shape: HalfSpace, center: Array, size: float) -> Outline:

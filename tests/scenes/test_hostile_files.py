@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mutation import mutated, said_by
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Sphere
 from overlapper.polytopes import shape_text
 from overlapper.polytopes.shape_text import shape_of, text_of
 from overlapper.scenes.comparison import compare_measures, compare_poses
@@ -23,7 +23,7 @@ from overlapper.scenes.table_file import TABLES, read_metadata, read_table
 
 CORNERS = np.random.default_rng(0).normal(size=(12, 3))
 SHAPES = [Box([1, 2, 3]), Sphere(1), Capsule(1, 2), Cylinder(1, 2), HalfSpace([0, 0, 1], 0), Hull(CORNERS)]
-SHAPES.append(RoundedHull(CORNERS, 0.1))
+SHAPES += [RoundedHull(CORNERS, 0.1), Ellipsoid([0.1, 0.2, 0.3])]
 
 
 def rows():

@@ -23,7 +23,7 @@ from published import PUBLISHED
 from scipy.spatial import ConvexHull, cKDTree
 from strategies import directions, hull_points, overlapping_points, quaternion, reach, rotation, turn
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere
 
 CORNERS = np.array(list(product((-1, 1), repeat=3)), float)
 OCTAHEDRON = np.vstack([np.eye(3), -np.eye(3)])
@@ -770,6 +770,51 @@ def flush_round(rng):
     return Case(way, 0.0, bodies if rng.random() < 0.5 else bodies[::-1], float(volume))
 
 
+def ellipsoids(rng):
+    """An ellipsoid, up to 1000 times as long as thick, into which a half-space or a box reaches by `parameter` of a
+    half axis, so that their common part is a stretched cap; or of which a box has so many octants; or all."""
+    axes = 2.0 ** (rng.integers(0, 11, 3) + int(rng.integers(-15, 6)))
+    depth = float(rng.choice([1.0, 0.5, 1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10]))
+    where = str(rng.choice(["in a half-space", "askew", "on a box", "octants", "inside"]))
+    whole, body = 4 / 3 * pi * float(axes.prod()), Placed(Ellipsoid(axes))
+    longest = float(axes.max())
+    if where in ("octants", "inside"):
+        ends = rng.integers(0, 2, 3) if where == "octants" else np.zeros(3)  # at the centre, or beyond all
+        bodies = (body, Placed(Box([4 * longest] * 3), 4 * longest * ends))
+        return Case(where, 1.0, bodies if rng.random() < 0.5 else bodies[::-1], whole / 2 ** int(ends.sum()))
+    # In the ball that it is made of, the plane's normal is (2, 3, 6) / 7, or an axis.
+    normal, length = (np.array([2.0, 3.0, 6.0]), 7) if where == "askew" else (np.array([0.0, 0.0, 1.0]), 1)
+    level = length * (depth - 1)
+    h = Fraction(level) / length + 1
+    other = Placed(HalfSpace(normal / axes, level))
+    if where == "on a box":
+        top = level * axes[2]
+        other = Placed(Box([4 * longest] * 3), (0, 0, top - 4 * longest))
+        h = (Fraction(float(other.position[2])) + 4 * Fraction(longest)) / Fraction(float(axes[2])) + 1
+    bodies = (body, other) if rng.random() < 0.5 else (other, body)
+    return Case(where, depth, bodies, whole * float(h * h * (3 - h) / 4))
+
+
+def posed_ellipsoids(rng):
+    """An ellipsoid and one of all kinds at random poses, into each other by `parameter` or so, or apart."""
+    choices = [
+        Sphere(rng.uniform(0.3, 1)),
+        Capsule(rng.uniform(0.1, 1), rng.uniform(0, 2)),
+        Cylinder(*rng.uniform(0.2, 2, 2)),
+        Box(rng.uniform(0.2, 1, 3)),
+        Hull(rng.normal(size=(8, 3))),
+        RoundedHull(CORNERS * 0.3, 0.2),
+        Ellipsoid(2 * np.exp(rng.uniform(-3, 0, 3))),
+    ]
+    a, b = Ellipsoid(2 * np.exp(rng.uniform(-3, 0, 3))), choices[int(rng.integers(len(choices)))]
+    depth = float(rng.choice([1.0, 0.5, 0.3, 1e-2, 1e-4, 1e-8, -1e-8, -1e-2]))
+    axis, p, q = directions(rng, 1)[0], quaternion(rng), quaternion(rng)
+    room = reach(Placed(a, orientation=p), axis) + reach(Placed(b, orientation=q), -axis)
+    where = rng.normal(size=3)
+    bodies = (Placed(a, where, p), Placed(b, where + axis * (room - depth), q))
+    return Case(f"Ellipsoid and {type(b).__name__}", depth, bodies)
+
+
 def rounded_slab(sides, r, h):
     """The volume of what a rounded box has below the height h <= r above its lowest plane: a slab of cuboid, and its
     rims, over quarters of a disc."""
@@ -797,7 +842,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
-        round_contacts, rounded_hulls, flush_round,
+        round_contacts, rounded_hulls, flush_round, ellipsoids, posed_ellipsoids,
     )
 }  # fmt: skip
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere, overlap
 
 CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
 WAYS = [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) != (0, 0, 0)]
@@ -110,6 +110,7 @@ SHAPES: dict[str, Callable[[Random], Shape]] = {
     "fine hull": lambda rng: Hull(ball_of_points(rng, 90)),
     "rounded hull": lambda rng: RoundedHull(cloud(rng, 8) * 0.6, rng.choice([1e-3, 0.1])),
     "half-space": lambda rng: HalfSpace(vector(rng), rng.uniform(-0.3, 0.3)),
+    "ellipsoid": lambda rng: Ellipsoid([rng.uniform(0.2, 1) for _ in range(3)]),
 }
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from families import CORNERS, Below, Case, mapped, points_of, solid
 from strategies import quaternion, rotation
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Overlap, Placed, RoundedHull, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Overlap, Placed, RoundedHull, Sphere, overlap
 from overlapper.proof.certificate import certificate
 
 HALF_ULP = 2.0**-53
@@ -209,7 +209,7 @@ def errors_of_depth_and_distance_are_small(case: Case, found: Overlap) -> str:
     relative = [shape.bounds - found.shapes[0].position for shape in found.shapes]
     extent = sum(float(np.abs(box[np.isfinite(box)]).max(initial=0)) for box in relative)
     far = float(np.linalg.norm(np.subtract(*(shape.position for shape in found.shapes))))
-    errors, rims = found.errors, any(isinstance(shape.shape, Cylinder) for shape in found.shapes)
+    errors, rims = found.errors, any(isinstance(shape.shape, Cylinder | Ellipsoid) for shape in found.shapes)
     numbers = extent + far + found.depth + found.distance
     depth_error = errors.depth
     if found.status == "touching" and depth_error > 1e-14 * numbers and (way := way_out(case, found)) is not None:
@@ -244,7 +244,7 @@ def body_of(case: Case, i: int, placed: Placed) -> exact.Polytope:
 
 def way_out(case: Case, found: Overlap) -> Fraction | None:
     """How far a pair is apart, or less than nothing by how deep; None of what is too large, or not known."""
-    if len(case.bodies) != 2 or any(isinstance(shape.shape, HalfSpace) for shape in found.shapes):
+    if len(case.bodies) != 2 or any(isinstance(shape.shape, HalfSpace | Ellipsoid) for shape in found.shapes):
         return None
     if not case.round and np.prod([len(solid.vertices) for solid in case.solids]) >= 400:
         return None
@@ -325,7 +325,8 @@ def volume_off(case: Case, found: Overlap) -> Fraction:
 
 def the_certificate_is_proved(case: Case, found: Overlap) -> str:
     """Within what is stated; of three round bodies, which it encloses by other planes, beside that and as narrow."""
-    if len(found.shapes) > 2 and found and any(isinstance(body.shape, RoundedHull) for body in found.shapes):
+    kinds = [type(body.shape) for body in found.shapes]
+    if Ellipsoid in kinds or (len(kinds) > 2 and found and RoundedHull in kinds):
         return ""  # they have none
     lower, upper = certificate(found).verify()
     volume, error = Fraction(found.volume), Fraction(found.volume_error)

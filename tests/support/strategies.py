@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere
 
 # Seeded
 
@@ -103,6 +103,10 @@ def reach(body, direction):
         return base + shape.radius * float(np.linalg.norm(local)) + abs(local[2]) * shape.length / 2
     if isinstance(shape, Cylinder):
         return base + shape.radius * float(np.hypot(local[0], local[1])) + abs(local[2]) * shape.length / 2
+    if isinstance(shape, Ellipsoid):
+        return base + float(np.linalg.norm(shape.half_axes * local))
+    if isinstance(shape, RoundedHull):
+        return base + float((shape.core.vertices @ local).max()) + shape.radius * float(np.linalg.norm(local))
     assert isinstance(shape, HalfSpace)
     along = float(shape.normal @ local)
     return base + shape.offset * along if np.allclose(along, np.linalg.norm(local), atol=0, rtol=1e-12) else np.inf
@@ -129,6 +133,7 @@ boxes = st.builds(Box, st.tuples(lengths, lengths, lengths))
 spheres = st.builds(Sphere, lengths)
 capsules = st.builds(Capsule, lengths, st.floats(0.0, 2.0))
 cylinders = st.builds(Cylinder, lengths, lengths)
+ellipsoids = st.builds(Ellipsoid, st.tuples(lengths, lengths, lengths))
 
 
 # What is drawn is printed as the calls that make it again, which must therefore hold all that there is to know.
@@ -160,7 +165,7 @@ def lattice_points(draw, reach=3):
 
 
 polyhedra = st.one_of(boxes, hulls())
-solids = st.one_of(boxes, spheres, capsules, cylinders, hulls())
+solids = st.one_of(boxes, spheres, capsules, cylinders, ellipsoids, hulls())
 
 
 def placed(shapes, spread=1.0):

@@ -41,13 +41,20 @@ constexpr double kAboutUpright = 0x1p-20;
 /// What one body adds to the nearest points: a point that it keeps, or one of a rim that goes with the direction, and
 /// flats along which the point is free.
 struct Contactor {
-  Vec3 point;  ///< of the body; of a rim its centre
+  Vec3 point;  ///< of the body; of a rim or an ellipsoid its centre
   std::vector<Vec3> flats;
   const Cylinder* rim = nullptr;
   Vec3 axis;
+  const Ellipsoid* ellipsoid = nullptr;
+  Mat3 turn;
 
   Contactor(const Placed& body, const Simplex& simplex, Vec3 DifferencePoint::* on, Vec3 witness) : point(witness) {
     rim = std::get_if<Cylinder>(&body.shape);
+    ellipsoid = stretched(body.shape);
+    if (ellipsoid) {
+      point = body.pose.translation, turn = body.pose.rotation;
+      return;
+    }
     if (!rim) {
       for (int i = 1; i < simplex.size; ++i) add_flat(simplex.corner[i].*on - simplex.corner[0].*on);
       return;
@@ -67,6 +74,7 @@ struct Contactor {
 
   /// The point farthest along a direction, flats aside.
   Vec3 farthest(Vec3 direction) const {
+    if (ellipsoid) return point + turn * ellipsoid->support(apply_transposed(turn, direction));
     return rim ? point + rim->radius * unit(direction - dot(axis, direction) * axis) : point;
   }
 };
@@ -109,9 +117,10 @@ bool above_cap(const Placed& a, const Placed& b, Separation& cores) {
   return false;
 }
 
-/// The nearest points of cores of which one has a rim: GJK knows a point of that, and with it the direction, to half
-/// of the digits only. At the nearest points x = a - b is across every flat, and the points of rims are those farthest
-/// along x: Newton's method on these equations, whose matrix is the identity and more. False where they do not hold.
+/// The nearest points of cores of which one has a rim or is an ellipsoid: GJK knows a point of that, and with it the
+/// direction, to half of the digits only. At the nearest points x = a - b is across every flat, and the points of rims
+/// and ellipsoids are those farthest along x: Newton's method on these equations, whose matrix is the identity and
+/// more. False where they do not hold.
 bool sharpen(const Placed& a, const Placed& b, Separation& cores) {
   const Contactor on_a(a, cores.simplex, &DifferencePoint::on_a, cores.simplex.witness_a()),
       on_b(b, cores.simplex, &DifferencePoint::on_b, cores.simplex.witness_b());
@@ -125,6 +134,11 @@ bool sharpen(const Placed& a, const Placed& b, Separation& cores) {
   for (int round = 0; round < 20; ++round) {
     Mat3 slope;
     for (const Contactor* on : {&on_a, &on_b}) {
+      if (on->ellipsoid) {
+        const Mat3 curved = on->turn * on->ellipsoid->slope(apply_transposed(on->turn, x)) * transposed(on->turn);
+        const auto across = [&](Vec3 row) { return across_flats(curved * across_flats(row)); };
+        slope = {slope.row0 + across({1, 0, 0}), slope.row1 + across({0, 1, 0}), slope.row2 + across({0, 0, 1})};
+      }
       if (!on->rim) continue;
       const Vec3 tangent = cross(on->axis, x);
       const double across = norm(tangent);
@@ -158,8 +172,8 @@ Separation separate_cores(const Placed& a, const Placed& b) {
   // The best gap of all rounds: on a rim, those of single rounds scatter by more than this.
   const auto settled = [](double length, double, double best) { return length - best <= 4 * 0x1p-53 * length; };
   Separation cores = separate(support(-towards), support, settled);
-  const bool rims = has_rims(a.shape) || has_rims(b.shape);
-  if (rims && !cores.origin_inside && cores.gap > 0 && !above_cap(a, b, cores)) sharpen(a, b, cores);
+  const bool curved = has_curved_core(a.shape) || has_curved_core(b.shape);
+  if (curved && !cores.origin_inside && cores.gap > 0 && !above_cap(a, b, cores)) sharpen(a, b, cores);
   return cores;
 }
 

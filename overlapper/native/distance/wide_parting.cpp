@@ -325,9 +325,81 @@ class RimSearch {
   const WideBody &a_, &b_;
 };
 
-/// The way out where two rims meet, from a direction near it: a local minimum of the support function, by Newton's
-/// method.
-Vec3 between_rims(const Placed& a, const Placed& b, Vec3 outward) {
+/// The ways out of an ellipsoid and a polytope, or a cylinder.
+///
+/// They are where the support function has a local minimum or a kink: along the normal of a facet; across a ridge,
+/// where the ellipsoid is seen as an ellipse, of which the ridge's point has nearest ones; or from a corner to a
+/// nearest point of the surface. A point inside of an ellipsoid has two of these at most.
+class EllipsoidSearch {
+ public:
+  /// Directions point out of the ellipsoid `a`; `sign` turns them out of A - B.
+  EllipsoidSearch(const WideBody& a, const WideBody& b, Ways& ways, double sign)
+      : ways_(ways),
+        sign_(sign),
+        shape_(*stretched(a.shape)),
+        longest_(max_component(shape_.half_axes)),
+        centre_(a.placed({})),
+        axes_{a.turned({{1}, {}, {}}), a.turned({{}, {1}, {}}), a.turned({{}, {}, {1}})},
+        reach_(a.reach() + b.reach()) {}
+
+  double lower = kInfinity;  ///< m: of the ways looked at
+
+  void of_polytope(NearPolytope& polytope) {
+    for (const NearFacet& facet : polytope.facets) look(-polytope.normal(facet), polytope.lost(facet) * reach_);
+    for (const NearRidge& ridge : polytope.ridges) beside(polytope.along(ridge), polytope.corner(ridge.from));
+    for (const NearCorner& corner : polytope.corners) {
+      const Vec3 place = seen(polytope.corner(corner) - centre_);
+      for (const Vec3 way : shape_.ways_out(place)) look(placed(way), beside_least(place));
+    }
+  }
+
+  void of_cylinder(const Rims& rims) {
+    look(rims.axis, 0), look(-rims.axis, 0);
+    beside(rims.axis, rims.centre);
+  }
+
+ private:
+  Vec3 seen(const WideVector& v) const { return {dot(axes_[0], v).head, dot(axes_[1], v).head, dot(axes_[2], v).head}; }
+  WideVector placed(Vec3 v) const { return v.x * axes_[0] + v.y * axes_[1] + v.z * axes_[2]; }
+
+  /// m: at a local minimum, the way is by no more too long than its slope there, which rounding leaves, times the
+  /// angle.
+  double beside_least(Vec3 place) const { return 0x1p-46 * (norm(place) + longest_); }
+
+  /// Across a ridge through that point.
+  void beside(const WideVector& ridge, const WideVector& point) {
+    const Vec3 along = seen(ridge), place = seen(point - centre_);
+    const Vec3 u = any_orthogonal(along), v = cross(along, u);
+    // The principal axes of what is seen along the ridge.
+    const Vec3 p = scaled(shape_.half_axes, u), q = scaled(shape_.half_axes, v);
+    const double angle = std::atan2(2 * dot(p, q), dot(p - q, p + q)) / 2;
+    const Vec3 major = std::cos(angle) * u + std::sin(angle) * v, minor = cross(along, major);
+    const double size = norm(scaled(shape_.half_axes, major)), width = norm(scaled(shape_.half_axes, minor));
+    const double k = std::min(1.0, width / size), rest = (1 - k) * (1 + k);
+    for (const double side : {1.0, -1.0}) {
+      look(placed(side * minor), beside_least(place));
+      look(placed(side * major), beside_least(place));
+      const auto at = nearest_on_ellipse(k, rest, side * dot(minor, place) / size, dot(major, place) / size);
+      if (at) look(placed(side * std::cos(*at) * minor + k * std::sin(*at) * major), beside_least(place));
+    }
+  }
+
+  void look(const WideVector& direction, double too_long) {
+    lower = std::min(lower, ways_.measure(sign_ * unit(direction)) - ways_.lost() - too_long);
+  }
+
+  Ways& ways_;
+  double sign_;
+  const Ellipsoid& shape_;
+  double longest_;
+  WideVector centre_;
+  std::array<WideVector, 3> axes_;
+  double reach_;
+};
+
+/// The way out where two curved surfaces meet, from a direction near it: a local minimum of the support function, by
+/// Newton's method.
+Vec3 between_curved(const Placed& a, const Placed& b, Vec3 outward) {
   for (int round = 0; round < 20; ++round) {
     const Vec3 farthest = a.support(outward) - b.support(-outward);
     const double way = dot(outward, farthest);
@@ -335,6 +407,12 @@ Vec3 between_rims(const Placed& a, const Placed& b, Vec3 outward) {
     const Vec3 u = any_orthogonal(outward), v = cross(outward, u);
     double uu = -way, uv = 0, vv = -way;
     for (const Placed* body : {&a, &b}) {
+      if (const Ellipsoid* ellipsoid = stretched(body->shape)) {
+        const auto own = [&](Vec3 w) { return apply_transposed(body->pose.rotation, w); };
+        const Mat3 curved = ellipsoid->slope(own(outward));
+        uu += dot(own(u), curved * own(u)), uv += dot(own(u), curved * own(v)), vv += dot(own(v), curved * own(v));
+        continue;
+      }
       const Vec3 tangent = cross(body->pose.rotation * Vec3{0, 0, 1}, outward);
       const double across = norm(tangent);
       if (!(across > 0)) return outward;
@@ -399,22 +477,45 @@ WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 
   const double lost = 0x1p-94 * (wide_a.reach() + wide_b.reach());
   const WideGap gap = wide_gap(wide_a, wide_b, lost / 4);
   if (norm2(gap.normal) > 0) {
-    // GJK may not have ended on a rim, and the hint be better.
+    // GJK may not have ended on what is curved, and the hint be better.
     Ways ways(wide_a, wide_b);
-    const bool rims = bounded(a.shape) && bounded(b.shape) && (has_rims(a.shape) || has_rims(b.shape));
-    if (rims) ways.measure(unit(wide(outward)));
-    const double certified = rims ? std::max(gap.certified, -(ways.shortest() + radii).head) : gap.certified;
+    const bool curved = bounded(a.shape) && bounded(b.shape) && (has_curved_core(a.shape) || has_curved_core(b.shape));
+    if (curved) ways.measure(unit(wide(outward)));
+    const double certified = curved ? std::max(gap.certified, -(ways.shortest() + radii).head) : gap.certified;
     return {-gap.distance, down(-std::max(gap.distance, gap.most) - lost), up(-certified + lost), gap.normal};
   }
   // Cores without an inside, or without a common point, are left at once by moving one of them to the other.
   const double touching = -(std::max(gap.distance, gap.most) + radii.head) - lost;
+  if (stretched(a.shape) || stretched(b.shape)) {
+    Ways ways(wide_a, wide_b);
+    ways.measure(unit(wide(outward)));
+    const bool first = stretched(a.shape);
+    EllipsoidSearch search(first ? wide_a : wide_b, first ? wide_b : wide_a, ways, first ? 1 : -1);
+    const WideBody& other = first ? wide_b : wide_a;
+    if (has_curved_core(other.shape)) {
+      if (has_rims(other.shape)) search.of_cylinder(Rims(other));
+      const EnclosedDepth enclosed = enclosed_depth(a, b);
+      ways.measure(unit(wide(between_curved(a, b, -enclosed.depth.normal))));
+      search.lower = std::min(enclosed.lower, ways.shortest().head - ways.lost());
+    } else {
+      NearPolytope polytope(other, gap.witness_a);
+      const double room = up(ways.shortest().head * (1 + 0x1p-40)) + ways.lost();
+      const Vec3 into = first ? -outward : outward;
+      const WideVector farthest = (first ? wide_a : wide_b).core_support(wide(-into)) - gap.witness_a;
+      const double beyond = dot(-into, rounded(farthest)) + kLost * norm(rounded(farthest));
+      polytope.cut(into, -beyond - room);
+      search.of_polytope(polytope);
+      search.lower = std::min(search.lower, ways.shortest().head - ways.lost());
+    }
+    return found(ways, search.lower > 0 ? search.lower : touching);
+  }
   if (has_rims(a.shape) || has_rims(b.shape)) {
     RimSearch search(wide_a, wide_b);
     search.run(outward, gap.witness_a);
     if (has_rims(a.shape) && has_rims(b.shape)) {
       const EnclosedDepth enclosed = enclosed_depth(a, b);
       const double coarse = enclosed.lower;
-      search.ways.measure(unit(wide(between_rims(a, b, -enclosed.depth.normal))));
+      search.ways.measure(unit(wide(between_curved(a, b, -enclosed.depth.normal))));
       const double way = std::min(search.lower, search.ways.shortest().head);
       if (coarse > way / 2 && rims_meet_farther_out(Rims(wide_a), Rims(wide_b), way)) search.lower = way - lost;
       else search.lower = std::min(way, coarse);

@@ -17,7 +17,8 @@ struct WideParting {
 /// The facets of the difference of two polytopes are parallel to a facet of either or to an edge of each, so the
 /// normals of these hold the least way out. About a point near the contact, every number is as exact as it is near:
 /// there doubles tell of nearly all normals, with bounds, that the way along them is longer, and double-doubles measure
-/// the rest. Cylinders have their own normals; what two rims leave open is enclosed by EPA.
+/// the rest. Cylinders and ellipsoids have their own normals; what two of these leave
+/// open is enclosed by EPA.
 WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint);
 
 }  // namespace overlapper

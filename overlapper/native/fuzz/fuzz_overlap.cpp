@@ -74,7 +74,9 @@ class Decoder {
 
   /// What bytes that have run out decode to, a box, is what is cheapest.
   Shape shape() {
-    switch (integer(0, 8)) {
+    const int kind = integer(0, 26);
+    if (kind == 26) return make_ellipsoid({positive(), positive(), positive()});
+    switch (kind % 9) {
       case 0:
       case 1: return make_box({positive(), positive(), positive()});
       case 2: return make_sphere(positive());
@@ -139,6 +141,9 @@ void print(const Shape& shape) {
     void operator()(const Sphere& s) const { std::fprintf(stderr, "Sphere(%.17g)", s.radius); }
     void operator()(const Box& b) const {
       std::fprintf(stderr, "Box("), print(b.half_extents), std::fprintf(stderr, ")");
+    }
+    void operator()(const Ellipsoid& e) const {
+      std::fprintf(stderr, "Ellipsoid("), print(e.half_axes), std::fprintf(stderr, ")");
     }
     void operator()(const Capsule& c) const { std::fprintf(stderr, "Capsule(%.17g, %.17g)", c.radius, c.length); }
     void operator()(const Cylinder& c) const { std::fprintf(stderr, "Cylinder(%.17g, %.17g)", c.radius, c.length); }

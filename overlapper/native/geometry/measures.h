@@ -76,6 +76,7 @@ struct Measures {
   int facets_touched = 0;       ///< planes of the bodies that took part
   double volume = 0, area = 0;  ///< m³, m²
   double volume_error = 0;      ///< m³: the true volume is within volume ± volume_error
+  double area_error = 0;        ///< m²: where it is more than what the error of the volume makes of the area
   Vec3 centroid;
   std::array<Pull, 2> pulls{};       ///< on the bodies of a pair, each about its body's position
   std::vector<Pull> pulls_of_group;  ///< likewise, on more than two

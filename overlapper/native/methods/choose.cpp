@@ -31,12 +31,14 @@ bool clippable(const Shape& shape) {
 bool rounded(const Shape& shape) { return std::holds_alternative<RoundedHull>(shape); }
 
 Traits traits(const Shape& shape) {
-  return {1, bounded(shape), clippable(shape), false, smooth(shape) && !rounded(shape), rounded(shape)};
+  const bool is_stretched = stretched(shape), is_smooth = smooth(shape), is_rounded = rounded(shape);
+  const bool round = is_smooth && !is_rounded && !is_stretched;
+  return {1, bounded(shape), clippable(shape), false, round, is_rounded, is_stretched, !is_smooth};
 }
 
 Traits operator+(const Traits& a, const Traits& b) {
   return {a.bodies + b.bodies, a.bounded || b.bounded, a.clippable && b.clippable, false,
-          a.round || b.round,  a.rounded || b.rounded};
+          a.round || b.round,  a.rounded || b.rounded, a.stretched || b.stretched, a.flat || b.flat};
 }
 
 /// Line by line, so that the compiler sees what each asks: a search through pointers is felt by two boxes apart.
@@ -321,6 +323,7 @@ std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping) {
   m.way = Way::kSlicing;
   m.facets_touched = round->facets_touched;
   m.volume = round->volume, m.volume_error = round->volume_error, m.area = round->area;
+  m.area_error = round->area_error;
   m.centroid = at.reference + round->centroid;
   for (int i = 0; i < 2; ++i) {
     const double side = i == 0 ? 1 : -1;

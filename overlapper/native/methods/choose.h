@@ -24,6 +24,8 @@ struct Traits {
   bool many_facet_pairs;  ///< two boxes or hulls that can be climbed, with more than kLeastPairsTraced
   bool round;             ///< one of them is a ball, a capsule or a cylinder
   bool rounded;           ///< one of them is a rounded hull
+  bool stretched;         ///< one of them is an ellipsoid whose axes differ
+  bool flat;              ///< one of them is a box, a hull or a half-space
 };
 Traits traits(const Placed& a, const Placed& b);
 Traits traits(std::span<const Placed> bodies);
@@ -41,7 +43,7 @@ struct Choice {
 
 /// How bodies are measured. The first line that fits counts, for single calls, batches and groups alike. Numbers of
 /// facets and errors that count are in geometry/thresholds.h.
-inline constexpr std::array<Choice, 6> kChoices{{
+inline constexpr std::array<Choice, 7> kChoices{{
     {"two boxes or hulls of many facets",
      [](const Traits& t) { return t.many_facet_pairs && t.clippable; },
      {Way::kTracing, Way::kClipping, Way::kWideClipping, Way::kDual}},
@@ -51,11 +53,14 @@ inline constexpr std::array<Choice, 6> kChoices{{
     {"two or more boxes, hulls and half-spaces",
      [](const Traits& t) { return t.clippable && t.bounded; },
      {Way::kClipping, Way::kWideClipping, Way::kDual}},
-    {"two, one of them a ball, a capsule or a cylinder, and no rounded hull",
-     [](const Traits& t) { return t.bodies == 2 && t.round && !t.rounded; },
+    {"two, one of them a ball, a capsule or a cylinder, and no rounded hull or ellipsoid",
+     [](const Traits& t) { return t.bodies == 2 && t.round && !t.rounded && !t.stretched; },
      {Way::kClosedForm, Way::kSlicing, Way::kDual}},
-    {"two, one of them a rounded hull",
-     [](const Traits& t) { return t.bodies == 2 && t.rounded; },
+    {"an ellipsoid, and a box, a hull or a half-space",
+     [](const Traits& t) { return t.bodies == 2 && t.stretched && t.flat; },
+     {Way::kClosedForm, Way::kSlicing, Way::kDual}},
+    {"two, one of them a rounded hull, and no ellipsoid",
+     [](const Traits& t) { return t.bodies == 2 && t.rounded && !t.stretched; },
      {Way::kSlicing, Way::kDual}},
     {"all others", [](const Traits&) { return true; }, {Way::kDual}},
 }};

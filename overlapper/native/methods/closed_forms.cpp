@@ -10,6 +10,7 @@
 
 #include "methods/quadric/ball.h"
 #include "methods/quadric/cylinder.h"
+#include "methods/round/stretch.h"
 #include "shapes/solid.h"
 
 namespace overlapper {
@@ -224,6 +225,8 @@ std::optional<Revolved> revolved(const Placed& body) {
   const Vec3 axis = body.pose.rotation * Vec3{0, 0, 1};
   if (const Sphere* s = std::get_if<Sphere>(&body.shape))
     return Revolved{body.pose.translation, axis, s->radius, 0, true};
+  if (const Ellipsoid* e = std::get_if<Ellipsoid>(&body.shape); e && e->ball())
+    return Revolved{body.pose.translation, axis, e->half_axes.x, 0, true};
   if (const Capsule* c = std::get_if<Capsule>(&body.shape))
     return Revolved{body.pose.translation, axis, c->radius, c->length / 2, true};
   if (const Cylinder* c = std::get_if<Cylinder>(&body.shape))
@@ -312,9 +315,14 @@ double reach_below(const Revolved& body, Vec3 normal, double offset, Vec3 direct
   return std::min({bound(0), at_left, at_right});
 }
 
-/// The body where at most one of the planes cuts off anything that the others leave.
-std::optional<Measures> cut_by_polytope(const Revolved& body, std::span<const Plane> planes, int self, double rounding,
-                                        Vec3 reference, const std::array<Vec3, 2>& positions) {
+/// The only one of some planes that cuts off anything which the others leave of a body.
+struct OnlyCut {
+  const Plane* plane = nullptr;
+  double layers = 1;  ///< of rounding that others may cut off
+};
+
+/// Nothing where there are two such planes.
+std::optional<OnlyCut> only_cut(const Revolved& body, std::span<const Plane> planes, double rounding) {
   const Plane* deepest = nullptr;
   double most = -kInfinity;
   std::vector<const Plane*> cutting;
@@ -332,7 +340,52 @@ std::optional<Measures> cut_by_polytope(const Revolved& body, std::span<const Pl
     if (reach > offset + 2 * rounding) return std::nullopt;
     if (reach > offset) layers += 4;  // it may cut off a layer of rounding
   }
-  return cut_by_plane(body, *deepest, self, layers * rounding, reference, positions);
+  return OnlyCut{deepest, layers};
+}
+
+/// The body where at most one of the planes cuts off anything that the others leave.
+std::optional<Measures> cut_by_polytope(const Revolved& body, std::span<const Plane> planes, int self, double rounding,
+                                        Vec3 reference, const std::array<Vec3, 2>& positions) {
+  const auto cut = only_cut(body, planes, rounding);
+  if (!cut) return std::nullopt;
+  return cut_by_plane(body, *cut->plane, self, cut->layers * rounding, reference, positions);
+}
+
+/// An ellipsoid likewise: a cap of the unit ball that it is made of, stretched.
+std::optional<Measures> cut_by_polytope(const Placed& body, std::span<const Plane> planes, int self, double rounding,
+                                        Vec3 reference, const std::array<Vec3, 2>& positions) {
+  const slicing::Stretch stretch(stretched(body.shape)->half_axes);
+  const Vec3 half_axes = stretch.half_axes, centre = body.pose.translation;
+  const Mat3& turn = body.pose.rotation;
+  std::vector<Plane> seen;
+  for (const Plane& plane : planes) {
+    const Vec3 normal = scaled(half_axes, apply_transposed(turn, plane.normal));
+    const double length = norm(normal);
+    seen.push_back({normal / length, -signed_distance(plane, centre) / length});
+  }
+  const Revolved ball{{}, {0, 0, 1}, 1, 0, true};
+  const double shortest = std::min({half_axes.x, half_axes.y, half_axes.z});
+  const auto cut = only_cut(ball, seen, rounding / shortest);
+  if (!cut) return std::nullopt;
+  const auto& [normal, offset] = *cut->plane;
+  const double height = std::min(2.0, 1 + offset);
+  if (!(height > 0)) return std::nullopt;
+  const Part part = cap(1, height, normal);
+  const bool whole = height == 2;
+  const slicing::Stretch::Cap curved = stretch.cap(normal, height);
+  const Vec3 on_other = whole ? Vec3{} : stretch.normal(part.flat_area * normal);
+  Measures q = by_formula();
+  q.facets_touched = whole ? 0 : 1;
+  q.volume = stretch.volume * part.volume;
+  q.area = curved.area + norm(on_other);
+  q.area_error = curved.error + stretch.open() * q.area;
+  q.centroid = reference + (centre + turn * scaled(half_axes, part.moment / part.volume));
+  q.volume_error = cut->layers * rounding * q.area + 2 * kSummation * q.volume;
+  if (!whole) {
+    const Vec3 force = turn * on_other, where = centre + turn * scaled(half_axes, offset * normal);
+    q.pulls = opposite_pulls(self == 0 ? -force : force, where, positions);
+  }
+  return q;
 }
 
 // ----------------------------------------------------------------------------------------------------------------- lens
@@ -518,21 +571,24 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
     if (!smooth_a->round || !smooth_b->round) return std::nullopt;
     return without_inertia(lens_of_ends(*smooth_a, *smooth_b, rounding, reference, positions));
   }
-  if (!smooth_a && !smooth_b) return std::nullopt;
-  const Placed& other = smooth_a ? b : a;
+  const bool first = smooth_a || stretched(a.shape);
+  if (!first && !smooth_b && !stretched(b.shape)) return std::nullopt;
+  const Placed &body = first ? a : b, &other = first ? b : a;
   if (smooth(other.shape)) return std::nullopt;
-  const Revolved& body = smooth_a ? *smooth_a : *smooth_b;
-  const int self = smooth_a ? 0 : 1;
+  const int self = first ? 0 : 1;
+  const std::optional<Revolved>& revolved_body = first ? smooth_a : smooth_b;
   std::optional<MeasuresAndInertia> several;
   const auto error = [](const Measures& m) { return m.volume_error / m.volume; };
-  if (body.round && body.half_length == 0)
-    several = ball_and_polyhedron(body, other, self, rounding, reference, positions);
-  else several = long_body_and_polyhedron(body, smooth_a ? a : b, other, self, rounding, reference, positions);
+  if (revolved_body && revolved_body->round && revolved_body->half_length == 0)
+    several = ball_and_polyhedron(*revolved_body, other, self, rounding, reference, positions);
+  else if (revolved_body)
+    several = long_body_and_polyhedron(*revolved_body, body, other, self, rounding, reference, positions);
   if (several && error(several->measures) <= kEnough) return several;
   std::vector<Plane> planes;
   append_planes(other.shape, planes);
   for (Plane& plane : planes) plane = other.pose * plane;
-  const auto cut = cut_by_polytope(body, planes, self, rounding, reference, positions);
+  if (!revolved_body) return without_inertia(cut_by_polytope(body, planes, self, rounding, reference, positions));
+  const auto cut = cut_by_polytope(*revolved_body, planes, self, rounding, reference, positions);
   if (several && !(cut && error(*cut) <= error(several->measures))) return several;
   return without_inertia(cut);
 }

@@ -46,7 +46,9 @@ Hull tessellated(const Shape& shape, double tolerance) {
     circle(cylinder->radius, cylinder->length / 2, n);
   } else if (bounded(shape)) {
     // A grid of latitudes and longitudes with the same step s lacks at most about s²/2 of the ball.
-    const double radius = core_radius(shape), half = shape.index() == 0 ? 0 : std::get<Capsule>(shape).length / 2;
+    const Capsule* capsule = std::get_if<Capsule>(&shape);
+    const Ellipsoid* ellipsoid = std::get_if<Ellipsoid>(&shape);
+    const double radius = ellipsoid ? 1 : core_radius(shape), half = capsule ? capsule->length / 2 : 0;
     // Two latitudes' worth of points per band: beyond a million or so their hull is out of reach.
     require(tolerance >= 1e-5, "tolerance must be 1e-5 or more where method 'paper' tessellates a round shape");
     const int bands = std::max(4, static_cast<int>(std::ceil(std::numbers::pi / std::sqrt(2 * tolerance))));
@@ -59,6 +61,8 @@ Hull tessellated(const Shape& shape, double tolerance) {
       if (z <= 0) circle(r, z - half, around);
       if (z >= 0) circle(r, z + half, around);
     }
+    if (ellipsoid)
+      for (Vec3& p : points) p = scaled(ellipsoid->half_axes, p);
   } else {
     throw std::invalid_argument("a half-space is unbounded and has no vertices");
   }

@@ -27,6 +27,7 @@ double extent(const Shape& shape) {
     double operator()(const Hull& h) const { return h.data->radius; }
     double operator()(const HalfSpace& h) const { return std::abs(h.plane.offset); }
     double operator()(const RoundedHull& h) const { return h.core.data->radius + h.radius; }
+    double operator()(const Ellipsoid& e) const { return sum(e.half_axes); }
   };
   return std::visit(Visitor{}, shape);
 }
@@ -60,8 +61,8 @@ bool in_doubt(double length, const Placed& a, const Placed& b) {
   return rounding(reach(a, reach(b, between))) > kClear * length;
 }
 
-bool has_rims(const Placed& a, const Placed& b) {
-  return (has_rims(a.shape) || has_rims(b.shape)) && bounded(a.shape) && bounded(b.shape);
+bool has_curved_core(const Placed& a, const Placed& b) {
+  return (has_curved_core(a.shape) || has_curved_core(b.shape)) && bounded(a.shape) && bounded(b.shape);
 }
 
 Penetration penetration_in_order(const Placed& a, const Placed& b) {
@@ -80,7 +81,7 @@ Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool 
   Contact contact;
   if (status == Status::kOverlapping) {
     Penetration p = penetration(a, b);
-    if (doubtful || has_rims(a, b) || in_doubt(p.depth, a, b)) p = parting(a, b, at.reference, p.normal);
+    if (doubtful || has_curved_core(a, b) || in_doubt(p.depth, a, b)) p = parting(a, b, at.reference, p.normal);
     contact.depth = p.depth;
     contact.normal = p.normal;
   } else {

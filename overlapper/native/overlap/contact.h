@@ -26,8 +26,9 @@ Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool 
 /// True if doubles leave more of a depth or distance, of bodies in coordinates about one of them, in doubt than kClear.
 bool in_doubt(double length, const Placed& a, const Placed& b);
 
-/// True of a cylinder and another bounded body: EPA approaches a rim, and knows its direction to half of the digits.
-bool has_rims(const Placed& a, const Placed& b);
+/// True of a cylinder or an ellipsoid and another bounded body: EPA approaches a curved surface, and knows its
+/// direction to half of the digits.
+bool has_curved_core(const Placed& a, const Placed& b);
 
 /// How far the figures of a contact may be off, in m.
 struct ContactErrors {

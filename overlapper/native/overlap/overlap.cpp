@@ -200,7 +200,10 @@ Errors Overlap::errors_of_measures() const {
   if (!(volume_error() < volume())) return errors_of_anything(volume_error(), bodies());
   const bool integrated = way() == Way::kClosedForm || way() == Way::kSlicing;
   Errors errors;
-  if (integrated) errors = errors_of_formula(measures(), drawn(), bodies());
+  if (integrated) {
+    errors = errors_of_formula(measures(), drawn(), bodies());
+    errors.area = std::max(errors.area, measures().area_error);
+  }
   const MeasuresAndInertia* with_inertia = nullptr;
   if (integrated && in_full().inertia) with_inertia = &in_full();
   else if (integrated && sliced()) with_inertia = &*sliced();

@@ -220,7 +220,8 @@ as an answer to where a ray leaves it or which of its planes is tightest about a
   });
 }
 
-#define OVERLAPPER_SHAPES "collections.abc.Sequence[Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace]"
+#define OVERLAPPER_SHAPES \
+  "collections.abc.Sequence[Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace]"
 #define OVERLAPPER_POSES "positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike"
 
 constexpr const char* kOverlapsDoc =

@@ -449,7 +449,8 @@ void define_functions(nb::module_& m) {
         return make_overlap(to_bodies(shapes), to_double(tolerance, "tolerance"), to_method(method));
       },
       "shapes"_a, "tolerance"_a.none() = 1e-3, "method"_a.none() = "auto",
-      nb::sig("def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | "
+      nb::sig("def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | "
+              "Placed | "
               "numpy.typing.ArrayLike, "
               "tolerance: float = 0.001, method: typing.Literal['auto', 'paper'] = 'auto') -> Overlap"),
       R"(The common set of two or more convex shapes.
@@ -477,10 +478,11 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
         return contact_in_doubt(a, b).distance;
       },
       "a"_a.none(), "b"_a.none(),
-      nb::sig("def distance(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | "
-              "numpy.typing.ArrayLike, "
-              "b: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | "
-              "numpy.typing.ArrayLike) -> float"),
+      nb::sig(
+          "def distance(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | "
+          "numpy.typing.ArrayLike, "
+          "b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | "
+          "numpy.typing.ArrayLike) -> float"),
       "Distance (m) of the nearest points of two shapes; 0 if they touch or overlap.");
   m.def(
       "penetration_depth",
@@ -488,13 +490,15 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
         const auto pair = relative_pair(a, b);
         const auto& [p, q] = pair;
         const double depth = computed_of(pair, [&] { return penetration(pair[0], pair[1]).depth; });
-        if (in_doubt(std::abs(depth), p, q) || (depth > 0 && has_rims(p, q))) return contact_in_doubt(a, b).depth;
+        if (in_doubt(std::abs(depth), p, q) || (depth > 0 && has_curved_core(p, q)))
+          return contact_in_doubt(a, b).depth;
         return std::max(0.0, depth);
       },
       "a"_a.none(), "b"_a.none(),
-      nb::sig("def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | "
+      nb::sig("def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace "
+              "| Placed | "
               "numpy.typing.ArrayLike, "
-              "b: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | "
+              "b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | "
               "numpy.typing.ArrayLike) -> float"),
       R"(Length (m) of the least translation that separates two shapes; 0 if they do not overlap. Positive where pybullet's contact
 distance is negative. Raises ValueError for two half-spaces.)");
@@ -504,9 +508,9 @@ distance is negative. Raises ValueError for two half-spaces.)");
         return union_ratio(a, b, to_double(tolerance, "tolerance"));
       },
       "a"_a.none(), "b"_a.none(), "tolerance"_a.none() = 1e-3,
-      nb::sig("def iou(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | "
+      nb::sig("def iou(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | "
               "numpy.typing.ArrayLike, "
-              "b: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | "
+              "b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | "
               "numpy.typing.ArrayLike, tolerance: "
               "float = 0.001) -> float"),
       "Intersection over union of two shapes: common volume over the volume of their union, from 0 to 1.");

@@ -81,6 +81,7 @@ std::string repr(const RoundedHull& h) {
   return "RoundedHull(" + std::to_string(h.core.data->vertices.size()) + " vertices, " +
          std::to_string(h.core.data->planes.size()) + " facets, radius=" + number(h.radius) + ")";
 }
+std::string repr(const Ellipsoid& e) { return "Ellipsoid(half_axes=" + text(e.half_axes) + ")"; }
 std::string repr(const Shape& shape) {
   return std::visit([](const auto& s) { return repr(s); }, shape);
 }
@@ -188,6 +189,23 @@ void define_shape_types(nb::module_& m) {
   define_common(box);
   define_pickle(box, [](const Box& b) {
     return nb::make_tuple(nb::make_tuple(b.half_extents.x, b.half_extents.y, b.half_extents.z));
+  });
+
+  nb::class_<Ellipsoid> ellipsoid(m, "Ellipsoid", R"(An ellipsoid about the origin with half axes (m) along x, y, z.
+
+All points with (x / a)² + (y / b)² + (z / c)² <= 1. With equal half axes it answers as the sphere does. With a box, a
+hull or a half-space, it is measured as a ball is, of which it is the image; with other round bodies, between polytopes,
+as closely as `tolerance` asks. It has no certificate.)");
+  ellipsoid.def(
+      "__init__",
+      [](Ellipsoid* self, nb::handle half_axes) {
+        new (self) Ellipsoid(make_ellipsoid(to_vec3(half_axes, "half_axes")));
+      },
+      "half_axes"_a.none(), nb::sig("def __init__(self, half_axes: numpy.typing.ArrayLike) -> None"));
+  array_property(ellipsoid, "half_axes", [](const Ellipsoid& e) { return to_numpy(e.half_axes); }, "(3,) m");
+  define_common(ellipsoid);
+  define_pickle(ellipsoid, [](const Ellipsoid& e) {
+    return nb::make_tuple(nb::make_tuple(e.half_axes.x, e.half_axes.y, e.half_axes.z));
   });
 
   nb::class_<Capsule> capsule(
@@ -334,12 +352,13 @@ which rounds.)");
       },
       "shape"_a.none(), "position"_a.none() = nb::make_tuple(0.0, 0.0, 0.0),
       "orientation"_a.none() = nb::make_tuple(0.0, 0.0, 0.0, 1.0),
-      nb::sig("def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | "
-              "numpy.typing.ArrayLike, position: "
-              "numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None"));
+      nb::sig(
+          "def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | "
+          "numpy.typing.ArrayLike, position: "
+          "numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None"));
   placed.def_prop_ro(
       "shape", [](const Placed& p) { return to_python(p.shape); },
-      nb::sig("def shape(self) -> Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace"));
+      nb::sig("def shape(self) -> Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace"));
   array_property(placed, "position", [](const Placed& p) { return to_numpy(p.position); }, "(3,) m");
   array_property(
       placed, "orientation", [](const Placed& p) { return to_numpy(unit(p.orientation)); },

@@ -18,6 +18,7 @@ std::partial_ordering compare(const Capsule& a, const Capsule& b) {
 std::partial_ordering compare(const Cylinder& a, const Cylinder& b) {
   return std::tie(a.radius, a.length) <=> std::tie(b.radius, b.length);
 }
+std::partial_ordering compare(const Ellipsoid& a, const Ellipsoid& b) { return compare(a.half_axes, b.half_axes); }
 std::partial_ordering compare(const HalfSpace& a, const HalfSpace& b) {
   const auto by_normal = compare(a.given_normal, b.given_normal);
   return by_normal != 0 ? by_normal : a.given_offset <=> b.given_offset;

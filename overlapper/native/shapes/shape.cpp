@@ -150,6 +150,11 @@ Cylinder make_cylinder(double radius, double length) {
   return {radius, length};
 }
 
+Ellipsoid make_ellipsoid(Vec3 half_axes) {
+  for (int i = 0; i < 3; ++i) require_size(half_axes[i], "half_axes");
+  return {half_axes};
+}
+
 HalfSpace make_half_space(Vec3 normal, double offset) {
   require(finite(normal), "normal must be finite");
   require(std::isfinite(offset), "offset must be finite");
@@ -173,6 +178,9 @@ double volume(const Shape& shape) {
     double operator()(const Hull& h) const { return h.data->volume; }
     double operator()(const HalfSpace&) const { return kInfinity; }
     double operator()(const RoundedHull& h) const { return h.volume(); }
+    double operator()(const Ellipsoid& e) const {
+      return 4.0 / 3.0 * std::numbers::pi * e.half_axes.x * e.half_axes.y * e.half_axes.z;
+    }
   };
   return std::visit(Visitor{}, shape);
 }
@@ -188,9 +196,17 @@ bool bounded(const Shape& shape) { return !std::holds_alternative<HalfSpace>(sha
 
 bool has_rims(const Shape& shape) { return std::holds_alternative<Cylinder>(shape); }
 
+const Ellipsoid* stretched(const Shape& shape) {
+  const Ellipsoid* ellipsoid = std::get_if<Ellipsoid>(&shape);
+  return ellipsoid && !ellipsoid->ball() ? ellipsoid : nullptr;
+}
+
+bool has_curved_core(const Shape& shape) { return has_rims(shape) || stretched(shape); }
+
 bool smooth(const Shape& shape) {
   return std::holds_alternative<Sphere>(shape) || std::holds_alternative<Capsule>(shape) ||
-         std::holds_alternative<Cylinder>(shape) || std::holds_alternative<RoundedHull>(shape);
+         std::holds_alternative<Cylinder>(shape) || std::holds_alternative<RoundedHull>(shape) ||
+         std::holds_alternative<Ellipsoid>(shape);
 }
 
 void append_planes(const Shape& shape, std::vector<Plane>& planes) {
@@ -210,6 +226,7 @@ void append_planes(const Shape& shape, std::vector<Plane>& planes) {
     void operator()(const RoundedHull& h) const {
       for (const Plane& plane : h.core.data->planes) out.push_back({plane.normal, plane.offset + h.radius});
     }
+    void operator()(const Ellipsoid& e) const { box_of(e.half_axes); }
   };
   std::visit(Visitor{six, planes}, shape);
 }
@@ -218,6 +235,8 @@ double core_radius(const Shape& shape) {
   if (const Sphere* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
   if (const Capsule* capsule = std::get_if<Capsule>(&shape)) return capsule->radius;
   if (const RoundedHull* hull = std::get_if<RoundedHull>(&shape)) return hull->radius;
+  if (const Ellipsoid* ellipsoid = std::get_if<Ellipsoid>(&shape); ellipsoid && ellipsoid->ball())
+    return ellipsoid->half_axes.x;
   return 0;
 }
 
@@ -254,7 +273,8 @@ Vec3 Placed::support(Vec3 direction) const {
 }
 
 Vec3 Placed::core_support(Vec3 direction) const {
-  if (std::holds_alternative<Sphere>(shape)) return pose.translation;
+  const Ellipsoid* ellipsoid = std::get_if<Ellipsoid>(&shape);
+  if (std::holds_alternative<Sphere>(shape) || (ellipsoid && ellipsoid->ball())) return pose.translation;
   if (const Capsule* capsule = std::get_if<Capsule>(&shape)) {
     const Vec3 along = pose.rotation * Vec3{0, 0, capsule->length / 2};
     return pose.translation + (dot(along, direction) < 0 ? -along : along);

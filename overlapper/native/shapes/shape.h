@@ -2,6 +2,7 @@
 
 #include <concepts>
 #include <memory>
+#include <optional>
 #include <span>
 #include <variant>
 #include <vector>
@@ -97,7 +98,26 @@ struct RoundedHull {
   Vec3 centroid() const;  ///< about the core's origin
 };
 
-using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Hull, HalfSpace, RoundedHull>;
+/// About the origin, its axes along x, y and z: a ball that has been stretched.
+struct Ellipsoid {
+  Vec3 half_axes;
+
+  /// With equal axes, it answers as the sphere does.
+  bool ball() const { return half_axes.x == half_axes.y && half_axes.y == half_axes.z; }
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+  /// The supporting plane whose normal is along `outward`.
+  Plane supporting(Vec3 outward) const;
+  /// The derivative of support() by the direction.
+  Mat3 slope(Vec3 direction) const;
+  /// The unit normals at the points of the surface that are the nearest ones of all around them, of which there are
+  /// one or two: the nearest of all, and the one across the shortest axis.
+  std::vector<Vec3> ways_out(Vec3 point) const;
+};
+
+using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Hull, HalfSpace, RoundedHull, Ellipsoid>;
 
 /// Each throws std::invalid_argument with one sentence that names the argument.
 Sphere make_sphere(double radius);
@@ -106,17 +126,25 @@ Capsule make_capsule(double radius, double length);
 Cylinder make_cylinder(double radius, double length);
 HalfSpace make_half_space(Vec3 normal, double offset);
 RoundedHull make_rounded_hull(std::span<const Vec3> points, double radius);
+Ellipsoid make_ellipsoid(Vec3 half_axes);
 /// m³; infinite for a half-space.
 double volume(const Shape& shape);
 Vec3 centroid(const Shape& shape);
 bool bounded(const Shape& shape);
 
 /// True for shapes with infinitely many supporting planes along their boundary: sphere, capsule, cylinder,
-/// rounded hull.
+/// rounded hull, ellipsoid.
 bool smooth(const Shape& shape);
 
 /// True for a cylinder, whose caps have round borders.
 bool has_rims(const Shape& shape);
+
+/// The shape, if it is an ellipsoid and no ball.
+const Ellipsoid* stretched(const Shape& shape);
+
+/// True for cylinders and stretched ellipsoids: what GJK and EPA find of a core that is curved, they approach, and know
+/// the direction there to half of the digits.
+bool has_curved_core(const Shape& shape);
 
 /// All facet planes of a polytope; for a smooth shape a few of its tangent planes that already bound it. About the
 /// shape's origin.
@@ -129,8 +157,8 @@ double core_radius(const Shape& shape);
 /// The polytope that a hull is, or that a rounded hull is grown from; null for other shapes.
 const HullData* polytope_of(const Shape& shape);
 
-/// How far from its own origin a shape reaches; of a half-space, how far its plane is. For balls, capsules, cylinders
-/// and rounded hulls, the corner of the box around them.
+/// How far from its own origin a shape reaches; of a half-space, how far its plane is. For balls, capsules, cylinders,
+/// rounded hulls and ellipsoids, the corner of the box around them.
 double radius(const Shape& shape);
 
 /// Facets of a box or a hull; 1 for a half-space.

@@ -73,6 +73,26 @@ WidePlane ray_exit(const Cylinder& c, const WideVector& origin, const WideVector
   return tangent(side, {}, c.radius, axis(0));
 }
 
+WideVector scaled(Vec3 by, const WideVector& v) {
+  return {DoubleDouble{by.x} * v.x, DoubleDouble{by.y} * v.y, DoubleDouble{by.z} * v.z};
+}
+WideVector divided(const WideVector& v, Vec3 by) {
+  return {v.x / DoubleDouble{by.x}, v.y / DoubleDouble{by.y}, v.z / DoubleDouble{by.z}};
+}
+
+WidePlane supporting(const Ellipsoid& e, const WideVector& outward) {
+  const WideVector normal = unit(outward);
+  return {normal, norm(scaled(e.half_axes, normal))};
+}
+
+WidePlane ray_exit(const Ellipsoid& e, const WideVector& origin, const WideVector& d) {
+  const WideVector on_ball = leave_ball(divided(origin, e.half_axes), unit(divided(d, e.half_axes)), 1);
+  return supporting(e, divided(on_ball, e.half_axes));
+}
+
+/// By the normal that doubles find: where the slack is least, a normal that is off changes it to second order.
+WidePlane tightest(const Ellipsoid& e, const WideVector& p) { return supporting(e, wide(e.ways_out(rounded(p))[0])); }
+
 WidePlane tightest(const Sphere& s, const WideVector& p) { return tangent(p, {}, s.radius, axis(2)); }
 
 WidePlane tightest(const Box& b, const WideVector& p) {
@@ -182,6 +202,8 @@ WidePlane WideBody::ray_exit(const WideVector& origin, const WideVector& directi
     return in_world(supporting(hull->ray_exit(rounded(o), rounded(d)).normal));
   if (const Sphere* sphere = std::get_if<Sphere>(&shape)) return in_world(overlapper::ray_exit(*sphere, o, d));
   if (const Capsule* capsule = std::get_if<Capsule>(&shape)) return in_world(overlapper::ray_exit(*capsule, o, d));
+  if (const Ellipsoid* ellipsoid = std::get_if<Ellipsoid>(&shape))
+    return in_world(overlapper::ray_exit(*ellipsoid, o, d));
   return in_world(overlapper::ray_exit(std::get<Cylinder>(shape), o, d));
 }
 
@@ -218,6 +240,9 @@ WideVector WideBody::core_support(const WideVector& direction) const {
     WideVector operator()(const Hull&) const { return body.farthest_corner(d); }
     WideVector operator()(const RoundedHull&) const { return body.farthest_corner(d); }
     WideVector operator()(const HalfSpace&) const { return {}; }
+    WideVector operator()(const Ellipsoid& e) const {
+      return e.ball() ? WideVector{} : scaled(e.half_axes, unit(scaled(e.half_axes, d)));
+    }
   };
   return rotation_ * std::visit(Visitor{*this, d}, shape) + translation_;
 }

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from rules import the_errors_hold_the_measures
 from strategies import quaternion
 
-from overlapper import Box, Capsule, Cylinder, Hull, Placed, RoundedHull, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, Hull, Placed, RoundedHull, Sphere, overlap
 
 CUBE = Box([1, 1, 1])
 
@@ -18,6 +18,7 @@ def random_shape(rng):
         lambda: Sphere(size),
         lambda: Capsule(size / 2, size),
         lambda: Cylinder(size / 2, size),
+        lambda: Ellipsoid(rng.uniform(0.2, 1, 3) * size),
         lambda: RoundedHull(rng.normal(size=(6, 3)) * size / 2, size / 3),
         lambda: Box(rng.uniform(0.2, 1, 3) * size),
         lambda: Hull(rng.normal(size=(12, 3)) * size),

@@ -18,6 +18,7 @@ from overlapper import (
     Box,
     Capsule,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Hull,
     Overlap,
@@ -94,6 +95,8 @@ def answers(seed):
     found["candidate_pairs"] = pairs
     found["overlaps"] = overlaps(shapes, positions, orientations, tolerance=TOLERANCE, threads=2)
     found["Batch"] = Batch(shapes).overlaps(positions, orientations, pairs, TOLERANCE)
+    ellipsoid = Placed(Ellipsoid([0.4, 0.5, 0.6]))
+    found["Ellipsoid"] = [overlap(ellipsoid, body, tolerance=TOLERANCE) for body in (a, Placed(points[0]))]
     found["RoundedHull"] = overlap(Placed(RoundedHull(points[0], 0.1)), Placed(Box([0.5, 0.5, 0.5])))
     frames = [(body.position, body.orientation) for body in (a, b, c)]
     found["world_poses"] = _core.world_poses(frames, np.arange(3), positions, orientations)

@@ -29,7 +29,19 @@ from strategies import (
     vectors,
 )
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere, distance, overlap, penetration_depth
+from overlapper import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Placed,
+    Sphere,
+    distance,
+    overlap,
+    penetration_depth,
+)
 
 AXES = np.eye(3)
 CUBE = Box([1, 1, 1])
@@ -67,7 +79,7 @@ def assert_is_a_closed_polytope(answer):
     corners = answer.vertices[answer.faces]
     doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert_allclose(doubled.sum(0), 0, atol=1e-14 * np.abs(doubled).sum())
-    smooth = any(isinstance(body.shape, Sphere | Capsule | Cylinder) for body in answer.shapes)
+    smooth = any(isinstance(body.shape, Sphere | Capsule | Cylinder | Ellipsoid) for body in answer.shapes)
     # The area is that of the polytope around a smooth part, or of the part itself.
     rel = 3 * answer.tolerance if smooth else 1e-12
     assert np.linalg.norm(doubled, axis=1).sum() / 2 == pytest.approx(answer.area, rel=rel)

@@ -74,6 +74,45 @@ class Box:
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
 
+class Ellipsoid:
+    """
+    An ellipsoid about the origin with half axes (m) along x, y, z.
+
+    All points with (x / a)² + (y / b)² + (z / c)² <= 1. With equal half axes it answers as the sphere does. With a box, a
+    hull or a half-space, it is measured as a ball is, of which it is the image; with other round bodies, between polytopes,
+    as closely as `tolerance` asks. It has no certificate.
+    """
+
+    def __init__(self, half_axes: numpy.typing.ArrayLike) -> None: ...
+
+    @property
+    def half_axes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(3,) m"""
+
+    @property
+    def volume(self) -> float:
+        """Volume in m³; infinite for a half-space."""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """
+        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        """
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
+
 class Capsule:
     """
     All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.
@@ -324,10 +363,10 @@ class Placed:
     which rounds.
     """
 
-    def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
+    def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
 
     @property
-    def shape(self) -> Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace: ...
+    def shape(self) -> Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace: ...
 
     @property
     def position(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
@@ -641,7 +680,7 @@ class Overlap:
 def overlap(a: Placed, b: Placed, /) -> Overlap: ...
 
 @overload
-def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001, method: Literal['auto', 'paper'] = 'auto') -> Overlap:
+def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001, method: Literal['auto', 'paper'] = 'auto') -> Overlap:
     """
     The common set of two or more convex shapes.
 
@@ -659,18 +698,18 @@ def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | Ha
     deciding by exact signs inside its hulls. Where no shift lands inside, it says 'touching'.
     """
 
-def distance(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float:
+def distance(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float:
     """
     Distance (m) of the nearest points of two shapes; 0 if they touch or overlap.
     """
 
-def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float:
+def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float:
     """
     Length (m) of the least translation that separates two shapes; 0 if they do not overlap. Positive where pybullet's contact
     distance is negative. Raises ValueError for two half-spaces.
     """
 
-def iou(a: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001) -> float:
+def iou(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001) -> float:
     """
     Intersection over union of two shapes: common volume over the volume of their union, from 0 to 1.
     """
@@ -801,7 +840,7 @@ class Batch:
     answers are those of a first call to the last bit. Threads that ask at the same time get their answers without waiting.
     """
 
-    def __init__(self, shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace]) -> None: ...
+    def __init__(self, shapes: Sequence[Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace]) -> None: ...
 
     def overlaps(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
         """
@@ -825,7 +864,7 @@ class Batch:
         two half-spaces are no pair.
         """
 
-def overlaps(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
+def overlaps(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
     """
     What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
     gradient as arrays.
@@ -841,7 +880,7 @@ def overlaps(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | Rounded
     unbounded.
     """
 
-def candidate_pairs(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Hull | RoundedHull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
+def candidate_pairs(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
     """
     (p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
     two half-spaces are no pair.

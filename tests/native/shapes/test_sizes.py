@@ -6,7 +6,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 import pytest
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
 TETRA = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
@@ -16,6 +16,7 @@ MADE = {
     "box": lambda s: Box([s] * 3),
     "capsule": lambda s: Capsule(s, s),
     "cylinder": lambda s: Cylinder(s, s),
+    "ellipsoid": lambda s: Ellipsoid([s, 0.75 * s, 0.875 * s]),
     "hull": lambda s: Hull(CORNERS * s),
     "rounded hull": lambda s: RoundedHull(CORNERS * s, s),
     "half-space": lambda s: HalfSpace((0, 0, 1), s),

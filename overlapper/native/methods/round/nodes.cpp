@@ -123,7 +123,11 @@ class Bundle {
   void add_edge(const Line& line, const Points& from, const Points& to) {
     const Point d = (1 / line.length) * Point{-line.normal.y, line.normal.x};
     const double inverse = 1 / line.length, offset = std::abs(line.offset), rate = std::abs(line.rate);
-    const double nx = std::abs(line.normal.x), ny = std::abs(line.normal.y), owned = line.owner != kCut ? 1 : 0;
+    const double nx = std::abs(line.normal.x), ny = std::abs(line.normal.y);
+    // In the orthogonal axes l, m, n.
+    const Point s = stack_.shear;
+    const Vec3 normal{line.normal.x, line.normal.y, line.rate - dot(s, line.normal)};
+    const double owned = line.owner == kCut ? 0 : stack_.stretch ? stack_.area(normal) : 1;
     Row weight, x, y, up, size, blur;
     for (int k = 0; k < kRow; ++k) {
       const double px = from.x[k], py = from.y[k], qx = to.x[k], qy = to.y[k], t = t_[k];
@@ -136,14 +140,11 @@ class Bundle {
                           ny * std::max(std::abs(py), std::abs(qy)));
     }
     const double all = sum(weight), mx = sum(x), my = sum(y), mt = sum(up);
-    const Point s = stack_.shear;
-    // In the orthogonal axes l, m, n.
-    const Vec3 normal{line.normal.x, line.normal.y, line.rate - dot(s, line.normal)};
     const Vec3 place{mx + s.x * mt, my + s.y * mt, mt};
     sum_.correction += line.offset_tail * all - line.rate_tail * mt - line.normal_tail.x * mx - line.normal_tail.y * my;
     sum_.blur += sum(blur);
     sum_.pull[line.owner] += all * normal;
-    sum_.moment[line.owner] += cross(place, normal);
+    sum_.moment[line.owner] += stack_.moment(place, normal);
     sum_.across += mt * normal.z;
     sum_.terms += sum(size) * (rate + std::abs(s.x) * nx + std::abs(s.y) * ny);
     sum_.border += all * std::sqrt(norm2(normal));
@@ -214,7 +215,7 @@ class Bundle {
   void add_arc(const Points& p, const Points& q, int before, int after) {
     const Quadric& ball = stack_.quadric[stack_.ball];
     const double level = ball.level, stretch = 1 + dot(ball.shear, ball.shear), along = std::abs(2 * ball.along);
-    const double slack = std::abs(ball.slack);
+    const double slack = std::abs(ball.slack), of_ball = stack_.stretch ? 0 : ball.radius;
     const Row& radius = sides_.half[stack_.ball];
     // Nearly all of a circle lies between two lines that leave nearly all of the disc only where these are one, or turn
     // back; else next to nothing.
@@ -269,7 +270,7 @@ class Bundle {
       yy_[k] += w * my * my + 2 * f * my * y + a * y * y + b * x * x;
       xy_[k] += w * mx * my + f * (mx * y + my * x) + (a - b) * x * y;
       const double turned = counts_[k] * 2 * angle[k];
-      surface_[k] += 2 * angle[k] * ball.radius;
+      surface_[k] += 2 * angle[k] * of_ball;
       const double z = (t - level) * turned;
       strip[k] = turned;
       px[k] = counts_[k] * length[k] * x, py[k] = counts_[k] * length[k] * y;
@@ -277,7 +278,23 @@ class Bundle {
       blur[k] = 0.5 * turned * (stretch * t * t + along * std::abs(t) + slack + length[k] * length[k]);
     }
     sum_.blur += sum(blur);
-    add_zone(ball, {sum(px), sum(py), sum(up)}, sum(strip), sum(t_up), sum(size));
+    const double all = sum(strip), surface = stack_.stretch ? stretched_zone(ax, ay, angle) : all * ball.radius;
+    add_zone(ball, {sum(px), sum(py), sum(up)}, all, sum(t_up), sum(size), surface);
+  }
+
+  /// What arcs by those angles to either side of (x, y) have of an ellipsoid's surface.
+  double stretched_zone(const Row& x, const Row& y, const Row& angle) {
+    const Row& radius = sides_.half[stack_.ball];
+    double surface = 0;
+    for (int k = 0; k < kRow; ++k) {
+      if (counts_[k] == 0) continue;
+      const Vec3 level = (t_[k] - stack_.quadric[stack_.ball].level) * stack_.n;
+      const Vec3 across = radius[k] * (x[k] * stack_.l + y[k] * stack_.m),
+                 along = radius[k] * (x[k] * stack_.m - y[k] * stack_.l);
+      const double strip = stack_.stretch->arc(level, across, along, angle[k]);
+      surface_[k] += strip, surface += counts_[k] * strip;
+    }
+    return surface;
   }
 
   /// The polynomials of the first terms.
@@ -314,17 +331,23 @@ class Bundle {
       const double t = t_[k], turned = 2 * pi * counts_[k], z = turned * (t - ball.level);
       area_[k] = w, x_[k] = w * x, y_[k] = w * y;
       xx_[k] = w * (x * x + r2 / 4), yy_[k] = w * (y * y + r2 / 4), xy_[k] = w * x * y;
-      surface_[k] = 2 * pi * ball.radius;
+      surface_[k] = stack_.stretch ? 0 : 2 * pi * ball.radius;
       up += z, all += turned, t_up += t * z;
       size += std::abs(t) * (std::abs(t) + std::abs(ball.level)) * turned;
       sum_.blur += turned * r2;
     }
-    add_zone(ball, {0, 0, up}, all, t_up, size);
+    double surface = all * ball.radius;
+    if (stack_.stretch) {
+      Row one, none, whole;
+      one.fill(1), none.fill(0), whole.fill(pi);
+      surface = stretched_zone(one, none, whole);
+    }
+    add_zone(ball, {0, 0, up}, all, t_up, size, surface);
   }
 
   /// What the ball has of the surface. Its forces act along lines through its centre.
-  void add_zone(const Quadric& ball, Vec3 pull, double turned, double t_up, double size) {
-    sum_.area += turned * ball.radius;
+  void add_zone(const Quadric& ball, Vec3 pull, double turned, double t_up, double size, double surface) {
+    sum_.area += surface;
     sum_.border += turned * ball.radius;
     sum_.pull[ball.owner] += pull;
     sum_.moment[ball.owner] += cross(Vec3{ball.centre.x, ball.centre.y, ball.level}, pull);
@@ -431,7 +454,7 @@ void add_face(const Line& plane, const Stack& stack, const Outline& outline, dou
       (plane.offset_tail * area - plane.rate_tail * t * area - tilt.x * face.first.x - tilt.y * face.first.y) /
       std::abs(plane.rate);
   sum.blur += area * (std::abs(plane.offset) + std::abs(plane.rate * t)) / std::abs(plane.rate);
-  if (plane.owner != kCut) sum.area += area;
+  if (plane.owner != kCut) sum.area += stack.stretch ? stack.area({0, 0, area}) : area;
   const double side = plane.rate > 0 ? 1 : -1;
   if (stack.view && stack.view->sees(plane.owner)) {
     const View& view = *stack.view;
@@ -451,7 +474,7 @@ void add_face(const Line& plane, const Stack& stack, const Outline& outline, dou
   sum.across += t * side * area;
   sum.terms += std::abs(t) * area;
   sum.border += area;
-  sum.moment[plane.owner] += cross(
+  sum.moment[plane.owner] += stack.moment(
       Vec3{face.first.x + stack.shear.x * t * area, face.first.y + stack.shear.y * t * area, t * area}, {0, 0, side});
 }
 

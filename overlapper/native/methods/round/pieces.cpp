@@ -20,6 +20,7 @@ double reach(const Shape& shape) {
     double operator()(const Hull& h) const { return h.data->radius; }
     double operator()(const HalfSpace& h) const { return std::abs(h.plane.offset); }
     double operator()(const RoundedHull& h) const { return h.core.data->radius + h.radius; }
+    double operator()(const Ellipsoid& e) const { return max_component(e.half_axes); }
   };
   return std::visit(Visitor{}, shape);
 }
@@ -43,6 +44,12 @@ class Cutter {
   void operator()(const Sphere& s) {
     begin();
     ball({}, s.radius);
+    end();
+  }
+
+  void operator()(const Ellipsoid& e) {
+    begin();
+    ball({}, e.ball() ? e.half_axes.x : 1);
     end();
   }
 

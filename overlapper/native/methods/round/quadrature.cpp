@@ -67,6 +67,8 @@ constexpr double kHopeless = 30;
 constexpr int kMostHalvings = 48;
 /// Rules after which halving goes on for ever: where two surfaces touch along a line.
 constexpr int kMostRules = 600;
+/// Rules after which the area of a stretched ball, whose element may change as sharply as at an edge, has its error.
+constexpr int kMostRulesForStretch = 240;
 
 /// Coefficients in the middle and at the end of a Legendre series, from values at the nodes.
 struct Series {
@@ -160,8 +162,9 @@ class Integrating {
       if (strictness_ > 0) return strictness_ * end > limit_of_tail * whole ? 100.0 : 0.0;
       return series.halves_until(limit * whole);
     };
-    return std::max(of(part.volume, part.integrals.volume, volume_, kVolumeError, kVolumeTail),
-                    of(part.area, part.integrals.area, area_, kAreaError, kAreaTail));
+    const double volume = of(part.volume, part.integrals.volume, volume_, kVolumeError, kVolumeTail);
+    if (stack_.stretch && sum_.rules > kMostRulesForStretch) return volume;
+    return std::max(volume, of(part.area, part.integrals.area, area_, kAreaError, kAreaTail));
   }
 
   bool add(const Part& part, int halvings) {
@@ -184,6 +187,9 @@ class Integrating {
     }
     sum_.integrals.add(1, part.integrals);
     sum_.samples.insert(sum_.samples.end(), part.samples.begin(), part.samples.begin() + 2 * part.rule.size());
+    // Terms of a stretched area may go on more slowly than they have begun.
+    const bool ended = stack_.stretch && sum_.rules > kMostRulesForStretch;
+    sum_.area_error += 10 * (ended ? 30 * part.area.tail() : part.area.error());
     const double ratio = volume_ > 0 ? part.volume.tail() / volume_ : 0;
     sum_.error += strictness_ > 0 ? volume_ * std::min(ratio, 30 * ratio * std::sqrt(ratio)) : part.volume.error();
     return true;

@@ -16,6 +16,7 @@ struct Sum {
   Integrals integrals;
   double about = 0;             ///< m³: the volume by the first rules
   double error = 0;             ///< of the volume, beside rounding
+  double area_error = 0;        ///< likewise of the area
   int rules = 0;                ///< how many were applied
   std::vector<Sample> samples;  ///< in the order of t
 };

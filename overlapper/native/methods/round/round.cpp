@@ -28,7 +28,7 @@ constexpr double kSummation = 16 * DBL_EPSILON;
 
 /// Integrals in the axes of the world, about the point inside.
 struct Totals {
-  double volume = 0, error = 0, area = 0;
+  double volume = 0, error = 0, area = 0, area_error = 0;
   double border = 0;  ///< m²: the area of all that area vectors are the sums of
   double open = 0;    ///< m³: what may be missing of pieces whose area vectors do not sum to zero
   Vec3 first, pull, moment;
@@ -89,6 +89,7 @@ class Measuring {
   }
 
   Totals totals;
+  const slicing::Stretch* stretch = nullptr;   ///< of an ellipsoid: from the ball and the planes that are added
   double extent = 0;                           ///< m: no point of the common set is farther from the one inside
   const slicing::Enclosure* common = nullptr;  ///< what lies outside of that belongs to no piece
   Bounds box;                                  ///< around what is added, if the common set is enclosed
@@ -196,7 +197,12 @@ class Measuring {
     const double disc = wall ? pi * height * (2 * r - height) : 0;
     totals.volume += volume;
     totals.error += 32 * DBL_EPSILON * volume;
-    totals.area += 2 * pi * r * height + (wall && wall->owner != slicing::kCut ? disc : 0);
+    if (stretch) {
+      const slicing::Stretch::Cap cap = stretch->cap(n, height);
+      totals.area += cap.area + (wall ? stretch->area(disc * n) : 0), totals.area_error += cap.error;
+    } else {
+      totals.area += 2 * pi * r * height + (wall && wall->owner != slicing::kCut ? disc : 0);
+    }
     totals.border += 2 * pi * r * height + disc;
     totals.first += volume * tip + first * n;
     const auto second = [&](double p, double q, double u, double v) {
@@ -206,7 +212,7 @@ class Measuring {
                        second(tip.z, tip.z, n.z, n.z) + across};
     totals.products += {second(tip.y, tip.z, n.y, n.z), second(tip.z, tip.x, n.z, n.x), second(tip.x, tip.y, n.x, n.y)};
     // The force on the ball acts along a line through its centre and the tip.
-    const Vec3 force = disc * n, moment = cross(tip, force);
+    const Vec3 force = disc * n, moment = stretch ? stretch->moment(tip + height * n, force) : cross(tip, force);
     const auto act = [&](int body, double side) {
       if (body == 0) totals.pull += side * force, totals.moment += side * moment;
       if (body != slicing::kCut) totals.unbalanced += side * force;
@@ -317,6 +323,7 @@ class Measuring {
 
   bool add_stack() {
     std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent);
+    if (stack) stack->stretch = stretch;
     if (!stack || !slicing::find_intervals(*stack, closely, intervals_)) return false;
     if (intervals_.empty()) return true;
     slicing::View view;
@@ -331,9 +338,10 @@ class Measuring {
       if (less < open) open = less, std::swap(best_, sum_);
       return ratio;
     };
-    better(true, 0);
+    // Of few nodes, the terms of a stretched area tell too little.
+    better(!stretch, 0);
     if (!closed(0.1) && move_near(*stack)) return true;
-    if (!closed()) better(false, 0);
+    if (!closed() && !stretch) better(false, 0);
     // The rules end where the volume is exact. Where areas are not yet, the surface does not close.
     if (!closed() && !slicing::find_intervals(*stack, true, intervals_)) return false;
     for (double strictness = 1; strictness < 1e9 && !closed(); strictness *= 1e3)
@@ -367,7 +375,7 @@ class Measuring {
   /// Fills sum_ and returns how much may be missing.
   double integrate(const slicing::Stack& stack, bool few, double strictness) {
     slicing::Sum& sum = sum_;
-    sum.integrals = {}, sum.about = sum.error = 0, sum.rules = 0, sum.samples.clear();
+    sum.integrals = {}, sum.about = sum.error = sum.area_error = 0, sum.rules = 0, sum.samples.clear();
     const bool sound = slicing::integrate(stack, intervals_, totals.volume, totals.area, few, strictness, sum);
     const slicing::Interval &lowest = intervals_.front(), &highest = intervals_.back();
     if (stack.low_plane && lowest.low == stack.low)
@@ -397,12 +405,12 @@ class Measuring {
     const auto turned = [&](Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.n; };
     totals.volume += s.volume + s.correction;
     totals.error += sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
-    totals.area += s.area;
+    totals.area += s.area, totals.area_error += sum.area_error;
     totals.border += s.border;
     const Vec3 first = in_world(stack, s.first), pull = turned(s.pull[0]);
     totals.first += first + s.volume * offset_;
     totals.pull += pull;
-    totals.moment += turned(s.moment[0]) + cross(offset_, pull);
+    totals.moment += turned(s.moment[0]) + (stretch ? stretch->moment(offset_, pull) : cross(offset_, pull));
     totals.unbalanced += turned(s.pull[0] + s.pull[1]);
     if (patch) patch->add(s.seen[0], s.seen[1], s.seen[2], s.seen[3], s.seen[4], s.seen[5]);
     add_second(stack, s, first, offset_, totals);
@@ -450,6 +458,90 @@ struct Workspace {
   std::vector<Round> rounds;
   std::vector<Wall> walls;
 };
+
+/// The fraction of a volume beyond which slices are not what was hoped for.
+constexpr double kTwice = 1e-11;
+
+/// Makes a ball of radius 1 of the ellipsoid that a body is, and of all else what that makes of it, turned to the axes
+/// of the ellipsoid.
+void into_ball(const Placed& body, slicing::Pieces& pieces) {
+  const WideMatrix rotation = wide_rotation(body.orientation);
+  const Vec3 h = std::get<Ellipsoid>(body.shape).half_axes;
+  for (Round& r : pieces.rounds) {
+    const WideVector centre = apply_transposed(rotation, r.centre);
+    r.centre = {centre.x / DoubleDouble{h.x}, centre.y / DoubleDouble{h.y}, centre.z / DoubleDouble{h.z}};
+  }
+  for (Wall& wall : pieces.walls) {
+    const WideVector own = apply_transposed(rotation, wall.normal);
+    const WideVector normal{DoubleDouble{h.x} * own.x, DoubleDouble{h.y} * own.y, DoubleDouble{h.z} * own.z};
+    const DoubleDouble length = norm(normal);
+    wall.normal = normal / length, wall.slack = wall.slack / length;
+  }
+}
+
+struct StretchedWorkspace {
+  slicing::Pieces of_flat, of_ellipsoid;
+  Measuring measuring;
+};
+
+/// Of an ellipsoid and a body that planes bound: the ball that into_ball() makes is measured, and what is found is
+/// stretched. Volumes grow by the determinant, area vectors are images by the matrix of cofactors.
+std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b, Vec3 reference,
+                                               const WideVector& inside) {
+  const bool swapped = stretched(b.shape) == nullptr;
+  const Placed &flat = swapped ? b : a, &ellipsoid = swapped ? a : b;
+  if (smooth(flat.shape)) return std::nullopt;
+  const Scratch<StretchedWorkspace> scratch;
+  auto& [of_flat, of_ellipsoid, measuring] = *scratch;
+  of_flat.clear(), of_ellipsoid.clear();
+  slicing::cut(flat, ellipsoid, nullptr, 0, reference, inside, of_flat);
+  slicing::cut(ellipsoid, flat, nullptr, 1, reference, inside, of_ellipsoid);
+  into_ball(ellipsoid, of_flat);
+  into_ball(ellipsoid, of_ellipsoid);
+  const Vec3 h = stretched(ellipsoid.shape)->half_axes;
+  const slicing::Stretch stretch(h);
+  measuring.stretch = &stretch;
+  std::span<Round> rounds = of_ellipsoid.rounds;
+  Vec3 moved;  // in the ball
+  Totals totals;
+  double error = std::numeric_limits<double>::infinity();
+  // About the centroid, other slices are taken, which may do where the first do not.
+  for (int attempt = 0; attempt < 2 && !(error <= kTwice * totals.volume); ++attempt) {
+    const Vec3 step = attempt > 0 ? totals.first / totals.volume : Vec3{};
+    if (!(norm(step) <= 2)) break;
+    for (Round& r : rounds) r.centre = r.centre - wide(step);
+    for (Wall& wall : of_flat.walls) wall.slack = wall.slack - dot(wall.normal, wide(step));
+    measuring.totals = {};
+    measuring.extent = norm(rounded(rounds[0].centre)) + 1;
+    if (!measuring.add(rounds, of_flat.walls)) break;
+    const Totals& found = measuring.totals;
+    const double off = found.error + 2 * std::max(found.open, missing(found));
+    if (found.volume > 0 && off < error) totals = found, error = off, moved = step;
+    else break;
+  }
+  const double volume = totals.volume;
+  if (!(volume > 0 && error <= kMostError * volume)) return std::nullopt;
+  const Mat3& turn = ellipsoid.pose.rotation;
+  RoundMeasures result;
+  result.volume = stretch.volume * volume;
+  result.area = totals.area;
+  result.area_error = totals.area_error + stretch.open() * totals.area;
+  result.volume_error = stretch.volume * (error + 4 * DBL_EPSILON * volume) + of_flat.flatness * totals.area;
+  const Vec3 c = totals.first / volume, s = totals.squares - volume * scaled(c, c);
+  const Vec3 p = totals.products - volume * Vec3{c.y * c.z, c.z * c.x, c.x * c.y};
+  const Vec3 about_which = rounded(inside) + turn * scaled(h, moved);
+  result.centroid = about_which + turn * scaled(h, c);
+  Totals central;
+  central.volume = result.volume;
+  central.squares = stretch.volume * scaled(scaled(h, h), s);
+  central.products = stretch.volume * scaled(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, p);
+  result.inertia = turn * inertia_about({}, central) * transposed(turn);
+  const double side = swapped ? -1 : 1;
+  const Pull pull{side * (turn * stretch.normal(totals.pull)), side * (turn * totals.moment)};
+  result.pull = about(pull, about_which, {});
+  result.facets_touched = static_cast<int>(of_flat.walls.size());
+  return result;
+}
 
 std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside,
                                       int owner, PatchSums* patch) {
@@ -522,11 +614,13 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
 }  // namespace
 
 std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside) {
+  if (stretched(a.shape) || stretched(b.shape)) return measure_stretched(a, b, reference, inside);
   return measured(a, b, reference, inside, 0, nullptr);
 }
 
 bool measure_round_patch(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside, int owner,
                          PatchSums& patch) {
+  if (stretched(a.shape) || stretched(b.shape)) return false;
   return measured(a, b, reference, inside, owner, &patch).has_value();
 }
 

@@ -13,6 +13,7 @@ namespace overlapper {
 /// The measures of the common set of two bodies of which at least one is round, of the round shapes themselves.
 struct RoundMeasures {
   double volume = 0, volume_error = 0, area = 0;
+  double area_error = 0;   ///< where it is more than what the volume's error makes of the area
   Vec3 centroid;           ///< about the reference
   Mat3 inertia;            ///< about the centroid, unit density
   Pull pull;               ///< on the first body, about the reference; that on the second is the opposite
@@ -20,9 +21,9 @@ struct RoundMeasures {
 };
 
 /// Measures a pair that overlaps: pairs of spheres, capsules, cylinders and rounded hulls with each other and with
-/// boxes, hulls and half-spaces. `inside` is a point of the common set, as deep inside as can be told; bodies and it
-/// are about the reference. Nothing if the error would be larger than 1e-8 of the volume, not counting by how much
-/// facets are not flat, or if the pair is none of these.
+/// boxes, hulls and half-spaces, and of ellipsoids with the last three. `inside` is a point of the common set, as deep
+/// inside as can be told; bodies and it are about the reference. Nothing if the error would be larger than 1e-8 of the
+/// volume, not counting by how much facets are not flat, or if the pair is none of these.
 ///
 /// Every body is cut into pieces that planes leave of a ball or a cylinder, or of nothing round. Slices orthogonal to
 /// the axes of cylinders are convex polygons cut by one disc at most, and what they hold is integrated between the

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "geometry/vec.h"
+#include "methods/round/stretch.h"
 
 namespace overlapper::slicing {
 
@@ -88,6 +89,17 @@ struct Stack {
   Vec3 l, m, n, t;                            ///< the axes, in the world
   Point shear;                                ///< what t has along l and m
   const View* view = nullptr;                 ///< if anything is looked at
+  const Stretch* stretch = nullptr;           ///< of an ellipsoid: what makes the ball and all else out of the world
+
+  /// Of a part of a plane whose normal times its area that is, along l, m and n.
+  double area(Vec3 normal) const { return stretch->area(normal.x * l + normal.y * m + normal.z * n); }
+  /// place × normal, all along l, m and n; in the world, if that is stretched.
+  Vec3 moment(Vec3 place, Vec3 normal) const {
+    if (!stretch) return cross(place, normal);
+    const auto in_world = [&](Vec3 v) { return v.x * l + v.y * m + v.z * n; };
+    const Vec3 found = stretch->moment(in_world(place), in_world(normal));
+    return {dot(l, found), dot(m, found), dot(n, found)};
+  }
 };
 
 /// The lines and the disc of one slice.

@@ -1,0 +1,139 @@
+#include <algorithm>
+#include <array>
+
+#include "shapes/shape.h"
+
+namespace overlapper {
+namespace {
+
+int shortest_axis(Vec3 h) { return h.x <= h.y && h.x <= h.z ? 0 : h.y <= h.z ? 1 : 2; }
+
+Vec3 divided(Vec3 v, Vec3 h) { return {v.x / h.x, v.y / h.y, v.z / h.z}; }
+
+/// A point of an ellipsoid's space in units of its shortest half axis, with the shortest axis last.
+///
+/// The surface is nearest where n ∝ p / (τ + s), for s = g² − 1 of the half axes g: then u = g p / (τ + s), the point
+/// of the unit ball that the surface's point is an image of, has length one. For the nearest point of all, τ is not
+/// negative, and for one across the shortest axis it is (Eberly 2013, for the former).
+struct Seen {
+  std::array<int, 3> axis;
+  std::array<double, 3> g, s, p;
+
+  Seen(Vec3 half_axes, Vec3 point) {
+    const int last = shortest_axis(half_axes);
+    axis = {(last + 1) % 3, (last + 2) % 3, last};
+    const double shortest = half_axes[last];
+    for (int i = 0; i < 3; ++i) {
+      const double h = half_axes[axis[i]];
+      g[i] = h / shortest;
+      s[i] = (h - shortest) / shortest * (g[i] + 1);
+      p[i] = point[axis[i]] / shortest;
+    }
+  }
+
+  /// Of the point of the unit ball; of 0 / 0, at the centre of an axis, 0.
+  double u(int i, double tau) const { return p[i] != 0 ? g[i] * p[i] / (tau + s[i]) : 0; }
+
+  Vec3 normal(double tau, double last) const {
+    std::array<double, 3> n;
+    for (int i = 0; i < 2; ++i) n[axis[i]] = u(i, tau) / g[i];
+    n[axis[2]] = last;
+    return unit({n[0], n[1], n[2]});
+  }
+
+  /// What is left of a unit for the last component where the point lies in the plane across the shortest axis, and τ is
+  /// zero; negative if the nearest point lies in that plane, too.
+  double left() const {
+    const double x = u(0, 0), y = u(1, 0);
+    return 1 - x * x - y * y;
+  }
+
+  /// The greatest τ, at which |u| = 1, by Newton's method for 1 / |u|: from where one component alone is as long as
+  /// that, it comes no farther.
+  double nearest() const {
+    double tau = 0;
+    for (int i = 0; i < 3; ++i) tau = std::max(tau, g[i] * std::abs(p[i]) - s[i]);
+    constexpr int kMostSteps = 100;
+    for (int step = 0; step < kMostSteps; ++step) {
+      double square = 0, slope = 0;
+      for (int i = 0; i < 3; ++i) {
+        const double part = u(i, tau);
+        square += part * part;
+        if (part != 0) slope += part * part / (tau + s[i]);
+      }
+      const double next = tau + (std::sqrt(square) - 1) * square / slope;
+      if (!(next > tau)) break;
+      tau = next;
+    }
+    return tau;
+  }
+
+  /// The least negative τ, if there is one above the poles of the other axes: |u|² is convex between.
+  std::optional<double> across() const {
+    double tau = -std::abs(p[2]);
+    constexpr int kMostSteps = 100;
+    for (int step = 0; step < kMostSteps; ++step) {
+      if (!(tau + std::min(s[0], s[1]) > 0)) return std::nullopt;
+      double square = 0, slope = 0;
+      for (int i = 0; i < 3; ++i) {
+        const double part = u(i, tau);
+        square += part * part;
+        if (part != 0) slope -= 2 * part * part / (tau + s[i]);
+      }
+      if (!(square > 1)) return tau;
+      if (!(slope > 0)) return std::nullopt;
+      const double next = tau - (square - 1) / slope;
+      if (!(next < tau)) return tau;
+      tau = next;
+    }
+    return tau;
+  }
+};
+
+}  // namespace
+
+Vec3 Ellipsoid::support(Vec3 direction) const {
+  const Vec3 on_ball = unit(scaled(half_axes, unit(direction)));
+  return scaled(half_axes, on_ball);
+}
+
+Mat3 Ellipsoid::slope(Vec3 direction) const {
+  // With M the squares of the half axes and p = M d / √(d · M d) the point, (M − p pᵀ) / √(d · M d).
+  const Vec3 h = half_axes, square = scaled(h, h);
+  const double reach = norm(scaled(h, direction));
+  const Vec3 p = scaled(square, direction) / reach;
+  const Vec3 row0 = Vec3{square.x, 0, 0} - p.x * p, row1 = Vec3{0, square.y, 0} - p.y * p,
+             row2 = Vec3{0, 0, square.z} - p.z * p;
+  return {row0 / reach, row1 / reach, row2 / reach};
+}
+
+Plane Ellipsoid::supporting(Vec3 outward) const {
+  const Vec3 normal = unit(outward);
+  return {normal, norm(scaled(half_axes, normal))};
+}
+
+Plane Ellipsoid::ray_exit(Vec3 origin, Vec3 direction) const {
+  const Vec3 q = divided(origin, half_axes), d = unit(divided(direction, half_axes));
+  const double along = dot(q, d), inside = std::max(0.0, 1 - norm2(q));
+  const double root = std::sqrt(along * along + inside);
+  const double t = along > 0 ? inside / (along + root) : root - along;
+  return supporting(divided(q + t * d, half_axes));
+}
+
+std::vector<Vec3> Ellipsoid::ways_out(Vec3 point) const {
+  const Seen seen(half_axes, point);
+  if (seen.p[2] == 0 && seen.left() > 0) {
+    const double last = std::sqrt(seen.left());
+    return {seen.normal(0, last), seen.normal(0, -last)};
+  }
+  const double tau = seen.nearest();
+  const auto normal = [&](double at) { return seen.normal(at, seen.u(2, at)); };
+  if (seen.p[2] == 0) return {normal(tau)};
+  const std::optional<double> other = seen.across();
+  if (!other) return {normal(tau)};
+  return {normal(tau), normal(*other)};
+}
+
+Plane Ellipsoid::tightest(Vec3 point) const { return supporting(ways_out(point)[0]); }
+
+}  // namespace overlapper
