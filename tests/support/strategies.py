@@ -165,7 +165,8 @@ def lattice_points(draw, reach=3):
 
 
 polyhedra = st.one_of(boxes, hulls())
-solids = st.one_of(boxes, spheres, capsules, cylinders, ellipsoids, hulls())
+provable = st.one_of(boxes, spheres, capsules, cylinders, hulls())  # ellipsoids have no certificate
+solids = st.one_of(provable, ellipsoids)
 
 
 def placed(shapes, spread=1.0):
