@@ -316,8 +316,8 @@ the bodies overlap, and of a body inside the other.)");
       cls, "patch_moments", [](const Overlap&) { return true; }, [](const Patch& p) { return to_numpy(p.moments); },
       nb::sig("def patch_moments(self) -> numpy.typing.NDArray[numpy.float64] | None"),
       R"((3, 3) m⁴, ∫ x xᵀ dA of that area about its centre, world axes; nothing along the area vector. Its eigenvectors and the
-roots of its eigenvalues over the area are the axes of the patch and its radii of gyration. Of round bodies it is that of
-the round patch, not of polygons.)");
+roots of its eigenvalues over the area are the axes of the patch and its radii of gyration. Where formulas or slices
+measure round bodies it is that of the round patch, not of polygons.)");
   cls.def_prop_ro(
       "bounds",
       [](const Overlap& o) -> nb::object {

@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from strategies import directions, overlapping_points, quaternion
 
-from overlapper import Batch, Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
+from overlapper import Batch, Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
 FLOOR = HalfSpace([0, 0, 1], 0)
 CUBE = Box([0.5, 0.5, 0.5])
@@ -16,9 +16,17 @@ SHAPES = {
     "capsule": Capsule(0.3, 0.8),
     "cylinder": Cylinder(0.4, 0.9),
     "box": CUBE,
+    "ellipsoid": Ellipsoid([0.3, 0.45, 0.6]),
     "hull": Hull(TETRA * 0.6),
     "rounded hull": RoundedHull(TETRA * 0.3, 0.2),
 }
+# An ellipsoid and another round body are enclosed by a polytope, whose patch is another.
+PAIRS = [
+    (first, second)
+    for first in SHAPES
+    for second in SHAPES
+    if "ellipsoid" not in (first, second) or {"box", "hull"} & {first, second}
+]
 STEP = 1e-4
 TO_X = (0, np.sqrt(0.5), 0, np.sqrt(0.5))
 
@@ -101,8 +109,7 @@ def pushed(shape, position, turned, other):
     return answer, *(overlap(Placed(shape, position + by, turned), other) for by in (-step, step))
 
 
-@pytest.mark.parametrize("first", SHAPES)
-@pytest.mark.parametrize("second", SHAPES)
+@pytest.mark.parametrize(("first", "second"), PAIRS)
 def test_moments_of_the_patch_are_slopes_of_those_of_the_volume(first, second):
     """As a moves against the normal by a length, its surface inside b sweeps the patch, seen along the normal."""
     rng = np.random.default_rng([ord(first[-1]), ord(second[-1]), len(first), len(second)])
@@ -122,8 +129,7 @@ def test_moments_of_the_patch_are_slopes_of_those_of_the_volume(first, second):
         assert_array_equal(answer.patch_area, answer.gradient[1, :3])
 
 
-@pytest.mark.parametrize("first", SHAPES)
-@pytest.mark.parametrize("second", SHAPES)
+@pytest.mark.parametrize(("first", "second"), PAIRS)
 def test_the_patch_turns_with_the_bodies_and_knows_no_order(first, second):
     rng = np.random.default_rng(len(first) + len(second))
     a, b = Placed(SHAPES[first], (0.4, 0.3, 0.2), quaternion(rng)), Placed(SHAPES[second], (0, 0, 0), quaternion(rng))

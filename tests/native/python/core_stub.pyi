@@ -613,8 +613,8 @@ class Overlap:
     def patch_moments(self) -> numpy.typing.NDArray[numpy.float64] | None:
         """
         (3, 3) m⁴, ∫ x xᵀ dA of that area about its centre, world axes; nothing along the area vector. Its eigenvectors and the
-        roots of its eigenvalues over the area are the axes of the patch and its radii of gyration. Of round bodies it is that of
-        the round patch, not of polygons.
+        roots of its eigenvalues over the area are the axes of the patch and its radii of gyration. Where formulas or slices
+        measure round bodies it is that of the round patch, not of polygons.
         """
 
     @property

@@ -66,6 +66,20 @@ void add_second(const slicing::Stack& stack, const slicing::Integrals& sum, Vec3
   totals.products += products;
 }
 
+/// What a patch is seen in, in the coordinates that are measured in: u and v there, and what an area vector adds.
+struct Seen {
+  double u0 = 0, v0 = 0;
+  Vec3 u, v, normal;
+
+  Seen() = default;
+  explicit Seen(const PatchSums& patch)
+      : u0(-dot(patch.origin(), patch.u())),
+        v0(-dot(patch.origin(), patch.v())),
+        u(patch.u()),
+        v(patch.v()),
+        normal(patch.normal()) {}
+};
+
 class Measuring {
  public:
   /// False if it gives up.
@@ -95,6 +109,7 @@ class Measuring {
   Bounds box;                                  ///< around what is added, if the common set is enclosed
   bool closely = false;                        ///< looks at all of every interval
   PatchSums* patch = nullptr;                  ///< if wanted, of what belongs to `owner`
+  Seen seen;                                   ///< of that
   int owner = 0;
 
  private:
@@ -225,24 +240,23 @@ class Measuring {
 
   /// A disc of that area, negative where it is seen from behind, and of a radius of which that is the square.
   void add_disc_to_patch(Vec3 centre, Vec3 normal, double area, double square) {
-    const double w = area * dot(normal, patch->normal()), quarter = square / 4;
-    const double u = dot(centre - patch->origin(), patch->u()), v = dot(centre - patch->origin(), patch->v());
-    const double across_u = dot(normal, patch->u()), across_v = dot(normal, patch->v());
-    patch->add(w, w * u, w * v, w * (u * u + quarter * (1 - across_u * across_u)),
-               w * (u * v - quarter * across_u * across_v), w * (v * v + quarter * (1 - across_v * across_v)));
+    const double w = area * dot(normal, seen.normal), quarter = square / 4;
+    const double u = seen.u0 + dot(centre, seen.u), v = seen.v0 + dot(centre, seen.v);
+    const auto second = [&](Vec3 p, Vec3 q) { return quarter * (dot(p, q) - dot(p, normal) * dot(q, normal)); };
+    patch->add(w, w * u, w * v, w * (u * u + second(seen.u, seen.u)), w * (u * v + second(seen.u, seen.v)),
+               w * (v * v + second(seen.v, seen.v)));
   }
 
   /// What the patch is seen in, in coordinates of the stack.
   slicing::View view_of(const slicing::Stack& stack) const {
-    const Vec3 u = patch->u(), v = patch->v(), normal = patch->normal(), from = offset_ - patch->origin();
     slicing::View view;
     view.owner = owner;
     view.rest = stack.ball >= 0 && stack.quadric[stack.ball].owner == owner;
-    view.u0 = dot(from, u), view.v0 = dot(from, v);
-    view.u = {dot(stack.l, u), dot(stack.m, u), dot(stack.t, u)};
-    view.v = {dot(stack.l, v), dot(stack.m, v), dot(stack.t, v)};
+    view.u0 = seen.u0 + dot(offset_, seen.u), view.v0 = seen.v0 + dot(offset_, seen.v);
+    view.u = {dot(stack.l, seen.u), dot(stack.m, seen.u), dot(stack.t, seen.u)};
+    view.v = {dot(stack.l, seen.v), dot(stack.m, seen.v), dot(stack.t, seen.v)};
     const double side = view.rest ? -1 : 1;
-    view.normal = side * Vec3{dot(stack.l, normal), dot(stack.m, normal), dot(stack.n, normal)};
+    view.normal = side * Vec3{dot(stack.l, seen.normal), dot(stack.m, seen.normal), dot(stack.n, seen.normal)};
     return view;
   }
 
@@ -256,8 +270,8 @@ class Measuring {
       if (!polytope_.cut({rounded(walls_[i].normal), walls_[i].slack.head, static_cast<int>(i)})) return false;
     }
     Totals piece;
-    std::optional<PatchSums> seen;
-    if (patch) seen = *patch;
+    std::optional<PatchSums> with_piece;
+    if (patch) with_piece = *patch;
     const Vec3 apex = polytope_.corners[0].at;
     bool closed = true;
     polytope_.for_faces([&](int wall, std::span<const Vec3> ring) {
@@ -269,7 +283,7 @@ class Measuring {
       for (size_t i = 2; i < ring.size(); ++i) {
         const Vec3 a = ring[0], b = ring[i - 1], c = ring[i], triangle = 0.5 * cross(b - a, c - a);
         force += triangle, moment += cross((a + b + c) / 3, triangle);
-        if (seen && walls_[wall].owner == owner) seen->add_triangle(a, b, c, triangle);
+        if (with_piece && walls_[wall].owner == owner) with_piece->add_triangle(a, b, c, triangle);
         const double tetrahedron = dot(a - apex, triangle) / 3;
         const Vec3 sum = apex + a + b + c;
         piece.volume += tetrahedron;
@@ -290,7 +304,7 @@ class Measuring {
     if (!closed || !(piece.error <= kSure * (totals.volume + piece.volume))) return false;
     if (outside(piece.first / piece.volume)) return true;
     totals.add(piece);
-    if (patch) *patch = *seen;
+    if (patch) *patch = *with_piece;
     return true;
   }
 
@@ -479,6 +493,16 @@ void into_ball(const Placed& body, slicing::Pieces& pieces) {
   }
 }
 
+/// The same in a ball that is turned and stretched to the ellipsoid, and whose coordinates count from `origin` there.
+Seen stretched(const Seen& seen, const Mat3& turn, const slicing::Stretch& stretch, Vec3 origin) {
+  Seen result;
+  result.u = scaled(stretch.half_axes, apply_transposed(turn, seen.u));
+  result.v = scaled(stretch.half_axes, apply_transposed(turn, seen.v));
+  result.normal = stretch.normal(apply_transposed(turn, seen.normal));
+  result.u0 = seen.u0 + dot(origin, result.u), result.v0 = seen.v0 + dot(origin, result.v);
+  return result;
+}
+
 struct StretchedWorkspace {
   slicing::Pieces of_flat, of_ellipsoid;
   Measuring measuring;
@@ -487,7 +511,7 @@ struct StretchedWorkspace {
 /// Of an ellipsoid and a body that planes bound: the ball that into_ball() makes is measured, and what is found is
 /// stretched. Volumes grow by the determinant, area vectors are images by the matrix of cofactors.
 std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b, Vec3 reference,
-                                               const WideVector& inside) {
+                                               const WideVector& inside, int owner, PatchSums* patch) {
   const bool swapped = stretched(b.shape) == nullptr;
   const Placed &flat = swapped ? b : a, &ellipsoid = swapped ? a : b;
   if (smooth(flat.shape)) return std::nullopt;
@@ -499,12 +523,15 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
   into_ball(ellipsoid, of_flat);
   into_ball(ellipsoid, of_ellipsoid);
   const Vec3 h = stretched(ellipsoid.shape)->half_axes;
+  const Mat3& turn = ellipsoid.pose.rotation;
   const slicing::Stretch stretch(h);
   measuring.stretch = &stretch;
+  measuring.owner = swapped ? 1 - owner : owner, measuring.patch = nullptr;
   std::span<Round> rounds = of_ellipsoid.rounds;
   Vec3 moved;  // in the ball
   Totals totals;
   double error = std::numeric_limits<double>::infinity();
+  const std::optional<PatchSums> patch_before = patch ? std::optional(*patch) : std::nullopt;
   // About the centroid, other slices are taken, which may do where the first do not.
   for (int attempt = 0; attempt < 2 && !(error <= kTwice * totals.volume); ++attempt) {
     const Vec3 step = attempt > 0 ? totals.first / totals.volume : Vec3{};
@@ -513,15 +540,21 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
     for (Wall& wall : of_flat.walls) wall.slack = wall.slack - dot(wall.normal, wide(step));
     measuring.totals = {};
     measuring.extent = norm(rounded(rounds[0].centre)) + 1;
+    std::optional<PatchSums> of_attempt;
+    if (patch) {
+      of_attempt = *patch_before;
+      measuring.patch = &*of_attempt;
+      measuring.seen = stretched(Seen(*patch), turn, stretch, step);
+    }
     if (!measuring.add(rounds, of_flat.walls)) break;
     const Totals& found = measuring.totals;
     const double off = found.error + 2 * std::max(found.open, missing(found));
-    if (found.volume > 0 && off < error) totals = found, error = off, moved = step;
-    else break;
+    if (!(found.volume > 0 && off < error)) break;
+    totals = found, error = off, moved = step;
+    if (patch) *patch = *of_attempt;
   }
   const double volume = totals.volume;
   if (!(volume > 0 && error <= kMostError * volume)) return std::nullopt;
-  const Mat3& turn = ellipsoid.pose.rotation;
   RoundMeasures result;
   result.volume = stretch.volume * volume;
   result.area = totals.area;
@@ -554,6 +587,7 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   std::vector<Wall>& walls = scratch->walls;
   of_a.clear(), of_b.clear();
   measuring.owner = owner, measuring.patch = patch;
+  if (patch) measuring.seen = Seen(*patch);
   measuring.extent = std::min(slicing::extent(a, rounded(inside)), slicing::extent(b, rounded(inside)));
   // Of many pieces, few lie near the common set.
   const bool many = std::holds_alternative<RoundedHull>(a.shape) || std::holds_alternative<RoundedHull>(b.shape);
@@ -614,13 +648,14 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
 }  // namespace
 
 std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside) {
-  if (stretched(a.shape) || stretched(b.shape)) return measure_stretched(a, b, reference, inside);
+  if (stretched(a.shape) || stretched(b.shape)) return measure_stretched(a, b, reference, inside, 0, nullptr);
   return measured(a, b, reference, inside, 0, nullptr);
 }
 
 bool measure_round_patch(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside, int owner,
                          PatchSums& patch) {
-  if (stretched(a.shape) || stretched(b.shape)) return false;
+  if (stretched(a.shape) || stretched(b.shape))
+    return measure_stretched(a, b, reference, inside, owner, &patch).has_value();
   return measured(a, b, reference, inside, owner, &patch).has_value();
 }
 
