@@ -10,7 +10,8 @@ namespace overlapper {
 /// The measures of an overlapping pair where a formula gives them, right to rounding, whatever the tolerance:
 ///
 /// - the lens of two balls, of a ball and the end of a capsule, or of two ends of capsules;
-/// - a ball, a capsule, a cylinder or an ellipsoid cut by one plane: that of a half-space, or the only one of a box's or
+/// - a ball, a capsule, a cylinder or an ellipsoid cut by one plane: that of a half-space, or the only one of a box's
+/// or
 ///   a hull's that cuts off anything which the others leave;
 /// - a ball, a capsule or a cylinder of which several planes of a box or a hull cut off something;
 /// - a ball, a capsule, a cylinder or an ellipsoid that lies inside a half-space, a box or a hull, and all but the last

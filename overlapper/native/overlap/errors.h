@@ -60,12 +60,12 @@ Errors errors_of_formula(const Measures& stated, const Region& drawn, std::span<
 
 /// m⁵, of each entry.
 ///
-/// Formulas and slices that are off by rounding, and rules that end, are those of a set that differs from the common set by no more
-/// than the volume may be off, or by four times that, as the inertia is of a degree so much higher. Of that, no part is
-/// farther from the centroid than the farthest point of the common set, at R. A convex set is at least 4 R / 3 wide
-/// along the line there, as the centroid of a solid is at least a quarter of the width from either side; and ∫ x² dV
-/// along a line is least, for a width w, of a double cone: w² / 40 of the volume. So V R² is no more than 45 / 2 of
-/// ∫ |x|² dV, which is half of the trace.
+/// Formulas and slices that are off by rounding, and rules that end, are those of a set that differs from the common
+/// set by no more than the volume may be off, or by four times that, as the inertia is of a degree so much higher. Of
+/// that, no part is farther from the centroid than the farthest point of the common set, at R. A convex set is at least
+/// 4 R / 3 wide along the line there, as the centroid of a solid is at least a quarter of the width from either side;
+/// and ∫ x² dV along a line is least, for a width w, of a double cone: w² / 40 of the volume. So V R² is no more than
+/// 45 / 2 of ∫ |x|² dV, which is half of the trace.
 double error_of_integrated_inertia(const MeasuresAndInertia& values);
 
 /// m: how far any of the points of one cloud is from the nearest of the other; infinite where they are too many to be
