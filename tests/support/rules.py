@@ -324,14 +324,16 @@ def volume_off(case: Case, found: Overlap) -> Fraction:
 
 
 def the_certificate_is_proved(case: Case, found: Overlap) -> str:
-    """Within what is stated; of three round bodies, which it encloses by other planes, beside that and as narrow."""
+    """Within what is stated; of three round bodies, and of a round one that touches, which it encloses by other planes,
+    beside that and as narrow."""
     kinds = [type(body.shape) for body in found.shapes]
     if Ellipsoid in kinds or (len(kinds) > 2 and found and RoundedHull in kinds):
         return ""  # they have none
     lower, upper = certificate(found).verify()
     volume, error = Fraction(found.volume), Fraction(found.volume_error)
     within = volume - error <= lower <= upper <= volume + error
-    beside = case.round and len(found.shapes) > 2 and lower <= volume + error and volume - error <= upper
+    other_planes = case.round and (len(found.shapes) > 2 or found.status == "touching")
+    beside = other_planes and lower <= volume + error and volume - error <= upper
     narrow = upper - lower <= 3 * max(2 * error, Fraction(TOLERANCE) * volume)
     return "" if within or (beside and narrow) else "the proved bounds are not within the stated ones"
 
