@@ -15,7 +15,8 @@ from overlapper import Hull
 SEED = 2026
 AFFORDABLE = {  # seeds whose exact truth takes less than half a second, and such as were hard
     "combined": (*range(SEED, SEED + 5), 300168, 400034),  # witnesses of needles, and needles that touch
-    "round_contacts": (*range(SEED, SEED + 5), 300076, 400019),  # over the diagonal that is no edge
+    "flush_round": (*range(SEED, SEED + 5), 500354),  # a cylinder in a box that it fills
+    "round_contacts": (*range(SEED, SEED + 5), 300076, 400019, 500146),  # over the diagonal that is no edge
     "fine_round_hulls": (2026, 2027),
     "finest_round_hulls": (2027,),
     "prisms": (2026, 2029, 2031, 2033, 2034, 2036, 2037),

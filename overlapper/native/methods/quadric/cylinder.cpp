@@ -92,7 +92,7 @@ class Measuring {
  public:
   std::optional<CylinderPart> measure(const Rings& polyhedron, double radius) {
     polyhedron_ = &polyhedron, radius_ = radius, part_ = {};
-    terms_ = 0, cones_ = sizes_ = all_area_ = far2_ = turned_ = levels_ = squares_ = 0, height_moments_ = {};
+    terms_ = 0, cones_ = sizes_ = all_area_ = upward_ = far2_ = turned_ = levels_ = squares_ = 0, height_moments_ = {};
     return measure();
   }
 
@@ -140,6 +140,7 @@ class Measuring {
     cones_ += plane.offset * area;
     sizes_ += std::abs(plane.offset) * section.sizes;
     all_area_ += area;
+    upward_ += std::max(0.0, area * n.z);
     height_moments_ += plane.offset * section.first;
     const Pull pull{area * n, cross(section.first, n)};
     part_.curved.force += -pull.force, part_.curved.moment += -pull.moment;
@@ -248,6 +249,8 @@ class Measuring {
     // Once around the cylinder and back, and faces that look up and down, unless a turn is wrong.
     if (!(std::abs(turned_) <= kOpen)) return std::nullopt;
     if (!(std::abs(part_.curved.force.z) <= kOpen * all_area_)) return std::nullopt;
+    // Seen along the axis, faces that look up share nothing, but where two are one but for rounding.
+    if (!(upward_ <= (1 + kOpen) * kPi * r * r)) return std::nullopt;
     part_.volume = (cones_ + r * curved) / 3;
     part_.area += curved, part_.whole_area = all_area_ + curved;
     const double reach = std::sqrt(far2_) + r;
@@ -269,6 +272,7 @@ class Measuring {
   CylinderPart part_;
   int terms_ = 0;
   double cones_ = 0, sizes_ = 0, all_area_ = 0;
+  double upward_ = 0;                ///< m²: of faces that look up, as seen along the axis
   double far2_ = 0;                  ///< m²: of how far corners of edges that are cut are from the origin
   double turned_ = 0;                ///< rad
   double levels_ = 0, squares_ = 0;  ///< ∫ z dθ and ∫ z² dθ along the arcs
