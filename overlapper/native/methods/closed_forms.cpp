@@ -511,6 +511,9 @@ std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, cons
   return MeasuresAndInertia{std::move(q), rotation * inertia(*part) * transposed(rotation)};
 }
 
+/// Of how far a body reaches: nearer to a corner, the planes of its ends are left to slices.
+constexpr double kFlush = 1e-9;
+
 /// A cylinder, or a capsule as a cylinder and two half balls. They are faces of the cylinder where the planes of its
 /// ends cut the polyhedron, and none of the capsule.
 std::optional<MeasuresAndInertia> long_body_and_polyhedron(const Revolved& body, const Placed& placed,
@@ -519,6 +522,9 @@ std::optional<MeasuresAndInertia> long_body_and_polyhedron(const Revolved& body,
   thread_local quadric::Rings polyhedron, part;
   if (!polyhedron.become(other.shape, relative_pose(placed.pose, other.pose))) return std::nullopt;
   const double r = body.radius, h = body.half_length;
+  // Cuts through corners would leave slivers that are nothing but rounding, or faces twice.
+  for (const Vec3 corner : polyhedron.corners())
+    if (std::abs(std::abs(corner.z) - h) <= kFlush * (r + h)) return std::nullopt;
   part = polyhedron;
   if (!part.cut(h, true) || !part.cut(-h, false)) return std::nullopt;
   Measures q = by_formula();

@@ -124,3 +124,16 @@ def test_a_tolerance_that_no_polytope_reaches_leaves_the_closed_form_in_force():
     assert finest.facets_touched == 1
     assert (finest.volume, finest.volume_error) == (usual.volume, usual.volume_error)
     assert finest.volume_error > 1e-14 * finest.volume
+
+
+@pytest.mark.parametrize("shape", [Cylinder, Capsule])
+@pytest.mark.parametrize("sides", [(1, 1), (2, 1), (0.8, 2), (0.9, 1)])
+def test_ends_in_the_plane_of_a_face_are_counted_once(shape, sides):
+    rng = np.random.default_rng(4)
+    for _ in range(60):
+        (r, h), turn = rng.uniform(0.1, 2, 2), rng.integers(-4, 5, 4) / 2 + 0.25
+        box = Placed(Box([sides[0] * r, sides[1] * r, h / 2]), (0, 0, 0), turn)
+        answer = overlap(Placed(shape(r, h), (0, 0, 0), turn), box)
+        cut = sum(np.arccos(side) - side * np.sqrt(1 - side**2) for side in sides if side < 1)
+        truth = (np.pi - 2 * cut) * r**2 * h
+        assert abs(answer.volume - truth) <= answer.volume_error + 1e-13 * truth

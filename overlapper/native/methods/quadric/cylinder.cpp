@@ -252,6 +252,7 @@ class Measuring {
     // Seen along the axis, faces that look up share nothing, but where two are one but for rounding.
     if (!(upward_ <= (1 + kOpen) * kPi * r * r)) return std::nullopt;
     part_.volume = (cones_ + r * curved) / 3;
+    if (!(part_.volume <= (1 + kOpen) * kPi * r * r * height_)) return std::nullopt;
     part_.area += curved, part_.whole_area = all_area_ + curved;
     const double reach = std::sqrt(far2_) + r;
     part_.error = kUnit * (16 + terms_) * sizes_ / 3 + kPlacing * reach * (all_area_ + std::abs(curved));
