@@ -167,11 +167,13 @@ class Measuring {
   /// Whether a face that has no edge inside reaches all around: one steeper would be higher than the polyhedron.
   bool around(std::span<const int> ring, Vec3 n) const {
     if (!(std::abs(n.z) * height_ > radius_ * std::hypot(n.x, n.y))) return false;
+    bool turns = false;  // what is but a point does not
     for (size_t k = 0; k < ring.size(); ++k) {
-      const Vec3 p = corners_[ring[k]], q = corners_[ring[k + 1 < ring.size() ? k + 1 : 0]];
-      if (cross2(p, q) * n.z < 0) return false;
+      const double turn = cross2(corners_[ring[k]], corners_[ring[k + 1 < ring.size() ? k + 1 : 0]]) * n.z;
+      if (turn < 0) return false;
+      turns = turns || turn > 0;
     }
-    return true;
+    return turns;
   }
 
   void add_ellipse(const Plane& plane, Section& section) {
