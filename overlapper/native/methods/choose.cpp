@@ -300,10 +300,6 @@ std::optional<Region> grown_in_wide_arithmetic(const OverlappingBodies& overlapp
 /// The error of a volume, without bound where rounding has turned the polytope inside out.
 double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 ? m.volume_error : kInfinity; }
 
-}  // namespace
-
-namespace {
-
 WideVector point_inside(const OverlappingBodies& overlapping) {
   const Inside& found = overlapping.inside();
   return found.wide_ball ? found.wide_ball->centre : wide(found.ball.centre);

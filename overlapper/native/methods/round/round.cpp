@@ -442,7 +442,7 @@ class Measuring {
   bool moved_ = false;  ///< whether that is another
 };
 
-/// The fraction of a volume that may stay open before all of every interval is looked at.
+/// The fraction of a volume that may stay open before slices are looked at more closely, or others are.
 constexpr double kMostOpen = 1e-11;
 /// Beyond that fraction of a volume, something is wrong. Polytopes of tangent planes take seconds to be as good.
 constexpr double kMostError = 1e-8;
@@ -472,9 +472,6 @@ struct Workspace {
   std::vector<Round> rounds;
   std::vector<Wall> walls;
 };
-
-/// The fraction of a volume beyond which slices are not what was hoped for.
-constexpr double kTwice = 1e-11;
 
 /// Makes a ball of radius 1 of the ellipsoid that a body is, and of all else what that makes of it, turned to the axes
 /// of the ellipsoid.
@@ -533,7 +530,7 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
   double error = std::numeric_limits<double>::infinity();
   const std::optional<PatchSums> patch_before = patch ? std::optional(*patch) : std::nullopt;
   // About the centroid, other slices are taken, which may do where the first do not.
-  for (int attempt = 0; attempt < 2 && !(error <= kTwice * totals.volume); ++attempt) {
+  for (int attempt = 0; attempt < 2 && !(error <= kMostOpen * totals.volume); ++attempt) {
     const Vec3 step = attempt > 0 ? totals.first / totals.volume : Vec3{};
     if (!(norm(step) <= 2)) break;
     for (Round& r : rounds) r.centre = r.centre - wide(step);
