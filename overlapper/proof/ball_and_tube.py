@@ -96,18 +96,7 @@ class BallAndTube(Slices):
             return True
         if t * t / self.tt + p * p / self.pp + (arb(0) if flat else q * q / self.qq) > self.thick:
             return True
-        if flat:
-            return False
-        for line in self.lines[4:]:
-            if line.normal[0] * p + line.normal[1] * q > line.offset[0] + line.offset[1] * t:
-                return True
-        return any(rate * t > offset for rate, offset in self.steep)
-
-    def marks(self) -> Iterator[arb]:
-        yield from self.level_edges()
-        for point, flat in self.candidates():
-            if not self.is_outside(point, flat):
-                yield point[0]
+        return not flat and self.is_cut_off(point)
 
     def candidates(self) -> Iterator[tuple[Point, bool]]:
         for corner in self.corners:

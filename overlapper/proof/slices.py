@@ -97,7 +97,11 @@ class Slices:
 
     # What the two kinds differ in.
 
-    def marks(self) -> Iterator[arb]:
+    def candidates(self) -> Iterator[tuple[Point, Any]]:
+        """Where an outline may change, each with what `is_outside` is to know of it."""
+        raise NotImplementedError
+
+    def is_outside(self, point: Point, known: Any) -> bool:
         raise NotImplementedError
 
     def widest(self) -> arb:
@@ -111,6 +115,20 @@ class Slices:
         raise NotImplementedError
 
     # What they share.
+
+    def marks(self) -> Iterator[arb]:
+        yield from self.level_edges()
+        for point, known in self.candidates():
+            if not self.is_outside(point, known):
+                yield point[0]
+
+    def is_cut_off(self, point: Point) -> bool:
+        """By a plane, certainly."""
+        t, p, q = point
+        for line in self.lines[4:]:
+            if line.normal[0] * p + line.normal[1] * q > line.offset[0] + line.offset[1] * t:
+                return True
+        return any(rate * t > offset for rate, offset in self.steep)
 
     def level_edges(self) -> Iterator[arb]:
         """Of edges that lie in a slice, ends need not be in the quadrics for what is between them to be."""

@@ -78,18 +78,7 @@ class TwoTubes(Slices):
             off = arb(0) if k == unknown else x - level
             if off * off > at(square, t):
                 return True
-        if unknown >= 0:
-            return False
-        for line in self.lines[4:]:
-            if line.normal[0] * p + line.normal[1] * q > line.offset[0] + line.offset[1] * t:
-                return True
-        return any(rate * t > offset for rate, offset in self.steep)
-
-    def marks(self) -> Iterator[arb]:
-        yield from self.level_edges()
-        for point, unknown in self.candidates():
-            if not self.is_outside(point, unknown):
-                yield point[0]
+        return unknown < 0 and self.is_cut_off(point)
 
     def candidates(self) -> Iterator[tuple[Point, int]]:
         for corner in self.corners:
