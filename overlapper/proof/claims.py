@@ -282,7 +282,8 @@ class Bracketed(Short):
     """The volume that two bodies share, round ones among them, is not below `lower` and not above `upper`, in m³.
 
     The check computes the volume anew from the numbers of the shapes, in ball arithmetic with as many bits as it takes
-    to tell (see `overlapper.proof.volume`); it needs python-flint.
+    to tell (see `overlapper.proof.volume`); it needs python-flint, whose number of bits all threads share: one check at
+    a time.
     """
 
     shapes: tuple[Placed, ...]
