@@ -3,7 +3,6 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -154,7 +153,9 @@ def test_other_runs_import_nothing_for_the_plugin(pytester):
             assert not heavy & set(sys.modules)
         """
     )
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", pytester.path]
+    # Of an editable install, pytest says that it came too late for a module of which it has no need.
+    quiet = ["-W", "ignore:Module already imported:pytest.PytestAssertRewriteWarning"]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *quiet, pytester.path]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stdout
-    assert "overlapper" not in done.stdout.replace("_editable_skbc_overlapper", "").replace(str(Path.cwd()), "")
+    assert "overlapper" not in done.stdout
