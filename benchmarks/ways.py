@@ -33,6 +33,7 @@ from overlapper import (  # noqa: E402
     Box,
     Capsule,
     Cylinder,
+    Ellipsoid,
     HalfSpace,
     Hull,
     Placed,
@@ -96,10 +97,20 @@ TYPICAL = {
     "a capsule in the corner of a box": Typical(
         (Placed(Capsule(0.3, 1), (0.3, 0.2, 0.5), TURN), Placed(CUBE)), "closed form"
     ),
+    "an ellipsoid on the face of a box": Typical(
+        (Placed(Ellipsoid([0.5, 0.3, 0.4]), (0.01, 0.02, 0.75), TURN), Placed(CUBE)), "closed form"
+    ),
     "two balls": Typical((Placed(Sphere(0.5)), Placed(Sphere(0.5), (0.6, 0, 0))), "closed form"),
     "two cylinders": Typical((Placed(Cylinder(0.5, 1)), Placed(Cylinder(0.5, 1), (0.3, 0.2, 0.1), TURN)), "slicing"),
     "a ball on the side of a capsule": Typical(
         (Placed(Sphere(0.5)), Placed(Capsule(0.3, 1), (0.6, 0, 0.1), TURN)), "slicing"
+    ),
+    "two meshes of 20 facets with margins, 1 mm each": Typical(
+        (
+            Placed(RoundedHull(0.1 * icosphere(0), 1e-3)),
+            Placed(RoundedHull(0.1 * icosphere(0), 1e-3), (0.12, 0.07, 0.09), TURN),
+        ),
+        "slicing",
     ),
     "a rounded hull of 80 facets and a box": Typical(
         (Placed(RoundedHull(icosphere(1), 0.05)), Placed(CUBE, (0.9, 0.3, 0.4), TURN)), "slicing"
