@@ -6,8 +6,8 @@
 
 namespace overlapper {
 
-/// Memory that a thread uses again and again. Who asks for it while it is in use, as a signal handler may that
-/// computes something itself at a cancellation point, gets his own; what an exception left half done is forgotten.
+/// Memory that a thread uses again and again. Whoever asks for it while it is in use, as a signal handler may that
+/// computes something itself at a cancellation point, has other memory; what an exception left half done is forgotten.
 template <class T>
 class Scratch {
  public:

@@ -481,7 +481,7 @@ class OwnPolyhedron {
 /// About the centroid, along the polyhedron's axes.
 Mat3 inertia(const quadric::BallPart& part) {
   const Vec3 c = part.first / part.volume, f = part.first;
-  const Vec3 s = part.squares - Vec3{f.x * c.x, f.y * c.y, f.z * c.z};
+  const Vec3 s = part.squares - scaled(f, c);
   const Vec3 p = part.products - Vec3{f.y * c.z, f.z * c.x, f.x * c.y};
   return {{s.y + s.z, -p.z, -p.y}, {-p.z, s.z + s.x, -p.x}, {-p.y, -p.x, s.x + s.y}};
 }

@@ -49,7 +49,7 @@ int PlaneTree::grow(int begin, int end) {
 
 double PlaneTree::most(const Node& node, Vec3 d) {
   const Vec3 a = node.lower.normal, b = node.upper.normal;
-  const Vec3 one{a.x * d.x, a.y * d.y, a.z * d.z}, other{b.x * d.x, b.y * d.y, b.z * d.z};
+  const Vec3 one = scaled(a, d), other = scaled(b, d);
   const Vec3 low = min(one, other), high = max(one, other);
   return std::max(high.x + high.y + high.z - node.lower.offset, node.upper.offset - low.x - low.y - low.z);
 }

@@ -173,7 +173,7 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     if (!with_second) continue;
     pressure += h * on_face;
     const Vec3 w = h * on_face * n + disc.third;
-    part.squares += {n.x * w.x, n.y * w.y, n.z * w.z};
+    part.squares += scaled(n, w);
     part.products += 0.5 * Vec3{n.y * w.z + n.z * w.y, n.z * w.x + n.x * w.z, n.x * w.y + n.y * w.x};
   }
   const bool holds_centre = std::ranges::none_of(discs, [](const Disc& disc) { return disc.height < 0; });

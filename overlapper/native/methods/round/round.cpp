@@ -55,11 +55,11 @@ void add_second(const slicing::Stack& stack, const slicing::Integrals& sum, Vec3
     for (int j = 0; j < 3; ++j) {
       const double w = second[i][j];
       const Vec3 a = axis[i], b = axis[j];
-      squares += w * Vec3{a.x * b.x, a.y * b.y, a.z * b.z};
+      squares += w * scaled(a, b);
       products += w * Vec3{a.y * b.z, a.z * b.x, a.x * b.y};
     }
   const Vec3 f = first, o = offset, g = 2.0 * f + sum.volume * o;
-  squares += {o.x * g.x, o.y * g.y, o.z * g.z};
+  squares += scaled(o, g);
   products += {f.y * o.z + f.z * o.y + sum.volume * o.y * o.z, f.z * o.x + f.x * o.z + sum.volume * o.z * o.x,
                f.x * o.y + f.y * o.x + sum.volume * o.x * o.y};
   totals.squares += squares;
@@ -289,7 +289,7 @@ class Measuring {
         piece.volume += tetrahedron;
         piece.first += tetrahedron / 4 * sum;
         for (const Vec3 p : {apex, a, b, c, sum}) {
-          piece.squares += tetrahedron / 20 * Vec3{p.x * p.x, p.y * p.y, p.z * p.z};
+          piece.squares += tetrahedron / 20 * scaled(p, p);
           piece.products += tetrahedron / 20 * Vec3{p.y * p.z, p.z * p.x, p.x * p.y};
         }
       }
