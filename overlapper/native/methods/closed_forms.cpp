@@ -531,7 +531,7 @@ std::optional<MeasuresAndInertia> long_body_and_polyhedron(const Revolved& body,
   Vec3 first;
   Pull on_body{};  // about its centre, along its axes
   if (!part.empty()) {
-    const auto middle = quadric::measure_cylinder(part, r);
+    const auto middle = quadric::measure_cylinder(part, r, false);
     if (!middle) return std::nullopt;
     q.volume = middle->volume, q.volume_error = middle->error, q.area = middle->area, q.facets_touched = middle->faces;
     first = middle->first;

@@ -26,23 +26,35 @@ struct Arc {
   double square;   ///< ∫ (cos t − cos x)² dt
 };
 
+/// Integrals over a unit disc's segment, of a across its chord, towards the arc, and b along, about the chord's middle.
+struct Second {
+  double aa, bb, aaa, abb;
+};
+
 struct ArcSeries {
-  static constexpr int kTerms = 9;
+  static constexpr int kTerms = 12;
   std::array<Arc, kTerms> term{};
+  std::array<Second, kTerms> second{};
 
   constexpr ArcSeries() {
-    double factorial = 1, two = 2, three = 3, sign = 1;  // of and to the power of 2 k + 1
+    double factorial = 1, two = 2, three = 3, four = 4, five = 5, sign = 1;  // of and to the power of n
     for (int k = 1; k <= kTerms; ++k) {
-      factorial *= 2.0 * k * (2.0 * k + 1);
-      two *= 4, three *= 9, sign = -sign;
-      term[k - 1] = {-sign * two / 2 / factorial, sign * (9 + three - 12 * (2.0 * k + 1)) / (12 * factorial),
+      const double n = 2.0 * k + 1;
+      factorial *= (n - 1) * n;
+      two *= 4, three *= 9, four *= 16, five *= 25, sign = -sign;
+      term[k - 1] = {-sign * two / 2 / factorial, sign * (9 + three - 12 * n) / (12 * factorial),
                      -sign * 2 * k / factorial, sign * two * (k - 1) / factorial};
+      second[k - 1] = {sign * (12 * n * two - 28 * two - four) / (48 * factorial),
+                       sign * (four - 8 * two) / (48 * factorial),
+                       sign * (300 + 175 * three + 3 * five - n * (720 + 40 * three)) / (480 * factorial),
+                       sign * (80 + 15 * three - five - 120 * n) / (480 * factorial)};
     }
   }
 };
 
+constexpr ArcSeries kSeries;
+
 Arc arc(double x) {
-  static constexpr ArcSeries kSeries;
   if (std::abs(x) < 0.4) {
     const double square = x * x, cube = square * x;
     Arc sum{};
@@ -55,6 +67,25 @@ Arc arc(double x) {
   }
   const double s = std::sin(x), c = std::cos(x), segment = x - s * c;
   return {segment, 2.0 / 3 * s * s * s - c * segment, s - x * c, 2 * x * c * c + x - 3 * s * c};
+}
+
+/// Of half an arc's angle, positive.
+Second second(double x) {
+  if (x < 0.4) {
+    const double square = x * x, cube = square * x;
+    Second sum{};
+    for (int k = ArcSeries::kTerms - 1; k >= 0; --k) {
+      const Second& term = kSeries.second[k];
+      sum = {sum.aa * square + term.aa, sum.bb * square + term.bb, sum.aaa * square + term.aaa,
+             sum.abb * square + term.abb};
+    }
+    return {cube * sum.aa, cube * sum.bb, cube * sum.aaa, cube * sum.abb};
+  }
+  // About the middle of the disc, then about the chord's.
+  const double s = std::sin(x), c = std::cos(x), s2 = s * s, s3 = s2 * s, s5 = s3 * s2;
+  const double one = x - s * c, to1 = 2.0 / 3 * s3, to2 = one / 4 + s3 * c / 2, to3 = 2 * (s3 / 3 - s5 / 5);
+  const double bb = one / 4 - s3 * c / 6;
+  return {to2 - 2 * c * to1 + c * c * one, bb, to3 - c * (3 * to2 - c * (3 * to1 - c * one)), 2.0 / 15 * s5 - c * bb};
 }
 
 /// The part of an edge inside the cylinder.
@@ -81,17 +112,19 @@ bool find_chord(Vec3 p, Vec3 q, bool p_inside, bool q_inside, double radius, Cho
   return true;
 }
 
-/// The part of a face inside the cylinder.
-struct Section {
-  double area = 0;
-  Vec3 first;        ///< ∫ x dA
+/// What is summed over a face's part inside.
+struct Sum : Section {
   double sizes = 0;  ///< m²: of the areas that are summed
+  /// If second moments are asked for, ∫ (ρ² − r²) x dA, of the distance ρ from the axis, and ∫ z³ dA.
+  Vec3 within;
+  double cubes = 0;
 };
 
 class Measuring {
  public:
-  std::optional<CylinderPart> measure(const Rings& polyhedron, double radius) {
-    polyhedron_ = &polyhedron, radius_ = radius, part_ = {};
+  std::optional<CylinderPart> measure(const Rings& polyhedron, double radius, bool with_second) {
+    polyhedron_ = &polyhedron, radius_ = radius, with_second_ = with_second, part_ = {};
+    radial_ = 0, lengthwise_ = across_ = {}, sections_.assign(with_second ? polyhedron.planes().size() : 0, {});
     terms_ = 0, cones_ = sizes_ = all_area_ = upward_ = far2_ = turned_ = levels_ = squares_ = 0, height_moments_ = {};
     return measure();
   }
@@ -118,7 +151,7 @@ class Measuring {
     Plane plane = polyhedron_->planes()[f];
     plane.offset -= plane.normal.z * level_;
     const Vec3 n = plane.normal;
-    Section section;
+    Sum section;
     find_chords(polyhedron_->ring(f));
     if (chords_.empty()) {
       if (!around(polyhedron_->ring(f), n)) return true;
@@ -142,6 +175,13 @@ class Measuring {
     all_area_ += area;
     upward_ += std::max(0.0, area * n.z);
     height_moments_ += plane.offset * section.first;
+    if (with_second_) {
+      radial_ += n.x * section.within.x + n.y * section.within.y;
+      lengthwise_ += scaled(n, {section.within.x, section.within.y, section.cubes});
+      across_ +=
+          Vec3{n.y * section.within.z, n.x * section.within.z, (n.x * section.within.y + n.y * section.within.x) / 2};
+      sections_[f] = section;
+    }
     const Pull pull{area * n, cross(section.first, n)};
     part_.curved.force += -pull.force, part_.curved.moment += -pull.moment;
     if (!polyhedron_->face(f)) return true;
@@ -176,7 +216,7 @@ class Measuring {
     return turns;
   }
 
-  void add_ellipse(const Plane& plane, Section& section) {
+  void add_ellipse(const Plane& plane, Sum& section) {
     const Vec3 n = plane.normal;
     const double turn = n.z > 0 ? 2 * kPi : -2 * kPi, z = plane.offset / n.z;
     const double wave2 = radius_ * radius_ * dot2(n, n) / (n.z * n.z);
@@ -185,18 +225,43 @@ class Measuring {
     section.first = section.area * Vec3{0, 0, z};
     turned_ += turn, levels_ += turn * z, squares_ += turn * (z * z + wave2 / 2);
     sizes_ += radius_ * radius_ * std::abs(turn * z);
+    if (!with_second_) return;
+    const double quarter = radius_ * radius_ / 4;
+    const Vec3 slope{-n.x / n.z, -n.y / n.z, 0};
+    const double rise2 = quarter * dot2(slope, slope);
+    section.squares = section.area * Vec3{quarter, quarter, z * z + rise2};
+    section.products = section.area * quarter * Vec3{slope.y, slope.x, 0};
+    // Over a disc, the mean of (ρ² − r²) is −r² / 2, and that of (ρ² − r²) x² is −r⁴ / 12.
+    section.within = section.area * Vec3{0, 0, -2 * quarter * z};
+    section.cubes = section.area * z * (z * z + 3 * rise2);
   }
 
-  static void add_triangle(Vec3 n, Vec3 a, Vec3 b, Vec3 c, Section& section) {
+  void add_triangle(Vec3 n, Vec3 a, Vec3 b, Vec3 c, Sum& section) const {
     const double area = dot(n, cross(b - a, c - a)) / 2;
     section.area += area, section.sizes += std::abs(area);
-    section.first += area / 3 * (a + b + c);
+    const Vec3 sum = a + b + c;
+    section.first += area / 3 * sum;
+    if (!with_second_) return;
+    // A rule for polynomials of the third degree.
+    const auto at = [&](double weight, Vec3 p) {
+      const double w = weight * area, inner = w * (dot2(p, p) - radius_ * radius_);
+      section.within += inner * p;
+      section.cubes += w * p.z * p.z * p.z;
+      add_second(w, p, section);
+    };
+    at(-27.0 / 48, sum / 3);
+    for (const Vec3 corner : {a, b, c}) at(25.0 / 48, 0.2 * sum + 0.4 * corner);
+  }
+
+  static void add_second(double weight, Vec3 p, Section& section) {
+    section.squares += weight * scaled(p, p);
+    section.products += weight * Vec3{p.y * p.z, p.z * p.x, p.x * p.y};
   }
 
   /// An arc of a face's border, counter-clockwise seen along the axis from where its normal leads, and the segment
   /// between it and its chord. False if that may be nothing as well as a whole turn, or if the face lies along the
   /// surface, where its area is as uncertain as the root of where it lies.
-  bool add_arc(Vec3 n, Vec3 p, Vec3 q, double border, Section& section) {
+  bool add_arc(Vec3 n, Vec3 p, Vec3 q, double border, Sum& section) {
     for (const Vec3 end : {p, q}) {
       const double sine = dot2(n, end) / radius_;
       if (!(1 - sine * sine > kGrazing)) return false;
@@ -242,8 +307,36 @@ class Measuring {
     const double beyond = radius_ * radius_ * radius_ * std::abs(of.across) / std::abs(n.z);
     section.area += area, section.sizes += area;
     const Vec3 middle{(p.x + q.x) / 2, (p.y + q.y) / 2, mean};
-    section.first += area * middle + beyond * Vec3{w.x, w.y, -dot2(n, w) / n.z};
+    const Vec3 out{w.x, w.y, -dot2(n, w) / n.z};
+    section.first += area * middle + beyond * out;
+    if (with_second_)
+      add_segment(middle, radius_ * out, {-radius_ * w.y, radius_ * w.x, -slope}, std::abs(x),
+                  radius_ * radius_ / std::abs(n.z), section);
     return true;
+  }
+
+  /// The segment of a unit disc of which that is half the angle, as it lies in the face, `scale` times as large: about
+  /// the middle of its chord, across that towards the arc, and along it.
+  void add_segment(Vec3 middle, Vec3 across, Vec3 along, double half, double scale, Sum& section) const {
+    const Arc of = arc(half);
+    const double s = std::sin(half), c = std::cos(half);
+    const double one = scale * of.segment, a = scale * of.across;
+    const Second two = second(half);
+    const double aa = scale * two.aa, bb = scale * two.bb, aaa = scale * two.aaa, abb = scale * two.abb;
+    const auto product = [&](double p, double q, double p_across, double q_across, double p_along, double q_along) {
+      return one * p * q + a * (p * q_across + q * p_across) + aa * p_across * q_across + bb * p_along * q_along;
+    };
+    section.squares += one * scaled(middle, middle) + 2 * a * scaled(middle, across) + aa * scaled(across, across) +
+                       bb * scaled(along, along);
+    section.products += {product(middle.y, middle.z, across.y, across.z, along.y, along.z),
+                         product(middle.z, middle.x, across.z, across.x, along.z, along.x),
+                         product(middle.x, middle.y, across.x, across.y, along.x, along.y)};
+    // ρ² − r² is r² (a² + 2 a cos x + b² − sin² x).
+    const double at_middle = aa + 2 * c * a + bb - s * s * one, at_across = aaa + 2 * c * aa + abb - s * s * a;
+    section.within += radius_ * radius_ * (at_middle * middle + at_across * across);
+    const double m = middle.z, u = across.z, v = along.z;
+    section.cubes +=
+        m * m * (m * one + 3 * u * a) + 3 * m * (u * u * aa + v * v * bb) + u * (u * u * aaa + 3 * v * v * abb);
   }
 
   std::optional<CylinderPart> sum() {
@@ -260,9 +353,21 @@ class Measuring {
     part_.error = kUnit * (16 + terms_) * sizes_ / 3 + kPlacing * reach * (all_area_ + std::abs(curved));
     const Vec3 of_curved{r * part_.curved.force.x, r * part_.curved.force.y, r * squares_ / 2};
     part_.first = 0.25 * (height_moments_ + r * of_curved);
+    if (with_second_) {
+      const double v = part_.volume, both = radial_ / 4 + r * r * v / 2, rest = (r * r * v - both) / 2;
+      part_.squares = {lengthwise_.x / 2 + rest, lengthwise_.y / 2 + rest, lengthwise_.z / 3};
+      part_.products = 0.5 * across_;
+    }
     // About the origin again.
     const Vec3 up{0, 0, level_};
-    part_.first += part_.volume * up;
+    const auto lift = [&](double size, Vec3& first, Vec3& squares, Vec3& products) {
+      squares.z += level_ * (2 * first.z + level_ * size);
+      products += level_ * Vec3{first.y, first.x, 0};
+      first += size * up;
+    };
+    lift(part_.volume, part_.first, part_.squares, part_.products);
+    for (Section& section : sections_) lift(section.area, section.first, section.squares, section.products);
+    part_.sections = sections_;
     for (Pull* pull : {&part_.curved, &part_.flat}) pull->moment += cross(up, pull->force);
     return part_;
   }
@@ -280,6 +385,10 @@ class Measuring {
   double turned_ = 0;                ///< rad
   double levels_ = 0, squares_ = 0;  ///< ∫ z dθ and ∫ z² dθ along the arcs
   Vec3 height_moments_;              ///< Σ h ∫ x dA
+  bool with_second_ = false;
+  std::vector<Section> sections_;
+  double radial_ = 0;         ///< Σ ∫ (ρ² − r²) (n_x x + n_y y) dA
+  Vec3 lengthwise_, across_;  ///< Σ of n_x and n_y times that ∫ of x and y, n_z ∫ z³ dA; of those of two coordinates
 };
 
 }  // namespace
@@ -292,6 +401,12 @@ class Measuring {
 // face's part inside is a polygon of the edges' parts and of the chords of arcs, in space, and segments of an ellipse
 // beyond these: of steep faces, segments are slender, and their terms series of no cancellation.
 //
+// The fields (ρ² − r²) x e, for a coordinate x and a unit vector e orthogonal to the axis, vanish on the curved part,
+// and z³ along the axis is along it: by them, second moments are integrals over the faces alone,
+//
+//   4 ∫ ρ² dV = 2 r² V + Σ ∫ (ρ² − r²) (n_x x + n_y y) dA,   2 ∫ x² dV = r² V − ∫ ρ² dV + Σ n_x ∫ (ρ² − r²) x dA,
+//   3 ∫ z² dV = Σ n_z ∫ z³ dA,   2 ∫ x y dV = Σ n_x ∫ (ρ² − r²) y dA.
+//
 // Edges are cut at the same points whichever face asks, so that the surface closes whatever rounding has done to these;
 // a corner that it takes for inside, or an edge that grazes the cylinder, changes it by as much as these are off. Which
 // way round an arc goes is sure but where its ends nearly meet. All arcs together turn back as far as they turn, and
@@ -300,9 +415,9 @@ class Measuring {
 // The error. Every term has sixteen roundings or fewer, and every sum on the way one more. Points are off by kPlacing
 // of how far their numbers reach: by that, times the area, is the volume between the surface as computed and as it
 // should be.
-std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius) {
+std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius, bool with_second) {
   thread_local Measuring measuring;
-  return measuring.measure(polyhedron, radius);
+  return measuring.measure(polyhedron, radius, with_second);
 }
 
 }  // namespace overlapper::quadric

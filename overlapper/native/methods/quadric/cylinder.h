@@ -1,25 +1,35 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "geometry/measures.h"
 #include "methods/quadric/polyhedron.h"
 
 namespace overlapper::quadric {
 
+/// The part of a polyhedron's face inside a cylinder.
+struct Section {
+  double area = 0;
+  Vec3 first;              ///< ∫ x dA
+  Vec3 squares, products;  ///< ∫ x², y², z² dA and ∫ yz, zx, xy dA, if asked for
+};
+
 /// What a cylinder without ends about the z axis and a polyhedron share, about the origin.
 struct CylinderPart {
   double volume = 0;
-  double error = 0;  ///< of the volume: what rounding may have done to it, that of the arguments not counted
-  Vec3 first;        ///< ∫ x dV
+  double error = 0;        ///< of the volume: what rounding may have done to it, that of the arguments not counted
+  Vec3 first;              ///< ∫ x dV
+  Vec3 squares, products;  ///< ∫ x², y², z² dV and ∫ yz, zx, xy dV, if asked for
   /// ∫ n dA and ∫ x × n dA over the curved part, and over the polyhedron's faces without cuts.
   Pull curved, flat;
-  double area = 0;        ///< m², of the surface without cuts
-  double whole_area = 0;  ///< with them
-  int faces = 0;          ///< that take part
+  double area = 0;                    ///< m², of the surface without cuts
+  double whole_area = 0;              ///< with them
+  int faces = 0;                      ///< that take part
+  std::span<const Section> sections;  ///< of each of the polyhedron's planes; good until the next part is measured
 };
 
 /// In closed form; nothing where rounding leaves open which way round a face's border goes, or how wide it is.
-std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius);
+std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius, bool with_second);
 
 }  // namespace overlapper::quadric

@@ -23,7 +23,7 @@ constexpr auto kBoxRings = box_rings();
 }  // namespace
 
 bool Rings::become(const Shape& shape, const Pose& pose) {
-  corners_.clear(), planes_.clear(), ring_.clear(), start_.assign(1, 0), cuts_ = 0;
+  clear();
   if (const Box* box = std::get_if<Box>(&shape)) {
     for (int i = 0; i < 8; ++i) corners_.push_back(pose * corner(*box, i));
     for (int f = 0; f < 6; ++f) {

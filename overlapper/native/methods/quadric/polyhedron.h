@@ -20,6 +20,14 @@ class Rings {
  public:
   /// Those of a box or a hull, placed; false if there are none.
   bool become(const Shape& shape, const Pose& pose);
+  /// Another, face by face.
+  void clear() { corners_.clear(), planes_.clear(), ring_.clear(), start_.assign(1, 0), cuts_ = 0; }
+  void add_corner(Vec3 at) { corners_.push_back(at); }
+  void add_face(const Plane& plane, std::span<const int> ring) {
+    planes_.push_back(plane);
+    ring_.insert(ring_.end(), ring.begin(), ring.end());
+    start_.push_back(static_cast<int>(ring_.size()));
+  }
   /// Keeps what is not above the height, or not below it; false if a face is not convex, by rounding.
   bool cut(double height, bool keep_below);
 

@@ -41,7 +41,7 @@ void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side)
     for (int w = piece.first_wall; something && w < piece.first_wall + piece.walls; ++w) {
       cancellation_point(part.around.corners.size());
       const Wall& wall = pieces.walls[w];
-      something = part.around.cut({rounded(wall.normal), wall.slack.head + margin_, w});
+      something = part.around.cut({rounded(wall.normal), wall.slack.head, w});
     }
     // Planes that touch a round where the rest is: the second time, less of that is left.
     for (int again = 0; something && piece.round >= 0 && again < 2; ++again) {
@@ -60,12 +60,14 @@ void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side)
   }
 }
 
-bool Culling::keep_walls(const Side& side, int piece, const Part& other, std::vector<Wall>& walls) const {
+bool Culling::keep_walls(const Side& side, int piece, const Part& other, std::vector<int>& kept,
+                         std::vector<Wall>& walls) const {
+  kept.clear();
   for (const int w : side.parts[piece].walls) {
     const Wall& wall = side.pieces->walls[w];
-    const Vec3 normal = rounded(wall.normal);
-    if (other.around.least(normal) > wall.slack.head + margin_) return false;
-    if (other.around.most(normal) >= wall.slack.head - margin_) walls.push_back(wall);
+    const auto [least, most] = other.around.range(rounded(wall.normal));
+    if (least > wall.slack.head + margin_) return false;
+    if (most >= wall.slack.head - margin_) kept.push_back(w), walls.push_back(wall);
   }
   return true;
 }
@@ -75,15 +77,34 @@ bool Culling::beyond(const Round& round, const Part& other) const {
   return normal != Vec3{} && other.around.least(normal) > reach(round, normal) + margin_;
 }
 
-bool Culling::meet(int p, int q, std::vector<Wall>& walls, Bounds& box) const {
+bool Culling::meet(int p, int q, Meeting& meeting) const {
   const Part &one = a_.parts[p], &two = b_.parts[q];
   if (one.empty || two.empty) return false;
-  box = {max(one.box.lower, two.box.lower), min(one.box.upper, two.box.upper)};
-  if (box.lower.x > box.upper.x || box.lower.y > box.upper.y || box.lower.z > box.upper.z ||
-      !keep_walls(a_, p, two, walls) || !keep_walls(b_, q, one, walls))
+  const Vec3 lower = max(one.box.lower, two.box.lower), upper = min(one.box.upper, two.box.upper);
+  meeting.p = p, meeting.q = q, meeting.walls.clear();
+  if (lower.x > upper.x || lower.y > upper.y || lower.z > upper.z ||
+      !keep_walls(a_, p, two, meeting.of_p, meeting.walls) || !keep_walls(b_, q, one, meeting.of_q, meeting.walls))
     return false;
   const int r = a_.pieces->pieces[p].round, s = b_.pieces->pieces[q].round;
   return !(r >= 0 && beyond(a_.pieces->rounds[r], two)) && !(s >= 0 && beyond(b_.pieces->rounds[s], one));
+}
+
+bool Culling::share(const Meeting& meeting, Enclosure& polytope) const {
+  // The fewer cuts, the better.
+  const bool from_p = meeting.of_p.size() >= meeting.of_q.size();
+  polytope = (from_p ? a_.parts[meeting.p] : b_.parts[meeting.q]).around;
+  const std::vector<int>& known = from_p ? meeting.of_p : meeting.of_q;
+  const int size = static_cast<int>(meeting.walls.size()), of_p = static_cast<int>(meeting.of_p.size());
+  for (Enclosure::Face& face : polytope.faces) {
+    const auto at = std::ranges::find(known, face.wall);
+    face.wall = at == known.end() ? kNoWall : static_cast<int>(at - known.begin()) + (from_p ? 0 : of_p);
+  }
+  for (int w = from_p ? of_p : 0; w < (from_p ? size : of_p); ++w) {
+    cancellation_point(polytope.corners.size());
+    const Wall& wall = meeting.walls[w];
+    if (!polytope.cut({rounded(wall.normal), wall.slack.head, w})) return false;
+  }
+  return true;
 }
 
 }  // namespace overlapper::slicing

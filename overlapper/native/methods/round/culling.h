@@ -13,9 +13,19 @@ class Culling {
  public:
   void look_at(const Pieces& a, const Pieces& b, const Enclosure& common);
 
-  /// Fills in the walls and a box around what pieces p of a and q of b share; false if that is nothing. Where it is but
-  /// nothing shows it, what these walls leave lies outside of the polytope around the common set.
-  bool meet(int p, int q, std::vector<Wall>& walls, Bounds& box) const;
+  /// Of a piece of a and one of b.
+  struct Meeting {
+    int p = 0, q = 0;
+    std::vector<Wall> walls;      ///< those that matter: where no other does, the common set ends sooner
+    std::vector<int> of_p, of_q;  ///< their numbers
+  };
+  /// Fills in the walls of what pieces p of a and q of b may share; false if that is nothing. Where it is but nothing
+  /// shows it, what these walls leave lies outside of the polytope around the common set.
+  bool meet(int p, int q, Meeting& meeting) const;
+
+  /// The polytope that the walls leave of what encloses the common set, every face with the number of its wall among
+  /// `meeting.walls`, or kNoWall; false if that is nothing.
+  bool share(const Meeting& meeting, Enclosure& polytope) const;
 
  private:
   struct Part {
@@ -30,7 +40,8 @@ class Culling {
     std::vector<Part> parts;
   };
   void enclose(const Pieces& pieces, const Enclosure& common, Side& side) const;
-  bool keep_walls(const Side& side, int piece, const Part& other, std::vector<Wall>& walls) const;
+  bool keep_walls(const Side& side, int piece, const Part& other, std::vector<int>& kept,
+                  std::vector<Wall>& walls) const;
   bool beyond(const Round& round, const Part& other) const;
 
   Side a_, b_;

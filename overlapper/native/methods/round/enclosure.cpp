@@ -87,10 +87,13 @@ Bounds Enclosure::bounds() const {
   return box;
 }
 
-double Enclosure::least(Vec3 direction) const {
-  double least = std::numeric_limits<double>::infinity();
-  for (const Corner& corner : corners) least = std::min(least, dot(direction, corner.at));
-  return least;
+std::pair<double, double> Enclosure::range(Vec3 direction) const {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  for (const Corner& corner : corners) {
+    const double at = dot(direction, corner.at);
+    least = std::min(least, at), most = std::max(most, at);
+  }
+  return {least, most};
 }
 
 Vec3 Enclosure::middle() const {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "shapes/shape.h"
@@ -29,7 +30,7 @@ struct Enclosure {
   /// False if the face leaves nothing, and then the polytope is as it was.
   bool cut(const Face& face);
 
-  /// Calls use(wall, ring) for each face that is left, its corners counter-clockwise from outside.
+  /// Calls use(face, ring) for each face that is left, with its corners, counter-clockwise from outside.
   template <class Use>
   void for_faces(Use use) const;
 
@@ -37,8 +38,8 @@ struct Enclosure {
   bool excludes(Vec3 point) const;
   Bounds bounds() const;
   /// Of dot(direction, X) over the polytope.
-  double least(Vec3 direction) const;
-  double most(Vec3 direction) const { return -least(-direction); }
+  std::pair<double, double> range(Vec3 direction) const;
+  double least(Vec3 direction) const { return range(direction).first; }
   Vec3 middle() const;
   double extent() const;  ///< no corner is farther from the origin
 };
@@ -47,7 +48,7 @@ inline constexpr int kNoWall = -1;
 
 template <class Use>
 void Enclosure::for_faces(Use use) const {
-  thread_local std::vector<Vec3> ring;
+  thread_local std::vector<int> ring;
   thread_local std::vector<std::array<bool, 3>> seen;
   seen.assign(corners.size(), {});
   for (size_t first = 0; first < corners.size(); ++first)
@@ -56,14 +57,14 @@ void Enclosure::for_faces(Use use) const {
       ring.clear();
       int from = static_cast<int>(first), along = k;
       do {
-        ring.push_back(corners[from].at);
+        ring.push_back(from);
         seen[from][along] = true;
         const int to = corners[from].beside[along];
         const auto& back = corners[to].beside;
         along = ((back[0] == from ? 0 : back[1] == from ? 1 : 2) + 2) % 3;
         from = to;
       } while (!seen[from][along]);
-      use(faces[corners[first].face[k]].wall, ring);
+      use(faces[corners[first].face[k]], std::span<const int>(ring));
     }
 }
 

@@ -8,6 +8,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/scratch.h"
+#include "methods/quadric/cylinder.h"
 #include "methods/round/culling.h"
 #include "methods/round/nodes.h"
 #include "methods/round/quadrature.h"
@@ -45,10 +46,12 @@ struct Totals {
 /// Of coordinates (x, y, t).
 Vec3 in_world(const slicing::Stack& stack, Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.t; }
 
-/// ∫ X Xᵀ dV of coordinates (x, y, t) and of their integral `first`, in the world, about a point `offset` before them.
-void add_second(const slicing::Stack& stack, const slicing::Integrals& sum, Vec3 first, Vec3 offset, Totals& totals) {
-  const Vec3 axis[3] = {stack.l, stack.m, stack.t};
-  const Vec3 s = sum.squares, p = sum.products;
+/// Coordinates that second moments are taken along, in the world.
+using Axes = std::array<Vec3, 3>;
+
+/// ∫ X Xᵀ dV of coordinates along `axis`, as squares and products there, and the integral `first` of the same in the
+/// world, about a point `offset` before them.
+void add_second(const Axes& axis, double volume, Vec3 s, Vec3 p, Vec3 first, Vec3 offset, Totals& totals) {
   const double second[3][3] = {{s.x, p.z, p.y}, {p.z, s.y, p.x}, {p.y, p.x, s.z}};
   Vec3 squares, products;
   for (int i = 0; i < 3; ++i)
@@ -58,10 +61,10 @@ void add_second(const slicing::Stack& stack, const slicing::Integrals& sum, Vec3
       squares += w * scaled(a, b);
       products += w * Vec3{a.y * b.z, a.z * b.x, a.x * b.y};
     }
-  const Vec3 f = first, o = offset, g = 2.0 * f + sum.volume * o;
+  const Vec3 f = first, o = offset, g = 2.0 * f + volume * o;
   squares += scaled(o, g);
-  products += {f.y * o.z + f.z * o.y + sum.volume * o.y * o.z, f.z * o.x + f.x * o.z + sum.volume * o.z * o.x,
-               f.x * o.y + f.y * o.x + sum.volume * o.x * o.y};
+  products += {f.y * o.z + f.z * o.y + volume * o.y * o.z, f.z * o.x + f.x * o.z + volume * o.z * o.x,
+               f.x * o.y + f.y * o.x + volume * o.x * o.y};
   totals.squares += squares;
   totals.products += products;
 }
@@ -99,14 +102,19 @@ class Measuring {
       add_cap(rounds_[0], walls_.empty() ? nullptr : &walls_[0]);
       return true;
     }
-    return (rounds_.empty() && common && add_polytope()) || add_stack();
+    return add_stack();
+  }
+
+  /// In closed form, what walls leave of a polytope and of one cylinder at most, whose faces tell which of the walls
+  /// they are. False, and nothing is added, if doubles are not sure of it to a fraction of the whole that matters.
+  bool add_in_closed_form(const Round* cylinder, const slicing::Enclosure& polytope, std::span<const Wall> walls) {
+    return cylinder ? add_cylinder(*cylinder, polytope, walls) : add_polytope(polytope, walls);
   }
 
   Totals totals;
   const slicing::Stretch* stretch = nullptr;   ///< of an ellipsoid: from the ball and the planes that are added
   double extent = 0;                           ///< m: no point of the common set is farther from the one inside
   const slicing::Enclosure* common = nullptr;  ///< what lies outside of that belongs to no piece
-  Bounds box;                                  ///< around what is added, if the common set is enclosed
   bool closely = false;                        ///< looks at all of every interval
   PatchSums* patch = nullptr;                  ///< if wanted, of what belongs to `owner`
   Seen seen;                                   ///< of that
@@ -260,30 +268,30 @@ class Measuring {
     return view;
   }
 
-  /// Pieces that only planes bound, corner by corner in doubles; false, and nothing is added, if these are not sure of
-  /// it to a fraction of the whole that matters. No tetrahedron is negative, but by rounding.
-  bool add_polytope() {
-    const Vec3 wider = 0.1 * (box.upper - box.lower);
-    polytope_.become({box.lower - wider, box.upper + wider});
-    for (size_t i = 0; i < walls_.size(); ++i) {
-      cancellation_point(polytope_.corners.size());
-      if (!polytope_.cut({rounded(walls_[i].normal), walls_[i].slack.head, static_cast<int>(i)})) return false;
-    }
+  /// What rounding has done to the volume of what corners bound that cuts have made.
+  static double rounding_of(const slicing::Enclosure& polytope, double border) {
+    return 16 * DBL_EPSILON * polytope.extent() * border;
+  }
+
+  /// No tetrahedron is negative, but by rounding.
+  bool add_polytope(const slicing::Enclosure& polytope, std::span<const Wall> walls) {
     Totals piece;
     std::optional<PatchSums> with_piece;
     if (patch) with_piece = *patch;
-    const Vec3 apex = polytope_.corners[0].at;
+    const Vec3 apex = polytope.corners[0].at;
     bool closed = true;
-    polytope_.for_faces([&](int wall, std::span<const Vec3> ring) {
-      if (wall == slicing::kNoWall) {
+    polytope.for_faces([&](const slicing::Enclosure::Face& face, std::span<const int> ring) {
+      if (face.wall == slicing::kNoWall) {
         closed = false;
         return;
       }
+      const int of_wall = walls[face.wall].owner;
       Vec3 force, moment;
       for (size_t i = 2; i < ring.size(); ++i) {
-        const Vec3 a = ring[0], b = ring[i - 1], c = ring[i], triangle = 0.5 * cross(b - a, c - a);
+        const Vec3 a = polytope.corners[ring[0]].at, b = polytope.corners[ring[i - 1]].at;
+        const Vec3 c = polytope.corners[ring[i]].at, triangle = 0.5 * cross(b - a, c - a);
         force += triangle, moment += cross((a + b + c) / 3, triangle);
-        if (with_piece && walls_[wall].owner == owner) with_piece->add_triangle(a, b, c, triangle);
+        if (with_piece && of_wall == owner) with_piece->add_triangle(a, b, c, triangle);
         const double tetrahedron = dot(a - apex, triangle) / 3;
         const Vec3 sum = apex + a + b + c;
         piece.volume += tetrahedron;
@@ -294,18 +302,75 @@ class Measuring {
         }
       }
       const double area = norm(force);
-      const int of_wall = walls_[wall].owner;
       piece.border += area;
       if (of_wall != slicing::kCut) piece.area += area, piece.unbalanced += force;
       if (of_wall == 0) piece.pull += force, piece.moment += moment;
     });
-    // Every cut moves corners by some roundings of the box's numbers.
-    piece.error = 16 * DBL_EPSILON * norm(max(abs(box.lower), abs(box.upper))) * piece.border;
-    if (!closed || !(piece.error <= kSure * (totals.volume + piece.volume))) return false;
-    if (outside(piece.first / piece.volume)) return true;
+    piece.error = rounding_of(polytope, piece.border);
+    if (!closed || !sure(piece)) return false;
     totals.add(piece);
     if (patch) *patch = *with_piece;
     return true;
+  }
+
+  bool sure(const Totals& piece) const { return piece.error <= kSure * (totals.volume + piece.volume); }
+
+  bool add_cylinder(const Round& cylinder, const slicing::Enclosure& polytope, std::span<const Wall> walls) {
+    const Vec3 axis = rounded(cylinder.axis), across = any_orthogonal(axis);
+    const Mat3 turn{across, cross(axis, across), axis};
+    const Vec3 centre = rounded(cylinder.centre - dot(cylinder.centre, cylinder.axis) * cylinder.axis);
+    rings_.clear(), owners_.clear();
+    for (const slicing::Enclosure::Corner& corner : polytope.corners) rings_.add_corner(turn * (corner.at - centre));
+    polytope.for_faces([&](const slicing::Enclosure::Face& face, std::span<const int> ring) {
+      rings_.add_face({turn * face.normal, face.slack - dot(face.normal, centre)}, ring);
+      owners_.push_back(face.wall == slicing::kNoWall ? kNobody : walls[face.wall].owner);
+    });
+    const auto part = quadric::measure_cylinder(rings_, cylinder.radius, true);
+    if (!part || !(part->volume >= 0)) return false;
+    Totals piece;
+    piece.volume = part->volume;
+    piece.area = part->whole_area, piece.border = part->whole_area;
+    const auto turned = [&](Vec3 v) { return apply_transposed(turn, v); };
+    const auto act = [&](int body, const Pull& local) {
+      const Vec3 force = turned(local.force);
+      if (body == 0) piece.pull += force, piece.moment += turned(local.moment) + cross(centre, force);
+      if (body != slicing::kCut) piece.unbalanced += force;
+    };
+    act(cylinder.owner, part->curved);
+    for (size_t f = 0; f < owners_.size(); ++f) {
+      const quadric::Section& section = part->sections[f];
+      if (section.area == 0) continue;
+      if (owners_[f] == kNobody) return false;
+      const Vec3 n = rings_.planes()[f].normal;
+      act(owners_[f], {section.area * n, cross(section.first, n)});
+      if (owners_[f] == slicing::kCut) piece.area -= section.area;
+    }
+    piece.error = part->error + rounding_of(polytope, piece.border);
+    if (!sure(piece)) return false;
+    const Vec3 first = turned(part->first);
+    piece.first = first + piece.volume * centre;
+    add_second({turn.row0, turn.row1, turn.row2}, piece.volume, part->squares, part->products, first, centre, piece);
+    totals.add(piece);
+    if (patch) add_to_patch(cylinder, *part, turn, centre);
+    return true;
+  }
+
+  /// The surface of a part of a cylinder is closed: from behind, the others show what its curved part does.
+  void add_to_patch(const Round& cylinder, const quadric::CylinderPart& part, const Mat3& turn, Vec3 centre) {
+    const bool rest = cylinder.owner == owner;
+    const Vec3 u = turn * seen.u, v = turn * seen.v, normal = (rest ? -1.0 : 1.0) * (turn * seen.normal);
+    const double u0 = seen.u0 + dot(centre, seen.u), v0 = seen.v0 + dot(centre, seen.v);
+    for (size_t f = 0; f < owners_.size(); ++f) {
+      const quadric::Section& s = part.sections[f];
+      if (s.area == 0 || (owners_[f] == owner) == rest) continue;
+      const double w = dot(rings_.planes()[f].normal, normal), a = s.area, fu = dot(s.first, u), fv = dot(s.first, v);
+      const auto second = [&](Vec3 p, Vec3 q) {
+        return dot(s.squares, scaled(p, q)) + s.products.x * (p.y * q.z + p.z * q.y) +
+               s.products.y * (p.z * q.x + p.x * q.z) + s.products.z * (p.x * q.y + p.y * q.x);
+      };
+      patch->add(w * a, w * (u0 * a + fu), w * (v0 * a + fv), w * (u0 * (u0 * a + 2 * fu) + second(u, u)),
+                 w * (u0 * (v0 * a + fv) + v0 * fu + second(u, v)), w * (v0 * (v0 * a + 2 * fv) + second(v, v)));
+    }
   }
 
   /// Where the radical plane parts two balls, the common set is the part of either ball beyond it.
@@ -427,15 +492,17 @@ class Measuring {
     totals.moment += turned(s.moment[0]) + (stretch ? stretch->moment(offset_, pull) : cross(offset_, pull));
     totals.unbalanced += turned(s.pull[0] + s.pull[1]);
     if (patch) patch->add(s.seen[0], s.seen[1], s.seen[2], s.seen[3], s.seen[4], s.seen[5]);
-    add_second(stack, s, first, offset_, totals);
+    add_second({stack.l, stack.m, stack.t}, s.volume, s.squares, s.products, first, offset_, totals);
   }
 
   static constexpr int kSuperseded = -1;  ///< the owner of a wall that is to go
+  static constexpr int kNobody = -1;      ///< of a face that no wall makes
 
   std::vector<Round> rounds_;
   std::vector<Wall> walls_, with_radical_;
   std::vector<std::pair<double, int>> by_length_;  ///< walls, by what their normals are along a line
-  slicing::Enclosure polytope_;
+  quadric::Rings rings_;
+  std::vector<int> owners_;  ///< of the faces of that
   std::vector<slicing::Interval> intervals_;
   slicing::Sum sum_, best_;
   Vec3 offset_;         ///< of the point that the pieces are about, from the point inside
@@ -469,8 +536,9 @@ struct Workspace {
   Measuring measuring;
   slicing::Enclosure around;
   slicing::Culling culling;
+  slicing::Culling::Meeting meeting;
+  slicing::Enclosure polytope;
   std::vector<Round> rounds;
-  std::vector<Wall> walls;
 };
 
 /// Makes a ball of radius 1 of the ellipsoid that a body is, and of all else what that makes of it, turned to the axes
@@ -581,7 +649,8 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   slicing::Enclosure& around = scratch->around;
   slicing::Culling& culling = scratch->culling;
   std::vector<Round>& rounds = scratch->rounds;
-  std::vector<Wall>& walls = scratch->walls;
+  slicing::Culling::Meeting& meeting = scratch->meeting;
+  std::vector<Wall>& walls = meeting.walls;
   of_a.clear(), of_b.clear();
   measuring.owner = owner, measuring.patch = patch;
   if (patch) measuring.seen = Seen(*patch);
@@ -603,14 +672,19 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
           const slicing::Piece &p = of_a.pieces[i], &q = of_b.pieces[j];
           if ((p.round >= 0) + (q.round >= 0) != round_ones) continue;
           rounds.clear(), walls.clear();
+          if (p.round >= 0) rounds.push_back(of_a.rounds[p.round]);
+          if (q.round >= 0) rounds.push_back(of_b.rounds[q.round]);
           if (many) {
-            if (!culling.meet(i, j, walls, measuring.box)) continue;
+            if (!culling.meet(i, j, meeting)) continue;
+            if (round_ones == 0 || (round_ones == 1 && !rounds[0].ball)) {
+              if (!culling.share(meeting, scratch->polytope)) continue;
+              const Round* cylinder = rounds.empty() ? nullptr : &rounds[0];
+              if (measuring.add_in_closed_form(cylinder, scratch->polytope, walls)) continue;
+            }
           } else {
             walls.insert(walls.end(), of_a.walls.begin() + p.first_wall, of_a.walls.begin() + p.first_wall + p.walls);
             walls.insert(walls.end(), of_b.walls.begin() + q.first_wall, of_b.walls.begin() + q.first_wall + q.walls);
           }
-          if (p.round >= 0) rounds.push_back(of_a.rounds[p.round]);
-          if (q.round >= 0) rounds.push_back(of_b.rounds[q.round]);
           if (!measuring.add(rounds, walls)) return false;
         }
     return measuring.totals.volume > 0;
