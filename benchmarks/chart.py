@@ -130,13 +130,14 @@ def main() -> None:
     print(f"Written: {write_page(Results(named, *results_in(folder)), chosen.out or ROOT / 'docs')}")
 
 
-def results_in(folder: Path) -> tuple[list[str], list[Row], list[Claim], bool]:
-    """Comments and rows, claims if they were measured, and whether the steps of a simulation were."""
+def results_in(folder: Path) -> tuple[list[str], list[Row], list[Claim], bool, bool]:
+    """Comments and rows, claims if they were measured, and whether steps of a simulation and round bodies were."""
     claims = folder / "claims.csv"
     return (
         *read(folder / "speed.csv", Row),
         read(claims, Claim)[1] if claims.exists() else [],
         (folder / "steps.csv").exists(),
+        (folder / "round.csv").exists(),
     )
 
 

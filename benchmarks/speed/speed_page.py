@@ -51,6 +51,7 @@ class Results:
     rows: list[Row]
     claims: list[Claim]
     steps: bool  # whether the steps of a simulation were measured, too
+    round: bool  # and all classes of round bodies
 
 
 def write_page(results: Results, folder: Path) -> Path:
@@ -149,6 +150,7 @@ def text(results: Results) -> str:
         "missing": missing(rows),
         "results": results.folder,
         "notes": "\n".join(f"    {line}" for line in results.notes),
+        "round": ROUND if results.round else "This was not measured.",
         "steps": STEPS if results.steps else "This was not measured.",
         "claims": claims_text(results.claims, *by_claim) if results.claims else "They were not measured.",
     }
@@ -158,6 +160,11 @@ def text(results: Results) -> str:
 STEPS = """[Where the time of a step goes](steps.md) is a page of its own: piles of boxes, beside pybullet's own step.
 
 ![Time of a step per box, by its parts, and of the whole, over the number of boxes](steps.png)"""
+
+ROUND = """[Round bodies beside boxes](round.md) is a page of its own: every two kinds of shapes, in single calls and in
+batches, meshes with margins, and scenes.
+
+![The median and the slowest hundredth of every class of pairs, over the time of a call](round.png)"""
 
 CLAIMS = """![Time over the vertices of a pair and over the number of bodies](speed_claims.png)
 

@@ -41,16 +41,16 @@ def chart(
     ] = None,
     page: Annotated[bool, typer.Option("--page", help="Only draw, from the results there are.")] = False,
 ) -> None:
-    """Time this package and others on the same pairs and chart error over time: for a checkout, twenty minutes.
+    """Time this package and others on the same pairs and chart error over time: for a checkout, half an hour.
 
-    Then, unless pairs or methods are chosen, chart where the time of a step goes. Volumes are compared with the exact
-    truth, or with single calls; the exit code is 1 if one of this package is wrong.
+    Then, unless pairs or methods are chosen, chart what round bodies cost and where the time of a step goes. Volumes
+    are compared with the exact truth, or with single calls; the exit code is 1 if one of this package is wrong.
     """
     chosen = [f"--family={name}" for name in family or ()] + [f"--method={name}" for name in method or ()]
     common = [*([f"--out={out}"] if out else []), *["--page"] * page]
     code = _run_benchmark("chart", f"--seconds={seconds}", *chosen, *common)
-    if not code and not chosen:
-        code = _run_benchmark("scene_steps", *common)
+    if not chosen:
+        code = code or _run_benchmark("round_bodies", *common) or _run_benchmark("scene_steps", *common)
     raise typer.Exit(code)
 
 

@@ -44,7 +44,7 @@ def test_a_volume_that_is_not_that_of_a_single_call_ends_the_run(small, tmp_path
 @pytest.mark.parametrize(
     ("asked", "code", "started"),
     [
-        ({}, 0, ["chart.py", "scene_steps.py"]),
+        ({}, 0, ["chart.py", "round_bodies.py", "scene_steps.py"]),
         ({}, 1, ["chart.py"]),
         ({"family": ["box deep"]}, 0, ["chart.py"]),
     ],
