@@ -288,6 +288,27 @@ def test_a_rounded_hull_inside_a_box_has_the_volume_of_steiner():
     assert_allclose(found.centroid, rounded.centroid, atol=1e-12)
 
 
+def test_halves_of_a_rounded_hull_of_a_thousand_corners_have_the_volume_of_steiner():
+    corners = np.random.default_rng(3).normal(size=(1000, 3))
+    rounded = RoundedHull(corners / np.linalg.norm(corners, axis=1, keepdims=True), 0.05)
+    halves = [overlap(rounded, Placed(Box([2, 2, 2]), (side * 2 + 0.1, 0, 0))) for side in (-1, 1)]
+    assert [half.way for half in halves] == ["slicing", "slicing"]
+    assert sum(half.volume for half in halves) == pytest.approx(rounded.volume, rel=EXACT)
+
+
+@pytest.mark.parametrize("slivers", [90, 300, 3000])
+def test_a_ball_meets_a_rounded_cone_of_many_slivers_at_its_rim(slivers):
+    turns = 2 * np.pi * (np.arange(slivers) + 0.5) / slivers
+    rim = np.column_stack([np.cos(turns), np.sin(turns), 0 * turns])
+    cone = RoundedHull(np.vstack([rim, [[0, 0, 1]]]), 0.02)
+    ball = Placed(Sphere(0.3), (1.3, 0.1, 0.05))
+    found = overlap(cone, ball)
+    # The same of no more than the slivers that are near, and one corner far from them.
+    near = RoundedHull(np.vstack([rim[rim[:, 0] > 0.9], [[0, 0, 1], [0, 0, 0]]]), 0.02)
+    assert found.way == overlap(near, ball).way == "slicing"
+    assert found.volume == pytest.approx(overlap(near, ball).volume, rel=EXACT)
+
+
 @pytest.mark.parametrize(
     ("first", "second", "seed"),
     [("sphere", "box", 1), ("capsule", "cylinder", 4)],

@@ -7,6 +7,13 @@
 namespace overlapper::slicing {
 namespace {
 
+/// Walls that a piece is cut with in the order in which they come. Every cut looks at all corners, so that of more,
+/// those that cut the deepest go first, a few at a time, and those that do not reach what is left are dropped.
+constexpr size_t kMostInOrder = 128;
+constexpr size_t kDeepest = 16;
+/// Corners beyond which a piece of many walls is cut no more: all that may matter stay.
+constexpr size_t kMostCorners = 512;
+
 /// From a round's centre or axis to a point; unit, or zero.
 Vec3 outward(const Round& round, Vec3 point) {
   Vec3 from = point - rounded(round.centre);
@@ -28,35 +35,58 @@ void Culling::look_at(const Pieces& a, const Pieces& b, const Enclosure& common)
   enclose(b, common, b_);
 }
 
-void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side) const {
+bool Culling::cut_around(const Pieces& pieces, const Piece& piece) {
+  uncut_.clear();
+  for (int w = piece.first_wall; w < piece.first_wall + piece.walls; ++w)
+    uncut_.push_back({{rounded(pieces.walls[w].normal), pieces.walls[w].slack.head, w}, 0});
+  while (uncut_.size() > kMostInOrder) {
+    for (Cut& cut : uncut_) {
+      cancellation_point(around_.corners.size());
+      cut.depth = around_.range(cut.face.normal).second - cut.face.slack;
+    }
+    std::erase_if(uncut_, [&](const Cut& cut) { return cut.depth < -margin_; });
+    if (around_.corners.size() > kMostCorners) return true;
+    const size_t few = std::min(kDeepest, uncut_.size());
+    std::ranges::partial_sort(uncut_, uncut_.begin() + few, std::ranges::greater{}, &Cut::depth);
+    for (size_t i = 0; i < few; ++i)
+      if (!around_.cut(uncut_[i].face)) return false;
+    uncut_.erase(uncut_.begin(), uncut_.begin() + few);
+  }
+  for (const Cut& cut : uncut_) {
+    cancellation_point(around_.corners.size());
+    if (!around_.cut(cut.face)) return false;
+  }
+  uncut_.clear();
+  return true;
+}
+
+void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side) {
   side.pieces = &pieces;
   if (side.parts.size() < pieces.pieces.size()) side.parts.resize(pieces.pieces.size());
   for (size_t i = 0; i < pieces.pieces.size(); ++i) {
     cancellation_point(common.corners.size());
     const Piece& piece = pieces.pieces[i];
     Part& part = side.parts[i];
-    part.around = common;
-    part.walls.clear();
-    bool something = true;
-    for (int w = piece.first_wall; something && w < piece.first_wall + piece.walls; ++w) {
-      cancellation_point(part.around.corners.size());
-      const Wall& wall = pieces.walls[w];
-      something = part.around.cut({rounded(wall.normal), wall.slack.head, w});
-    }
+    around_ = common;
+    bool something = cut_around(pieces, piece);
     // Planes that touch a round where the rest is: the second time, less of that is left.
     for (int again = 0; something && piece.round >= 0 && again < 2; ++again) {
       const Round& round = pieces.rounds[piece.round];
-      const Vec3 normal = outward(round, part.around.middle());
-      if (normal != Vec3{}) something = part.around.cut({normal, reach(round, normal) + margin_, kNoWall});
+      const Vec3 normal = outward(round, around_.middle());
+      if (normal != Vec3{}) something = around_.cut({normal, reach(round, normal) + margin_, kNoWall});
     }
     part.empty = !something;
     if (part.empty) continue;
-    part.middle = part.around.middle(), part.box = part.around.bounds();
-    for (const Enclosure::Corner& corner : part.around.corners)
-      for (const int face : corner.face)
-        if (const int wall = part.around.faces[face].wall; wall != kNoWall) part.walls.push_back(wall);
+    around_.drop_faces();
+    part.around = around_;
+    part.middle = around_.middle(), part.box = around_.bounds();
+    part.walls.clear(), part.uncut.clear();
+    for (const Cut& cut : uncut_) part.uncut.push_back(cut.face.wall);
+    std::ranges::sort(part.uncut);
+    part.walls = part.uncut;
+    for (const Enclosure::Face& face : around_.faces)
+      if (face.wall != kNoWall) part.walls.push_back(face.wall);
     std::ranges::sort(part.walls);
-    part.walls.erase(std::unique(part.walls.begin(), part.walls.end()), part.walls.end());
   }
 }
 
@@ -99,11 +129,15 @@ bool Culling::share(const Meeting& meeting, Enclosure& polytope) const {
     const auto at = std::ranges::find(known, face.wall);
     face.wall = at == known.end() ? kNoWall : static_cast<int>(at - known.begin()) + (from_p ? 0 : of_p);
   }
-  for (int w = from_p ? of_p : 0; w < (from_p ? size : of_p); ++w) {
+  const auto cut = [&](int w) {
     cancellation_point(polytope.corners.size());
-    const Wall& wall = meeting.walls[w];
-    if (!polytope.cut({rounded(wall.normal), wall.slack.head, w})) return false;
-  }
+    return polytope.cut({rounded(meeting.walls[w].normal), meeting.walls[w].slack.head, w});
+  };
+  const std::vector<int>& uncut = (from_p ? a_.parts[meeting.p] : b_.parts[meeting.q]).uncut;
+  for (size_t i = 0; i < known.size() && !uncut.empty(); ++i)
+    if (std::ranges::binary_search(uncut, known[i]) && !cut(static_cast<int>(i) + (from_p ? 0 : of_p))) return false;
+  for (int w = from_p ? of_p : 0; w < (from_p ? size : of_p); ++w)
+    if (!cut(w)) return false;
   return true;
 }
 

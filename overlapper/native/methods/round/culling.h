@@ -32,19 +32,30 @@ class Culling {
     Enclosure around;
     Vec3 middle;
     Bounds box;
-    std::vector<int> walls;  ///< those of which something is left
+    std::vector<int> walls;  ///< those of which something is left, and
+    std::vector<int> uncut;  ///< those that it has not been cut with, though they may matter; both sorted
     bool empty = false;
   };
   struct Side {
     const Pieces* pieces = nullptr;
     std::vector<Part> parts;
   };
-  void enclose(const Pieces& pieces, const Enclosure& common, Side& side) const;
+  /// A wall that a piece may be cut with, and by how much it would be.
+  struct Cut {
+    Enclosure::Face face;
+    double depth;
+  };
+  void enclose(const Pieces& pieces, const Enclosure& common, Side& side);
+  /// Cuts around_ with the walls of a piece; false if that leaves nothing. Those that it was not cut with, and that may
+  /// matter, are left in uncut_.
+  bool cut_around(const Pieces& pieces, const Piece& piece);
   bool keep_walls(const Side& side, int piece, const Part& other, std::vector<int>& kept,
                   std::vector<Wall>& walls) const;
   bool beyond(const Round& round, const Part& other) const;
 
   Side a_, b_;
+  Enclosure around_;  ///< what a piece leaves of the polytope around the common set
+  std::vector<Cut> uncut_;
   double margin_ = 0;  ///< m: of rounding
 };
 

@@ -77,6 +77,20 @@ bool Enclosure::cut(const Face& face) {
   return true;
 }
 
+void Enclosure::drop_faces() {
+  thread_local std::vector<int> of_thread;
+  std::vector<int>& place = of_thread;  // every use of what is a thread's own looks for it
+  place.assign(faces.size(), -1);
+  for (const Corner& corner : corners)
+    for (const int face : corner.face) place[face] = 0;
+  int next = 0;
+  for (size_t i = 0; i < faces.size(); ++i)
+    if (place[i] == 0) faces[next] = faces[i], place[i] = next++;
+  faces.resize(next);
+  for (Corner& corner : corners)
+    for (int& face : corner.face) face = place[face];
+}
+
 bool Enclosure::excludes(Vec3 point) const {
   return std::ranges::any_of(faces, [&](const Face& face) { return dot(face.normal, point) > face.slack; });
 }

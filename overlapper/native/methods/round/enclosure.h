@@ -29,6 +29,8 @@ struct Enclosure {
   void become(const Bounds& box);
   /// False if the face leaves nothing, and then the polytope is as it was.
   bool cut(const Face& face);
+  /// Leaves out the faces of which nothing is left.
+  void drop_faces();
 
   /// Calls use(face, ring) for each face that is left, with its corners, counter-clockwise from outside.
   template <class Use>

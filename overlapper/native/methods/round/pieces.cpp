@@ -8,6 +8,10 @@
 namespace overlapper::slicing {
 namespace {
 
+/// Planes that are cut with, the six of the box included, to enclose the common set: what does so need not be tight,
+/// and every piece of a body is cut out of it.
+constexpr size_t kMostFaces = 64;
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// How far a shape reaches from its own origin; of a half-space, how far its plane is.
@@ -191,7 +195,9 @@ class Cutter {
     const double here = dot(n, inside_) + slack.head;
     if (common_) {
       cancellation_point(common_->corners.size());
-      if (common_->least(n) > slack.head + margin_) {
+      const auto [least, most] = common_->range(n);
+      if (most < slack.head - margin_) return;
+      if (least > slack.head + margin_) {
         empty_ = true;
         return;
       }
@@ -295,21 +301,29 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result) {
   const double margin = 1e-12 * (norm(size) + norm(inside) + norm(a.pose.translation) + norm(b.pose.translation));
   const Vec3 wider = margin * Vec3{1, 1, 1};
   result.become({lower - wider, upper + wider});
+  thread_local std::vector<Enclosure::Face> planes;
+  planes.clear();
   for (const Placed* body : {&a, &b}) {
     const Vec3 origin = body->pose.translation - inside;
-    const auto cut = [&](const Plane& plane, double more) {
-      cancellation_point(result.corners.size());
+    const auto add = [&](const Plane& plane, double more) {
+      cancellation_point();
       const Vec3 normal = body->pose.rotation * plane.normal;
-      result.cut({normal, plane.offset + dot(normal, origin) + more + margin, kNoWall});
+      planes.push_back({normal, plane.offset + dot(normal, origin) + more + margin, kNoWall});
     };
     if (const HullData* hull = polytope_of(body->shape)) {
       const double more = core_radius(body->shape) + hull->flatness;
-      for (const Plane& plane : hull->planes) cut(plane, more);
+      for (const Plane& plane : hull->planes) add(plane, more);
     } else if (const Box* box = std::get_if<Box>(&body->shape)) {
-      for (int f = 0; f < 6; ++f) cut(side(*box, f), 0);
+      for (int f = 0; f < 6; ++f) add(side(*box, f), 0);
     } else if (const HalfSpace* half = std::get_if<HalfSpace>(&body->shape)) {
-      cut(half->plane, 0);
+      add(half->plane, 0);
     }
+  }
+  std::ranges::sort(planes, {}, &Enclosure::Face::slack);
+  for (const Enclosure::Face& plane : planes) {
+    if (result.faces.size() >= kMostFaces) break;
+    cancellation_point(result.corners.size());
+    result.cut(plane);
   }
 }
 

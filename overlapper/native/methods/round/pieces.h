@@ -45,8 +45,8 @@ struct Pieces {
 /// How far from a point a body reaches at most.
 double extent(const Placed& body, Vec3 point);
 
-/// A polytope around the common set of two bodies of which one is bounded, about the point `inside`: what planes of
-/// both leave of a box, and a little more.
+/// A polytope around the common set of two bodies of which one is bounded, about the point `inside`: what those planes
+/// of both that are nearest to that point leave of a box, and a little more.
 void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result);
 
 /// Cuts a body; pieces and walls that `other` does not reach are left out, and so are pieces outside of what encloses
