@@ -23,11 +23,15 @@ struct Disc {
   double square = 0;     ///< of the radius ρ; 0 if the plane does not reach the ball
   bool around = true;    ///< the face holds the middle, as none of its edges lies this side of that
   bool touched = false;  ///< by an edge
+  int ends = 0;          ///< of edges, on the sphere
   double angle = 0;      ///< of the edges' parts inside the ball, as the middle sees them
   double sizes = 0;      ///< of these
   double twice = 0;      ///< twice the area of their triangles
   double second = 0;     ///< four times ∫ |y|² dA over the triangles
-  Vec3 third;            ///< ∫ (|y|² − ρ²) y dA over triangles and sectors
+  Vec3 first;            ///< ∫ y dA over triangles and sectors
+  Vec3 third;            ///< ∫ (|y|² − ρ²) y dA over the same
+  /// Where the ball's centre is a corner of the face, from there along the edge that comes and the one that goes.
+  Vec3 comes, goes;
 };
 
 /// The part of an edge inside the ball, as the middle of a disc sees it. Lengths along the edge count from the point
@@ -40,6 +44,14 @@ struct Chord {
   double distance2(double t) const { return height * height + t * t; }
 };
 
+/// Takes from a disc the sector from one unit vector to another, of which directions are to sum to the opposite of
+/// those of the edges.
+void add_sector(Vec3 out, bool with_second, Disc& disc) {
+  const double cube = disc.square * std::sqrt(disc.square);
+  disc.first += cube / 3 * out;
+  if (with_second) disc.third -= 2.0 / 15 * disc.square * cube * out;
+}
+
 /// Returns the size of the angle.
 double add(const Chord& chord, bool with_second, Disc& disc) {
   const auto [out, along, h, from, to] = chord;
@@ -49,14 +61,16 @@ double add(const Chord& chord, bool with_second, Disc& disc) {
   disc.angle += angle, disc.sizes += std::abs(angle);
   disc.twice += h * length;
   disc.second += h * (h2 * length + cubes / 3);
+  disc.first += h * length / 6 * (2 * h * out + (from + to) * along);
   if (with_second) {
     const double radius2 = disc.square, part = h2 / 5 - radius2 / 3;
     const double squares = length * (from + to), fourths = squares * (from * from + to * to);
     disc.third += h2 * (part * length + cubes / 15) * out + h * (part * squares / 2 + fourths / 20) * along;
-    // The directions of sectors sum to the opposite of those of the edges.
+  }
+  // Seen from an end of itself, it takes up no angle.
+  if (chord.distance2(from) > 0 && chord.distance2(to) > 0) {
     const double begin = 1 / std::sqrt(chord.distance2(from)), end = 1 / std::sqrt(chord.distance2(to));
-    const double sector = 2.0 / 15 * radius2 * radius2 * std::sqrt(radius2);
-    disc.third += sector * ((to * end - from * begin) * out - h * (end - begin) * along);
+    add_sector((from * begin - to * end) * out + h * (end - begin) * along, with_second, disc);
   }
   return std::abs(angle);
 }
@@ -83,6 +97,9 @@ double turn_at(double t, double radius, double cosine, double sine, double heigh
 // edge a disc's middle lies are each decided once, for whatever depends on it. Decided wrongly by rounding, they are
 // right for a ball or a plane that is off by as much; so tangent planes and grazed edges need no care.
 //
+// Where the ball's centre is itself a corner, it is seen from there as if it were a little farther along the edge that
+// leaves it: the middles of its faces' discs are outside.
+//
 // The error. Every term has ten roundings or fewer, and every sum on the way one more. An edge is where rounding has
 // put it, to kPlacing of how far its numbers reach: seen along it, the two planes and their line still meet, so that
 // what it gives to the volume, a signed part of the ball between its planes and two of its disc's radii, changes by no
@@ -94,8 +111,9 @@ double turn_at(double t, double radius, double cosine, double sine, double heigh
 std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius, bool with_second) {
   thread_local std::vector<Disc> discs;
   thread_local std::vector<char> inside;
+  thread_local std::vector<Section> sections;
   const double r = radius, r2 = r * r, r3 = r * r2;
-  discs.assign(polyhedron.planes.size(), {});
+  discs.assign(polyhedron.planes.size(), {}), sections.assign(polyhedron.planes.size(), {});
   for (size_t f = 0; f < discs.size(); ++f) {
     const double h = -signed_distance(polyhedron.planes[f], centre);
     if (h <= -r) return std::nullopt;
@@ -116,21 +134,33 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     const Vec3 corner = polyhedron.corners[edge.from], between = polyhedron.corners[edge.to] - corner;
     const Vec3 n = polyhedron.planes[edge.left].normal, m = polyhedron.planes[edge.right].normal;
     const double length = std::sqrt(norm2(between));
+    if (length == 0) {  // of corners where more than three faces meet
+      if (!from_inside) continue;
+      for (Disc* disc : {&left, &right}) disc->touched = true, disc->around = disc->around && corner != centre;
+      ++characteristic;
+      continue;
+    }
     const Vec3 p = corner - centre, along = between / length, out = cross(along, n);
     // Seen along the edge, both planes and the line in which they meet, from the one plane's height and the line's. No
     // zero is negative, whose angle would be on the other side.
     const double cosine = dot(n, m), sine = std::max(0.0, dot(out, m));
-    const double height = dot(out, p) + 0.0, other = sine * left.height - cosine * height + 0.0;
+    const bool from_middle = p == Vec3{}, to_middle = polyhedron.corners[edge.to] == centre;
+    const bool through = from_middle || to_middle;
+    const double height = through ? 0 : dot(out, p) + 0.0;
+    const double other = through ? 0 : sine * left.height - cosine * height + 0.0;
+    if (from_middle) left.goes = right.comes = along;
+    if (to_middle) left.comes = right.goes = -along;
     if (height < 0) left.around = false;
     if (other < 0) right.around = false;
     const double half = std::sqrt(std::max(0.0, left.square - height * height));
-    const double first = dot(p, along), last = first + length;
+    const double first = to_middle ? -length : dot(p, along), last = to_middle ? 0 : first + length;
     if (!from_inside && !to_inside && !(half > 0 && right.square > 0 && first < 0 && last > 0)) continue;
     // An edge along the sphere may seem to end on that beyond a corner: the corner counts.
     const double from = from_inside ? first : std::clamp(-half, first, to_inside ? last : 0);
     const double to = to_inside ? last : std::clamp(half, from_inside ? first : 0, last);
     const auto turn = [&](double t) { return turn_at(t, r, cosine, sine, height * other); };
     const int ends = !from_inside + !to_inside;
+    left.ends += ends, right.ends += ends;
     if (ends == 2 && -from == to) turns += 2 * turn(to);
     else turns += (from_inside ? 0 : turn(-from)) + (to_inside ? 0 : turn(to));
     partial += turns;
@@ -141,12 +171,21 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     ++characteristic;
     const double far = std::abs(first) + std::abs(height) + std::abs(left.height);
     const auto seen = [&](double t) {
-      return 1 / std::sqrt(of_left.distance2(t)) + 1 / std::sqrt(of_right.distance2(t));
+      return through && t == 0 ? 0 : 1 / std::sqrt(of_left.distance2(t)) + 1 / std::sqrt(of_right.distance2(t));
     };
     part.error += kPlacing * far * beside;
     if (from_inside) part.error += kPlacing * far * r3 / 2 * seen(from);
     if (to_inside) part.error += kPlacing * (far + length) * r3 / 2 * seen(to);
     part.error += ends * r3 * (std::abs(dot(along, n)) + std::abs(dot(along, m)) + kPlacing);
+  }
+  for (size_t f = 0; f < discs.size(); ++f) {
+    Disc& disc = discs[f];
+    if (disc.goes == Vec3{}) continue;
+    const Vec3 n = polyhedron.planes[f].normal;
+    const double angle = std::atan2(dot(n, cross(disc.comes, disc.goes)), dot(disc.comes, disc.goes));
+    disc.around = false;
+    disc.angle += angle, disc.sizes += std::abs(angle);
+    add_sector(cross(disc.comes - disc.goes, n), with_second, disc);
   }
   double curved = 2 * kPi * characteristic - turns, cones = 0;
   double sizes = 2 * kPi * std::abs(characteristic) + turns, cone_sizes = 0;
@@ -158,7 +197,10 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     if (!whole_turn && !disc.touched) continue;
     ++part.faces;
     const Vec3 n = polyhedron.planes[f].normal;
-    const double h = disc.height, turn = whole_turn ? 2 * kPi : 0, arcs = turn - disc.angle;
+    // Without an end on the sphere, edges are the whole border, and what they turn beside a whole turn is rounding.
+    const double h = disc.height, turn = whole_turn ? 2 * kPi : 0, rest = turn - disc.angle;
+    const double arcs = disc.touched && disc.ends == 0 ? 0 : rest;
+    if (!(arcs > -kOpen && arcs < 2 * kPi + kOpen)) part.error = std::numeric_limits<double>::infinity();
     const double face = (disc.square * arcs + disc.twice) / 2;
     curved += arcs * h / r - 2 * kPi;
     cones += h * face;
@@ -168,6 +210,7 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     flats += face;
     if (f < polyhedron.faces) part.area += face;
     part.flat += face * n;
+    sections[f].area = face, sections[f].first = face * h * n + disc.first;
     const double on_face = (disc.second - disc.square * disc.square * arcs) / 4 - disc.square * disc.twice / 2;
     part.first += on_face / 2 * n;
     if (!with_second) continue;
@@ -194,6 +237,7 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     part.squares = 0.5 * (part.squares + Vec3{each, each, each});
     part.products = 0.5 * part.products;
   }
+  part.sections = sections;
   return part;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "methods/quadric/polyhedron.h"
 
@@ -15,6 +16,7 @@ struct BallPart {
   Vec3 flat;               ///< ∫ n dA over the polyhedron's faces; over the curved part, its opposite
   double area = 0;         ///< m², of the surface without cuts
   int faces = 0;           ///< of the polyhedron, that take part
+  std::span<const Section> sections;  ///< of each of the polyhedron's planes; good until the next part is measured
 };
 
 /// In closed form; nothing if a plane leaves nothing of the ball. The error has no bound where a corner is in the

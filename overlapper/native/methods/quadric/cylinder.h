@@ -8,13 +8,6 @@
 
 namespace overlapper::quadric {
 
-/// The part of a polyhedron's face inside a cylinder.
-struct Section {
-  double area = 0;
-  Vec3 first;              ///< ∫ x dA
-  Vec3 squares, products;  ///< ∫ x², y², z² dA and ∫ yz, zx, xy dA, if asked for
-};
-
 /// What a cylinder without ends about the z axis and a polyhedron share, about the origin.
 struct CylinderPart {
   double volume = 0;

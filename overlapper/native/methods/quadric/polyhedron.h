@@ -15,6 +15,13 @@ struct Polyhedron {
   size_t faces = 0;  ///< the first of the planes; where others have cut it, its surface goes on in the next piece
 };
 
+/// The part of a polyhedron's face inside a quadric.
+struct Section {
+  double area = 0;
+  Vec3 first;              ///< ∫ x dA
+  Vec3 squares, products;  ///< of a cylinder ∫ x², y², z² dA and ∫ yz, zx, xy dA, if asked for
+};
+
 /// A convex polyhedron by the corners around each of its faces, counter-clockwise from outside, which planes cut.
 class Rings {
  public:

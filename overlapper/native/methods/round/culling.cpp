@@ -14,20 +14,20 @@ constexpr size_t kDeepest = 16;
 /// Corners beyond which a piece of many walls is cut no more: all that may matter stay.
 constexpr size_t kMostCorners = 512;
 
-/// From a round's centre or axis to a point; unit, or zero.
-Vec3 outward(const Round& round, Vec3 point) {
-  Vec3 from = point - rounded(round.centre);
-  if (!round.ball) {
-    const Vec3 axis = rounded(round.axis);
-    from = from - dot(from, axis) * axis;
-  }
-  const double length = norm(from);
-  return length > 0 ? from / length : Vec3{};
+}  // namespace
+
+Culling::Solid::Solid(const Round& round) : radius(round.radius) {
+  if (!round.ball) axis = rounded(round.axis);
+  centre = rounded(round.ball ? round.centre : foot(round));
 }
 
-double reach(const Round& round, Vec3 outward) { return dot(outward, rounded(round.centre)) + round.radius; }
-
-}  // namespace
+Vec3 Culling::Solid::outward(Vec3 point) const {
+  Vec3 from = point - centre;
+  // Of what is far along the axis, the first time leaves rounding.
+  for (int again = 0; again < 2; ++again) from -= dot(from, axis) * axis;
+  const double length = std::sqrt(norm2(from));
+  return length > 0 ? from / length : Vec3{};
+}
 
 void Culling::look_at(const Pieces& a, const Pieces& b, const Enclosure& common) {
   margin_ = 1e-13 * common.extent();
@@ -68,12 +68,12 @@ void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side)
     const Piece& piece = pieces.pieces[i];
     Part& part = side.parts[i];
     around_ = common;
+    part.round = piece.round < 0 ? Solid{} : Solid(pieces.rounds[piece.round]);
     bool something = cut_around(pieces, piece);
     // Planes that touch a round where the rest is: the second time, less of that is left.
     for (int again = 0; something && piece.round >= 0 && again < 2; ++again) {
-      const Round& round = pieces.rounds[piece.round];
-      const Vec3 normal = outward(round, around_.middle());
-      if (normal != Vec3{}) something = around_.cut({normal, reach(round, normal) + margin_, kNoWall});
+      const Vec3 normal = part.round.outward(around_.middle());
+      if (normal != Vec3{}) something = around_.cut({normal, part.round.reach(normal) + margin_, kNoWall});
     }
     part.empty = !something;
     if (part.empty) continue;
@@ -102,9 +102,10 @@ bool Culling::keep_walls(const Side& side, int piece, const Part& other, std::ve
   return true;
 }
 
-bool Culling::beyond(const Round& round, const Part& other) const {
-  const Vec3 normal = outward(round, other.middle);
-  return normal != Vec3{} && other.around.least(normal) > reach(round, normal) + margin_;
+bool Culling::beyond(const Part& part, const Part& other) const {
+  if (!(part.round.radius > 0)) return false;
+  const Vec3 normal = part.round.outward(other.middle);
+  return normal != Vec3{} && other.around.least(normal) > part.round.reach(normal) + margin_;
 }
 
 bool Culling::meet(int p, int q, Meeting& meeting) const {
@@ -115,8 +116,7 @@ bool Culling::meet(int p, int q, Meeting& meeting) const {
   if (lower.x > upper.x || lower.y > upper.y || lower.z > upper.z ||
       !keep_walls(a_, p, two, meeting.of_p, meeting.walls) || !keep_walls(b_, q, one, meeting.of_q, meeting.walls))
     return false;
-  const int r = a_.pieces->pieces[p].round, s = b_.pieces->pieces[q].round;
-  return !(r >= 0 && beyond(a_.pieces->rounds[r], two)) && !(s >= 0 && beyond(b_.pieces->rounds[s], one));
+  return !beyond(one, two) && !beyond(two, one);
 }
 
 bool Culling::share(const Meeting& meeting, Enclosure& polytope) const {

@@ -28,8 +28,20 @@ class Culling {
   bool share(const Meeting& meeting, Enclosure& polytope) const;
 
  private:
+  /// A ball, or a cylinder by the point of its axis that is nearest to the origin; nothing without a radius.
+  struct Solid {
+    Vec3 centre, axis;
+    double radius = 0;
+
+    Solid() = default;
+    explicit Solid(const Round& round);
+    /// From the centre or the axis to a point; unit, or zero.
+    Vec3 outward(Vec3 point) const;
+    double reach(Vec3 outward_normal) const { return dot(outward_normal, centre) + radius; }
+  };
   struct Part {
     Enclosure around;
+    Solid round;
     Vec3 middle;
     Bounds box;
     std::vector<int> walls;  ///< those of which something is left, and
@@ -51,7 +63,7 @@ class Culling {
   bool cut_around(const Pieces& pieces, const Piece& piece);
   bool keep_walls(const Side& side, int piece, const Part& other, std::vector<int>& kept,
                   std::vector<Wall>& walls) const;
-  bool beyond(const Round& round, const Part& other) const;
+  bool beyond(const Part& part, const Part& other) const;
 
   Side a_, b_;
   Enclosure around_;  ///< what a piece leaves of the polytope around the common set

@@ -91,6 +91,18 @@ void Enclosure::drop_faces() {
     for (int& face : corner.face) face = place[face];
 }
 
+void Enclosure::number_faces(std::vector<std::array<int, 3>>& number, std::vector<int>& left) const {
+  number.assign(corners.size(), {kNoWall, kNoWall, kNoWall});
+  left.clear();
+  for (size_t first = 0; first < corners.size(); ++first)
+    for (int k = 0; k < 3; ++k) {
+      if (number[first][k] != kNoWall) continue;
+      for_ring(static_cast<int>(first), k,
+               [&](int corner, int along) { number[corner][along] = static_cast<int>(left.size()); });
+      left.push_back(corners[first].face[k]);
+    }
+}
+
 bool Enclosure::excludes(Vec3 point) const {
   return std::ranges::any_of(faces, [&](const Face& face) { return dot(face.normal, point) > face.slack; });
 }
@@ -117,9 +129,20 @@ Vec3 Enclosure::middle() const {
 }
 
 double Enclosure::extent() const {
-  double extent = 0;
-  for (const Corner& corner : corners) extent = std::max(extent, norm(corner.at));
-  return extent;
+  double extent2 = 0;
+  for (const Corner& corner : corners) extent2 = std::max(extent2, norm2(corner.at));
+  return std::sqrt(extent2);
+}
+
+double Enclosure::surface() const {
+  double twice = 0;
+  for_faces([&](const Face& face, std::span<const int> ring) {
+    Vec3 sum;
+    for (size_t i = 2; i < ring.size(); ++i)
+      sum += cross(corners[ring[i - 1]].at - corners[ring[0]].at, corners[ring[i]].at - corners[ring[0]].at);
+    twice += std::abs(dot(face.normal, sum));
+  });
+  return twice / 2;
 }
 
 }  // namespace overlapper::slicing

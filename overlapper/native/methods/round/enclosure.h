@@ -23,7 +23,7 @@ struct Enclosure {
     std::array<int, 3> beside;  ///< the corners at the other ends of its edges, counter-clockwise from outside
     std::array<int, 3> face;    ///< between an edge and the next
   };
-  std::vector<Face> faces;  ///< all that have cut it, of which further ones may have left nothing
+  std::vector<Face> faces;  ///< all that have cut it; of some, further ones may have left nothing
   std::vector<Corner> corners;
 
   void become(const Bounds& box);
@@ -35,6 +35,13 @@ struct Enclosure {
   /// Calls use(face, ring) for each face that is left, with its corners, counter-clockwise from outside.
   template <class Use>
   void for_faces(Use use) const;
+  /// Calls use(corner, edge) around the face to the left of a corner's edge, beginning with these.
+  template <class Use>
+  void for_ring(int corner, int edge, Use use) const;
+
+  /// Numbers what is left of faces, of which one may be left in two places by rounding: `number[i][k]` of a corner
+  /// between its edge k and the next, and `left` the face that each number is of.
+  void number_faces(std::vector<std::array<int, 3>>& number, std::vector<int>& left) const;
 
   /// Whether it is surely not inside: what is no number may be.
   bool excludes(Vec3 point) const;
@@ -43,7 +50,8 @@ struct Enclosure {
   std::pair<double, double> range(Vec3 direction) const;
   double least(Vec3 direction) const { return range(direction).first; }
   Vec3 middle() const;
-  double extent() const;  ///< no corner is farther from the origin
+  double extent() const;   ///< no corner is farther from the origin
+  double surface() const;  ///< its area
 };
 
 inline constexpr int kNoWall = -1;
@@ -57,17 +65,24 @@ void Enclosure::for_faces(Use use) const {
     for (int k = 0; k < 3; ++k) {
       if (seen[first][k]) continue;
       ring.clear();
-      int from = static_cast<int>(first), along = k;
-      do {
-        ring.push_back(from);
-        seen[from][along] = true;
-        const int to = corners[from].beside[along];
-        const auto& back = corners[to].beside;
-        along = ((back[0] == from ? 0 : back[1] == from ? 1 : 2) + 2) % 3;
-        from = to;
-      } while (!seen[from][along]);
+      for_ring(static_cast<int>(first), k, [&](int corner, int along) {
+        ring.push_back(corner);
+        seen[corner][along] = true;
+      });
       use(faces[corners[first].face[k]], std::span<const int>(ring));
     }
+}
+
+template <class Use>
+void Enclosure::for_ring(int first, int edge, Use use) const {
+  int from = first, along = edge;
+  do {
+    use(from, along);
+    const int to = corners[from].beside[along];
+    const auto& back = corners[to].beside;
+    along = ((back[0] == from ? 0 : back[1] == from ? 1 : 2) + 2) % 3;
+    from = to;
+  } while (from != first || along != edge);
 }
 
 }  // namespace overlapper::slicing

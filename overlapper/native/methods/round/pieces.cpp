@@ -325,6 +325,7 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result) {
     cancellation_point(result.corners.size());
     result.cut(plane);
   }
+  result.drop_faces();
 }
 
 void cut(const Placed& body, const Placed& other, const Enclosure* common, int owner, Vec3 reference,

@@ -19,6 +19,11 @@ struct Round {
   int owner;
 };
 
+/// The point of a cylinder's axis that is nearest to the origin.
+inline WideVector foot(const Round& cylinder) {
+  return cylinder.centre - dot(cylinder.centre, cylinder.axis) * cylinder.axis;
+}
+
 /// { X : dot(normal, X) <= slack }, about the same point.
 struct Wall {
   WideVector normal;  ///< unit

@@ -8,6 +8,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/scratch.h"
+#include "methods/quadric/ball.h"
 #include "methods/quadric/cylinder.h"
 #include "methods/round/culling.h"
 #include "methods/round/nodes.h"
@@ -23,7 +24,9 @@ using slicing::Wall;
 /// The fraction of a volume that may stay open before rules are made finer.
 constexpr double kClosed = 1e-12;
 /// The fraction of a volume up to which the rounding of a polytope's corners does not matter.
-constexpr double kSure = 2e-13;
+constexpr double kSure = 5e-13;
+/// The same of second moments about the centroid.
+constexpr double kSureOfMoments = 5e-11;
 /// Sums of area vectors are right to this fraction of the area.
 constexpr double kSummation = 16 * DBL_EPSILON;
 
@@ -105,10 +108,11 @@ class Measuring {
     return add_stack();
   }
 
-  /// In closed form, what walls leave of a polytope and of one cylinder at most, whose faces tell which of the walls
-  /// they are. False, and nothing is added, if doubles are not sure of it to a fraction of the whole that matters.
-  bool add_in_closed_form(const Round* cylinder, const slicing::Enclosure& polytope, std::span<const Wall> walls) {
-    return cylinder ? add_cylinder(*cylinder, polytope, walls) : add_polytope(polytope, walls);
+  /// In closed form, what a polytope, whose faces tell which of the walls they are, and one round at most share. False,
+  /// and nothing is added, if doubles are not sure of it to a fraction of the whole that matters.
+  bool add_in_closed_form(const Round* round, const slicing::Enclosure& polytope, std::span<const Wall> walls) {
+    if (!round) return add_polytope(polytope, walls);
+    return round->ball ? add_ball(*round, polytope, walls) : add_cylinder(*round, polytope, walls);
   }
 
   Totals totals;
@@ -318,7 +322,7 @@ class Measuring {
   bool add_cylinder(const Round& cylinder, const slicing::Enclosure& polytope, std::span<const Wall> walls) {
     const Vec3 axis = rounded(cylinder.axis), across = any_orthogonal(axis);
     const Mat3 turn{across, cross(axis, across), axis};
-    const Vec3 centre = rounded(cylinder.centre - dot(cylinder.centre, cylinder.axis) * cylinder.axis);
+    const Vec3 centre = rounded(slicing::foot(cylinder));
     rings_.clear(), owners_.clear();
     for (const slicing::Enclosure::Corner& corner : polytope.corners) rings_.add_corner(turn * (corner.at - centre));
     polytope.for_faces([&](const slicing::Enclosure::Face& face, std::span<const int> ring) {
@@ -328,30 +332,82 @@ class Measuring {
     const auto part = quadric::measure_cylinder(rings_, cylinder.radius, true);
     if (!part || !(part->volume >= 0)) return false;
     Totals piece;
-    piece.volume = part->volume;
-    piece.area = part->whole_area, piece.border = part->whole_area;
+    piece.volume = part->volume, piece.error = part->error, piece.first = part->first;
+    piece.squares = part->squares, piece.products = part->products;
+    const Pull& curved = part->curved;
+    if (!add_part(cylinder.owner, curved, part->whole_area, rings_.planes(), part->sections, turn, centre, polytope,
+                  piece))
+      return false;
+    if (patch) add_to_patch(cylinder, *part, turn, centre);
+    return true;
+  }
+
+  /// The centre may be a corner of the polytope, where faces that go through it meet.
+  bool add_ball(const Round& ball, const slicing::Enclosure& polytope, std::span<const Wall> walls) {
+    if (patch) return false;
+    const Vec3 centre = rounded(ball.centre);
+    const double nothing = 16 * DBL_EPSILON * (polytope.extent() + norm(centre));
+    corners_.clear(), planes_.clear(), edges_.clear(), owners_.clear();
+    polytope.number_faces(number_, left_);
+    for (const int f : left_) {
+      const slicing::Enclosure::Face& face = polytope.faces[f];
+      const double offset = face.slack - dot(face.normal, centre);
+      planes_.push_back({face.normal, std::abs(offset) <= nothing ? 0 : offset});
+      owners_.push_back(face.wall == slicing::kNoWall ? kNobody : walls[face.wall].owner);
+    }
+    for (size_t i = 0; i < polytope.corners.size(); ++i) {
+      const slicing::Enclosure::Corner& corner = polytope.corners[i];
+      int through = 0;
+      for (int k = 0; k < 3; ++k) {
+        const int left = number_[i][k];
+        through += planes_[left].offset == 0;
+        if (corner.beside[k] > static_cast<int>(i))
+          edges_.push_back({static_cast<int>(i), corner.beside[k], left, number_[i][(k + 2) % 3]});
+      }
+      const Vec3 at = corner.at - centre;
+      corners_.push_back(through == 3 && norm(at) <= 1e3 * nothing ? Vec3{} : at);
+    }
+    const auto part = quadric::measure_ball({corners_, planes_, edges_, planes_.size()}, {}, ball.radius, true);
+    if (!part || part->sections.empty()) return true;  // nothing
+    if (!(part->volume >= 0)) return false;
+    Totals piece;
+    piece.volume = part->volume, piece.error = part->error + nothing * part->area, piece.first = part->first;
+    piece.squares = part->squares, piece.products = part->products;
+    return add_part(ball.owner, {-part->flat, {}}, part->area, planes_, part->sections, {}, centre, polytope, piece);
+  }
+
+  /// Of part of a round, what is the same for all: `piece` has its volume and the integrals over that about a centre,
+  /// in axes that `turn` turns to. Area vectors and the integrals of sections are about the same.
+  bool add_part(int round_owner, const Pull& curved, double whole_area, std::span<const Plane> planes,
+                std::span<const quadric::Section> sections, const Mat3& turn, Vec3 centre,
+                const slicing::Enclosure& polytope, Totals& piece) {
+    piece.area = piece.border = whole_area;
     const auto turned = [&](Vec3 v) { return apply_transposed(turn, v); };
     const auto act = [&](int body, const Pull& local) {
       const Vec3 force = turned(local.force);
       if (body == 0) piece.pull += force, piece.moment += turned(local.moment) + cross(centre, force);
       if (body != slicing::kCut) piece.unbalanced += force;
     };
-    act(cylinder.owner, part->curved);
+    if (!(piece.volume > 0)) return piece.volume == 0;
+    act(round_owner, curved);
     for (size_t f = 0; f < owners_.size(); ++f) {
-      const quadric::Section& section = part->sections[f];
+      const quadric::Section& section = sections[f];
       if (section.area == 0) continue;
       if (owners_[f] == kNobody) return false;
-      const Vec3 n = rings_.planes()[f].normal;
-      act(owners_[f], {section.area * n, cross(section.first, n)});
+      act(owners_[f], {section.area * planes[f].normal, cross(section.first, planes[f].normal)});
       if (owners_[f] == slicing::kCut) piece.area -= section.area;
     }
-    piece.error = part->error + rounding_of(polytope, piece.border);
-    if (!sure(piece)) return false;
-    const Vec3 first = turned(part->first);
-    piece.first = first + piece.volume * centre;
-    add_second({turn.row0, turn.row1, turn.row2}, piece.volume, part->squares, part->products, first, centre, piece);
+    piece.error += rounding_of(polytope, piece.border);
+    // Second moments lose as much more as the part is farther from the centre than it is wide.
+    const Vec3 mean = piece.first / piece.volume, q = piece.squares / piece.volume;
+    const double spread2 = q.x + q.y + q.z - norm2(mean);
+    if (!(piece.error * norm2(mean) <= kSureOfMoments * (totals.volume + piece.volume) * spread2)) return false;
+    // What is convex has less surface than what is convex around it, but for a wrong turn.
+    if (!sure(piece) || !(piece.border <= (1 + 1e-9) * polytope.surface())) return false;
+    const Vec3 first = turned(piece.first), squares = piece.squares, products = piece.products;
+    piece.first = first + piece.volume * centre, piece.squares = piece.products = {};
+    add_second({turn.row0, turn.row1, turn.row2}, piece.volume, squares, products, first, centre, piece);
     totals.add(piece);
-    if (patch) add_to_patch(cylinder, *part, turn, centre);
     return true;
   }
 
@@ -502,6 +558,11 @@ class Measuring {
   std::vector<Wall> walls_, with_radical_;
   std::vector<std::pair<double, int>> by_length_;  ///< walls, by what their normals are along a line
   quadric::Rings rings_;
+  std::vector<Vec3> corners_;
+  std::vector<Plane> planes_;
+  std::vector<Edge> edges_;
+  std::vector<std::array<int, 3>> number_;
+  std::vector<int> left_;
   std::vector<int> owners_;  ///< of the faces of that
   std::vector<slicing::Interval> intervals_;
   slicing::Sum sum_, best_;
@@ -539,6 +600,7 @@ struct Workspace {
   slicing::Culling::Meeting meeting;
   slicing::Enclosure polytope;
   std::vector<Round> rounds;
+  std::vector<std::array<int, 2>> rest;  ///< pairs of pieces
 };
 
 /// Makes a ball of radius 1 of the ellipsoid that a body is, and of all else what that makes of it, turned to the axes
@@ -662,31 +724,37 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   slicing::cut(a, b, measuring.common, 0, reference, inside, of_a);
   slicing::cut(b, a, measuring.common, 1, reference, inside, of_b);
   if (many) culling.look_at(of_a, of_b, around);
+  // Fills in what pieces i of a and j of b may share; false if that is nothing.
+  const auto meet = [&](int i, int j) {
+    const slicing::Piece &p = of_a.pieces[i], &q = of_b.pieces[j];
+    rounds.clear(), walls.clear();
+    if (p.round >= 0) rounds.push_back(of_a.rounds[p.round]);
+    if (q.round >= 0) rounds.push_back(of_b.rounds[q.round]);
+    if (many) return culling.meet(i, j, meeting);
+    walls.insert(walls.end(), of_a.walls.begin() + p.first_wall, of_a.walls.begin() + p.first_wall + p.walls);
+    walls.insert(walls.end(), of_b.walls.begin() + q.first_wall, of_b.walls.begin() + q.first_wall + q.walls);
+    return true;
+  };
+  const auto in_closed_form = [&] {
+    if (!many || rounds.size() > 1) return false;
+    if (!culling.share(meeting, scratch->polytope)) return true;
+    return measuring.add_in_closed_form(rounds.empty() ? nullptr : &rounds[0], scratch->polytope, walls);
+  };
   const auto add_pieces = [&] {
     measuring.totals = {};
+    std::vector<std::array<int, 2>>& rest = scratch->rest;
+    rest.clear();
     // Pieces without rounds first: others then need to be exact only to a fraction of what these hold.
     for (const int round_ones : {0, 1, 2})
       for (int i = 0; i < static_cast<int>(of_a.pieces.size()); ++i)
         for (int j = 0; j < static_cast<int>(of_b.pieces.size()); ++j) {
           cancellation_point();
-          const slicing::Piece &p = of_a.pieces[i], &q = of_b.pieces[j];
-          if ((p.round >= 0) + (q.round >= 0) != round_ones) continue;
-          rounds.clear(), walls.clear();
-          if (p.round >= 0) rounds.push_back(of_a.rounds[p.round]);
-          if (q.round >= 0) rounds.push_back(of_b.rounds[q.round]);
-          if (many) {
-            if (!culling.meet(i, j, meeting)) continue;
-            if (round_ones == 0 || (round_ones == 1 && !rounds[0].ball)) {
-              if (!culling.share(meeting, scratch->polytope)) continue;
-              const Round* cylinder = rounds.empty() ? nullptr : &rounds[0];
-              if (measuring.add_in_closed_form(cylinder, scratch->polytope, walls)) continue;
-            }
-          } else {
-            walls.insert(walls.end(), of_a.walls.begin() + p.first_wall, of_a.walls.begin() + p.first_wall + p.walls);
-            walls.insert(walls.end(), of_b.walls.begin() + q.first_wall, of_b.walls.begin() + q.first_wall + q.walls);
-          }
-          if (!measuring.add(rounds, walls)) return false;
+          if ((of_a.pieces[i].round >= 0) + (of_b.pieces[j].round >= 0) != round_ones) continue;
+          if (meet(i, j) && !in_closed_form()) rest.push_back({i, j});
         }
+    // What was not sure to a fraction of the pieces before it may be to one of them all.
+    for (const auto& [i, j] : rest)
+      if (meet(i, j) && !in_closed_form() && !measuring.add(rounds, walls)) return false;
     return measuring.totals.volume > 0;
   };
   const Totals& totals = measuring.totals;
