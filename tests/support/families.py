@@ -631,6 +631,8 @@ def slender_groups(rng):
 def half_spaces(rng):
     """A hull and one to four half-spaces through its vertices, or `parameter` beside them."""
     points = coarse(hull_points(rng, int(rng.integers(4, 17))), 6)
+    while np.linalg.matrix_rank(points - points[0]) < 3:  # as few of them may be, so coarse
+        points = coarse(hull_points(rng, int(rng.integers(4, 17))), 6)
     beside = float(rng.choice([0, 1e-12, -1e-12, 1e-9, 1e-3, -1e-3, 0.3]))
     planes = []
     for _ in range(int(rng.integers(1, 5))):
