@@ -118,8 +118,34 @@ class PolytopeSearch {
     };
     if (c.kind == Candidate::kFacetOfA) return along(a_.normal(a_.facets[c.of_a]), a_.lost(a_.facets[c.of_a]));
     if (c.kind == Candidate::kFacetOfB) return along(-b_.normal(b_.facets[c.of_b]), b_.lost(b_.facets[c.of_b]));
-    const Across ridges = across(a_.along(a_.ridges[c.of_a]), b_.along(b_.ridges[c.of_b]));
-    return along(c.sign * ridges.direction, ridges.lost);
+    const NearRidge &of_a = a_.ridges[c.of_a], &of_b = b_.ridges[c.of_b];
+    const WideVector u = a_.along(of_a);
+    const Across ridges = across(u, b_.along(of_b));
+    const WideVector direction = c.sign * ridges.direction;
+    const double least = along(direction, ridges.lost);
+    return of_b.left < 0 || of_a.left < 0 ? least
+                                          : std::max(least, least_of_strip(of_a, of_b, u, direction, ridges.lost));
+  }
+
+  /// The same for the facet of two ridges, of which nearly parallel ones make a strip: where its direction is off, it
+  /// is turned about the ridge of a, and what lies on the strip moves by no more than its distance from there. The
+  /// point of the surface that is nearest to the origin is where a facet's normal from there meets the facet: a strip
+  /// beside which that passes is not the least way out.
+  double least_of_strip(const NearRidge& of_a, const NearRidge& of_b, const WideVector& along_a,
+                        const WideVector& direction, double lost) const {
+    const WideVector across = cross(along_a, direction);
+    const double rounding = ways.lost() + kLostWide * (a_.radius + b_.radius);
+    double low = kInfinity, high = -kInfinity, least = -kInfinity, farthest = 0;
+    for (const int i : {of_a.from, of_a.to})
+      for (const int j : {of_b.from, of_b.to}) {
+        const WideVector corner = a_.corner(i) - b_.corner(j);
+        const double beside = dot(across, corner).head, out = dot(direction, corner).head;
+        low = std::min(low, beside), high = std::max(high, beside);
+        least = std::max(least, out - lost * (std::abs(beside) + lost * std::abs(out)) - rounding);
+        farthest = std::max(farthest, std::abs(out));
+      }
+    const double margin = 2 * lost * farthest + rounding;
+    return low > margin || high < -margin ? kInfinity : least;
   }
 
   bool asked_too_many() const { return corners_asked_ > kMostCornersAsked; }

@@ -5,9 +5,11 @@ of the bodies bound the distance from above."""
 from fractions import Fraction
 
 import exact
+import families
 import numpy as np
 import pytest
 from exact_distance import outside, root
+from families import prism
 from numpy.testing import assert_allclose
 from strategies import directions, hull_points, quaternion, rotation
 
@@ -285,3 +287,22 @@ def test_the_errors_of_bodies_that_touch_bound_how_deep_and_how_far_apart_they_m
     assert answer.status == "touching"
     assert (answer.depth, answer.distance) == (0, 0)
     assert max(answer.errors.depth, answer.errors.distance, answer.errors.witnesses) <= 1e-15
+
+
+@pytest.mark.parametrize("seed", [500064, 500112, 500152])
+def test_rims_that_are_parallel_but_for_rounding_leave_the_depth_as_right_as_others(seed):
+    found = overlap(*(families.placed(body) for body in families.make("prisms", seed).bodies))
+    assert found.depth == pytest.approx(1e-9, rel=1e-5)
+    assert found.errors.depth <= 1e-15 * found.depth
+
+
+@pytest.mark.parametrize("sides", [8, 24])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_depth_of_prisms_on_each_other_is_as_right_as_stated(sides, seed):
+    rng = np.random.default_rng(seed)
+    turned, sunk = rotation(rng.normal(size=4)) if seed % 2 else np.eye(3), rng.choice([1e-12, 1e-9, 1e-3, 0.3])
+    a, b = (points @ turned.T for points in (prism(sides), prism(max(3, sides // 4)) + [0.25, 0.25, 1 - sunk]))
+    found = overlap(Hull(a), Hull(b))
+    way = root(exact.depth_squared(exact.hull(a), exact.hull(b)))
+    assert abs(Fraction(found.depth) - way) <= Fraction(found.errors.depth)
+    assert found.errors.depth <= max(1e-9 * found.depth, 1e-16)
