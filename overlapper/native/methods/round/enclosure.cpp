@@ -6,6 +6,15 @@
 
 namespace overlapper::slicing {
 
+namespace {
+
+/// Which of a corner's edges leads to another.
+int edge_to(const Enclosure::Corner& corner, int other) {
+  return corner.beside[0] == other ? 0 : corner.beside[1] == other ? 1 : 2;
+}
+
+}  // namespace
+
 void Enclosure::become(const Bounds& box) {
   const auto& [lower, upper] = box;
   faces = {{{-1, 0, 0}, -lower.x, kNoWall}, {{1, 0, 0}, upper.x, kNoWall},   {{0, -1, 0}, -lower.y, kNoWall},
@@ -25,55 +34,52 @@ void Enclosure::become(const Bounds& box) {
 
 bool Enclosure::cut(const Face& face) {
   thread_local std::pair<std::vector<double>, std::vector<int>> of_thread;
-  auto& [left, place] = of_thread;  // every use of what is a thread's own looks for it
+  auto& [left, removed] = of_thread;  // every use of what is a thread's own looks for it
   const int before = static_cast<int>(corners.size());
-  left.resize(before);
-  int kept = 0;
+  left.resize(before), removed.clear();
   for (int i = 0; i < before; ++i) {
     left[i] = face.slack - dot(face.normal, corners[i].at);
-    kept += left[i] >= 0;
+    if (!(left[i] >= 0)) removed.push_back(i);
   }
-  if (kept == before) return true;
-  if (kept == 0) return false;
+  if (removed.empty()) return true;
+  const int gone = static_cast<int>(removed.size());
+  if (gone == before) return false;
   const int number = static_cast<int>(faces.size());
   faces.push_back(face);
-  for (int i = 0; i < before; ++i) {
-    if (!(left[i] >= 0)) continue;
+  for (const int outer : removed)
     for (int k = 0; k < 3; ++k) {
-      const Corner inner = corners[i];
-      const int outer = inner.beside[k];
-      if (outer >= before || left[outer] >= 0) continue;
-      const double share = left[i] / (left[i] - left[outer]);
-      corners[i].beside[k] = static_cast<int>(corners.size());
-      corners.push_back({inner.at + share * (corners[outer].at - inner.at),
-                         {i, -1, -1},
-                         {inner.face[(k + 2) % 3], number, inner.face[k]}});
+      const int inner = corners[outer].beside[k];
+      if (!(left[inner] >= 0)) continue;
+      Corner& stays = corners[inner];
+      const int along = edge_to(stays, outer);
+      const double share = left[inner] / (left[inner] - left[outer]);
+      const Corner added{stays.at + share * (corners[outer].at - stays.at),
+                         {inner, -1, -1},
+                         {stays.face[(along + 2) % 3], number, stays.face[along]}};
+      stays.beside[along] = static_cast<int>(corners.size());
+      corners.push_back(added);
     }
-  }
   // Along each face that was cut, from the corner where its border comes back inside to that where it has left.
   const int all = static_cast<int>(corners.size());
   for (int start = before; start < all; ++start) {
     int from = start, to = corners[start].beside[0];
     while (to < before) {
-      const auto& beside = corners[to].beside;
-      const int k = beside[0] == from ? 0 : beside[1] == from ? 1 : 2;
-      from = to;
-      to = beside[(k + 1) % 3];
+      const int next = corners[to].beside[(edge_to(corners[to], from) + 1) % 3];
+      from = to, to = next;
     }
     corners[start].beside[2] = to;
     corners[to].beside[1] = start;
   }
-  place.resize(all);
-  int next = 0;
-  for (int i = 0; i < all; ++i)
-    if (i >= before || left[i] >= 0) place[i] = next++;
-  for (int i = 0; i < all; ++i) {
-    if (i < before && !(left[i] >= 0)) continue;
-    Corner corner = corners[i];
-    for (int& j : corner.beside) j = place[j];
-    corners[place[i]] = corner;
+  // The last corners take the places of those that are gone.
+  const int kept = all - gone;
+  size_t place = 0;
+  for (int last = all - 1; last >= kept; --last) {
+    if (last < before && !(left[last] >= 0)) continue;
+    const int to = removed[place++];
+    corners[to] = corners[last];
+    for (const int other : corners[to].beside) corners[other].beside[edge_to(corners[other], last)] = to;
   }
-  corners.resize(next);
+  corners.resize(kept);
   return true;
 }
 
