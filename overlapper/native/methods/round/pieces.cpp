@@ -42,6 +42,7 @@ class Cutter {
         origin_(wide(body.position) - wide(reference) - inside),
         result_(result) {
     if (const HullData* hull = polytope_of(body.shape)) origin_ = origin_ + rotation_ * wide(hull->origin);
+    plain_rotation_ = rounded(rotation_), plain_origin_ = rounded(origin_);
     margin_ = 1e-12 * (norm(body.pose.translation) + norm(other.pose.translation) + reach(body.shape));
   }
 
@@ -137,10 +138,9 @@ class Cutter {
   Bounds local_bounds(double more) const {
     if (!common_) return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
     Bounds box{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
-    const Mat3 rotation = rounded(rotation_);
-    const Vec3 origin = rounded(origin_), wider = (more + margin_) * Vec3{1, 1, 1};
+    const Vec3 wider = (more + margin_) * Vec3{1, 1, 1};
     for (const Enclosure::Corner& corner : common_->corners) {
-      const Vec3 at = apply_transposed(rotation, corner.at - origin);
+      const Vec3 at = apply_transposed(plain_rotation_, corner.at - plain_origin_);
       box = {min(box.lower, at), max(box.upper, at)};
     }
     return {box.lower - wider, box.upper + wider};
@@ -211,26 +211,41 @@ class Cutter {
     result_.walls.push_back({normal, slack, owner});
   }
 
-  /// Of a facet from three corners, exactly; further corners may be off its plane by the flatness.
-  WideVector facet_normal(const HullData& hull, int f) const {
-    const auto [a, b, c] = hull.facet_corners[f];
-    if (a < 0) return unit(wide(hull.planes[f].normal));
-    return unit(wide_normal(hull.corners[a], hull.corners[b], hull.corners[c]));
+  /// Whether what encloses the common set is surely beyond a plane, or surely nowhere beyond it, by doubles.
+  enum class Side { kBeyond, kInside, kBoth };
+  Side side_of(Vec3 local_normal, double local_offset) const {
+    const Vec3 n = plain_rotation_ * local_normal;
+    const double slack = local_offset + dot(n, plain_origin_), margin = 4 * margin_;
+    if (common_) {
+      cancellation_point(common_->corners.size());
+      const auto [least, most] = common_->range(n);
+      return least > slack + margin ? Side::kBeyond : most < slack - margin ? Side::kInside : Side::kBoth;
+    }
+    const bool below = bounded(other_.shape) && dot(n, other_.support(n)) < slack + dot(n, inside_) - margin;
+    return below ? Side::kInside : Side::kBoth;
   }
-  DoubleDouble facet_offset(const HullData& hull, int f, const WideVector& normal) const {
+  bool beyond(Vec3 local_normal, double local_offset) const {
+    return common_ && side_of(local_normal, local_offset) == Side::kBeyond;
+  }
+  bool beyond(Vec3 local_normal, Vec3 point) const { return beyond(local_normal, dot(local_normal, point)); }
+
+  struct WidePlane {
+    WideVector normal;
+    DoubleDouble offset;
+  };
+  /// Of a facet from three corners, exactly; further corners may be off its plane by the flatness.
+  static WidePlane plane_of(const HullData& hull, int f) {
     const auto [a, b, c] = hull.facet_corners[f];
-    return a < 0 ? DoubleDouble{hull.planes[f].offset} : dot(normal, wide(hull.corners[a]));
+    if (a < 0) return {unit(wide(hull.planes[f].normal)), {hull.planes[f].offset}};
+    const WideVector normal = unit(wide_normal(hull.corners[a], hull.corners[b], hull.corners[c]));
+    return {normal, dot(normal, wide(hull.corners[a]))};
   }
   void facet_wall(const HullData& hull, int f, double radius, int owner) {
     if (empty_) return;
     cancellation_point();
-    const Plane& plane = hull.planes[f];
-    // A look in doubles first.
-    const Vec3 n = rounded(rotation_) * plane.normal;
-    const double here = plane.offset + radius + dot(n, inside_ + rounded(origin_)) + margin_;
-    if (bounded(other_.shape) && dot(n, other_.support(n)) < here - 4 * margin_) return;
-    const WideVector normal = facet_normal(hull, f);
-    wall(normal, facet_offset(hull, f, normal) + DoubleDouble{radius}, owner);
+    if (side_of(hull.planes[f].normal, hull.planes[f].offset + radius) == Side::kInside) return;
+    const auto [normal, offset] = plane_of(hull, f);
+    wall(normal, offset + DoubleDouble{radius}, owner);
   }
   static Mat3 rounded(const WideMatrix& m) {
     return {overlapper::rounded(m.row0), overlapper::rounded(m.row1), overlapper::rounded(m.row2)};
@@ -240,9 +255,10 @@ class Cutter {
   void wall_through(const WideVector& normal, Vec3 point) { wall(normal, dot(normal, wide(point)), kCut); }
 
   void prism(const HullData& hull, int f, double radius) {
+    const Plane& plane = hull.planes[f];
+    if (beyond(plane.normal, plane.offset + radius) || beyond(-plane.normal, -plane.offset)) return;
     begin();
-    const WideVector normal = facet_normal(hull, f);
-    const DoubleDouble offset = facet_offset(hull, f, normal);
+    const auto [normal, offset] = plane_of(hull, f);
     wall(-normal, -offset, kCut);
     wall(normal, offset + DoubleDouble{radius}, owner_);
     const auto ring = hull.facet(f);
@@ -255,20 +271,26 @@ class Cutter {
 
   void edge_wedge(const HullData& hull, const Edge& edge, double radius) {
     const Vec3 a = hull.vertices[edge.from], b = hull.vertices[edge.to];
+    const Vec3 way = overlapper::unit(b - a), out_left = hull.planes[edge.left].normal;
+    const Vec3 out_right = hull.planes[edge.right].normal;
+    if (beyond(way, b) || beyond(-way, a) || beyond(cross(out_left, way), a) || beyond(cross(way, out_right), a))
+      return;
     const WideVector between = wide_difference(b, a), along = unit(between);
     begin();
     cylinder(DoubleDouble{0.5} * (wide(a) + wide(b)), along, radius, overlapper::rounded(norm(between)) / 2);
     wall_through(-along, a);
     wall_through(along, b);
     // The left facet lies to the left of the edge seen from outside: beyond it, the other way.
-    if (!empty_) wall_through(unit(cross(facet_normal(hull, edge.left), along)), a);
-    if (!empty_) wall_through(unit(cross(along, facet_normal(hull, edge.right))), a);
+    if (!empty_) wall_through(unit(cross(plane_of(hull, edge.left).normal, along)), a);
+    if (!empty_) wall_through(unit(cross(along, plane_of(hull, edge.right).normal)), a);
     end();
   }
 
   /// Of a vertex and each of those it shares an edge with.
   void vertex_wedge(const HullData& hull, std::span<const std::pair<int, int>> beside, double radius) {
     const Vec3 vertex = hull.vertices[beside[0].first];
+    for (const auto& [_, other] : beside)
+      if (beyond(overlapper::unit(hull.vertices[other] - vertex), vertex)) return;
     begin();
     ball(wide(vertex), radius);
     for (const auto& [_, other] : beside) wall_through(unit(wide_difference(hull.vertices[other], vertex)), vertex);
@@ -281,6 +303,8 @@ class Cutter {
   Vec3 inside_;
   WideMatrix rotation_;
   WideVector origin_;
+  Mat3 plain_rotation_;
+  Vec3 plain_origin_;
   Pieces& result_;
   double margin_ = 0;
   Piece piece_;

@@ -305,7 +305,7 @@ class Measuring {
           piece.products += tetrahedron / 20 * Vec3{p.y * p.z, p.z * p.x, p.x * p.y};
         }
       }
-      const double area = norm(force);
+      const double area = std::sqrt(norm2(force));
       piece.border += area;
       if (of_wall != slicing::kCut) piece.area += area, piece.unbalanced += force;
       if (of_wall == 0) piece.pull += force, piece.moment += moment;
