@@ -54,7 +54,8 @@ struct ArcSeries {
 
 constexpr ArcSeries kSeries;
 
-Arc arc(double x) {
+/// Of half an arc's angle, its sine and its cosine.
+Arc arc(double x, double s, double c) {
   if (std::abs(x) < 0.4) {
     const double square = x * x, cube = square * x;
     Arc sum{};
@@ -65,12 +66,11 @@ Arc arc(double x) {
     }
     return {cube * sum.segment, cube * sum.across, cube * sum.bulge, cube * sum.square};
   }
-  const double s = std::sin(x), c = std::cos(x), segment = x - s * c;
+  const double segment = x - s * c;
   return {segment, 2.0 / 3 * s * s * s - c * segment, s - x * c, 2 * x * c * c + x - 3 * s * c};
 }
 
-/// Of half an arc's angle, positive.
-Second second(double x) {
+Second second(double x, double s, double c) {
   if (x < 0.4) {
     const double square = x * x, cube = square * x;
     Second sum{};
@@ -82,7 +82,7 @@ Second second(double x) {
     return {cube * sum.aa, cube * sum.bb, cube * sum.aaa, cube * sum.abb};
   }
   // About the middle of the disc, then about the chord's.
-  const double s = std::sin(x), c = std::cos(x), s2 = s * s, s3 = s2 * s, s5 = s3 * s2;
+  const double s2 = s * s, s3 = s2 * s, s5 = s3 * s2;
   const double one = x - s * c, to1 = 2.0 / 3 * s3, to2 = one / 4 + s3 * c / 2, to3 = 2 * (s3 / 3 - s5 / 5);
   const double bb = one / 4 - s3 * c / 6;
   return {to2 - 2 * c * to1 + c * c * one, bb, to3 - c * (3 * to2 - c * (3 * to1 - c * one)), 2.0 / 15 * s5 - c * bb};
@@ -103,7 +103,8 @@ bool find_chord(Vec3 p, Vec3 q, bool p_inside, bool q_inside, double radius, Cho
   if (p_inside && q_inside) return true;
   const Vec3 e = q - p;
   const double length2 = dot2(e, e), along = dot2(p, e), off = std::abs(cross2(p, e));
-  if (!p_inside && !q_inside && !(off < radius * std::sqrt(length2) && along < 0 && -along < length2)) return false;
+  if (!p_inside && !q_inside && !(along < 0 && -along < length2)) return false;
+  if (!p_inside && !q_inside && !(off < radius * std::sqrt(length2))) return false;
   const double size = radius * std::sqrt(length2);
   const double root = std::sqrt(std::max(0.0, (size - off) * (size + off)));
   const double middle = length2 > 0 ? -along / length2 : 0, half = length2 > 0 ? root / length2 : 0;
@@ -159,7 +160,7 @@ class Measuring {
     } else {
       const Vec3 apex = chords_[0].from;
       double border = 0;
-      for (const Chord& chord : chords_) border += std::hypot(chord.to.x - chord.from.x, chord.to.y - chord.from.y);
+      for (const Chord& chord : chords_) border += std::sqrt(dot2(chord.to - chord.from, chord.to - chord.from));
       for (size_t k = 0; k < chords_.size(); ++k) {
         const Chord &chord = chords_[k], &next = chords_[k + 1 < chords_.size() ? k + 1 : 0];
         add_triangle(n, apex, chord.from, chord.to, section);
@@ -238,6 +239,7 @@ class Measuring {
 
   void add_triangle(Vec3 n, Vec3 a, Vec3 b, Vec3 c, Sum& section) const {
     const double area = dot(n, cross(b - a, c - a)) / 2;
+    if (area == 0) return;
     section.area += area, section.sizes += std::abs(area);
     const Vec3 sum = a + b + c;
     section.first += area / 3 * sum;
@@ -279,7 +281,8 @@ class Measuring {
       angle += n.z > 0 ? 2 * kPi : -2 * kPi;
     }
     const double x = angle / 2, mean = p.z + (q.z - p.z) / 2, rise = q.z - p.z;
-    const Arc of = arc(x);
+    const double s = std::sin(x), c = std::cos(x);
+    const Arc of = arc(x, s, c);
     ++terms_;
     turned_ += angle;
     sizes_ += radius_ * radius_ * std::abs(mean * angle);
@@ -292,13 +295,13 @@ class Measuring {
     // From the axis to the arc's middle.
     const Vec3 sum{p.x + q.x, p.y + q.y, 0}, way{q.y - p.y, p.x - q.x, 0};
     Vec3 w;
-    if (dot2(sum, sum) > dot2(way, way)) w = (std::abs(angle) < kPi ? 1 : -1) / std::hypot(sum.x, sum.y) * sum;
-    else w = (angle > 0 ? 1 : -1) / std::hypot(way.x, way.y) * way;
+    if (dot2(sum, sum) > dot2(way, way)) w = (std::abs(angle) < kPi ? 1 : -1) / std::sqrt(dot2(sum, sum)) * sum;
+    else w = (angle > 0 ? 1 : -1) / std::sqrt(dot2(way, way)) * way;
     const double steep = radius_ / n.z, fall = steep * dot2(n, w);
     levels_ -= 2 * fall * of.bulge;
     sizes_ += radius_ * radius_ * std::abs(2 * fall * of.bulge);
     squares_ += -4 * mean * fall * of.bulge + fall * fall * of.square;
-    const double s = std::sin(x), slope = steep * (n.y * w.x - n.x * w.y);
+    const double slope = steep * (n.y * w.x - n.x * w.y);
     if (std::abs(x) < 1e-4) squares_ += rise * rise * x / 6;
     else if (std::abs(x) < 1.5) squares_ += rise * rise / 4 * of.segment / (s * s);
     else squares_ += slope * slope * of.segment;
@@ -310,18 +313,18 @@ class Measuring {
     const Vec3 out{w.x, w.y, -dot2(n, w) / n.z};
     section.first += area * middle + beyond * out;
     if (with_second_)
-      add_segment(middle, radius_ * out, {-radius_ * w.y, radius_ * w.x, -slope}, std::abs(x),
+      add_segment(middle, radius_ * out, {-radius_ * w.y, radius_ * w.x, -slope}, std::abs(x), std::abs(s), c,
                   radius_ * radius_ / std::abs(n.z), section);
     return true;
   }
 
   /// The segment of a unit disc of which that is half the angle, as it lies in the face, `scale` times as large: about
   /// the middle of its chord, across that towards the arc, and along it.
-  void add_segment(Vec3 middle, Vec3 across, Vec3 along, double half, double scale, Sum& section) const {
-    const Arc of = arc(half);
-    const double s = std::sin(half), c = std::cos(half);
+  void add_segment(Vec3 middle, Vec3 across, Vec3 along, double half, double s, double c, double scale,
+                   Sum& section) const {
+    const Arc of = arc(half, s, c);
     const double one = scale * of.segment, a = scale * of.across;
-    const Second two = second(half);
+    const Second two = second(half, s, c);
     const double aa = scale * two.aa, bb = scale * two.bb, aaa = scale * two.aaa, abb = scale * two.abb;
     const auto product = [&](double p, double q, double p_across, double q_across, double p_along, double q_along) {
       return one * p * q + a * (p * q_across + q * p_across) + aa * p_across * q_across + bb * p_along * q_along;

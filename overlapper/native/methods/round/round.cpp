@@ -369,7 +369,8 @@ class Measuring {
     }
     const auto part = quadric::measure_ball({corners_, planes_, edges_, planes_.size()}, {}, ball.radius, true);
     if (!part || part->sections.empty()) return true;  // nothing
-    if (!(part->volume >= 0)) return false;
+    // What is convex has less surface than what is convex around it, but for a wrong turn.
+    if (!(part->volume >= 0 && part->area <= (1 + 1e-9) * polytope.surface())) return false;
     Totals piece;
     piece.volume = part->volume, piece.error = part->error + nothing * part->area, piece.first = part->first;
     piece.squares = part->squares, piece.products = part->products;
@@ -402,8 +403,7 @@ class Measuring {
     const Vec3 mean = piece.first / piece.volume, q = piece.squares / piece.volume;
     const double spread2 = q.x + q.y + q.z - norm2(mean);
     if (!(piece.error * norm2(mean) <= kSureOfMoments * (totals.volume + piece.volume) * spread2)) return false;
-    // What is convex has less surface than what is convex around it, but for a wrong turn.
-    if (!sure(piece) || !(piece.border <= (1 + 1e-9) * polytope.surface())) return false;
+    if (!sure(piece)) return false;
     const Vec3 first = turned(piece.first), squares = piece.squares, products = piece.products;
     piece.first = first + piece.volume * centre, piece.squares = piece.products = {};
     add_second({turn.row0, turn.row1, turn.row2}, piece.volume, squares, products, first, centre, piece);
