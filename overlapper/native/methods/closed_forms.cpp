@@ -478,13 +478,32 @@ class OwnPolyhedron {
   quadric::Polyhedron polyhedron_;
 };
 
-/// About the centroid, along the polyhedron's axes.
-Mat3 inertia(const quadric::BallPart& part) {
-  const Vec3 c = part.first / part.volume, f = part.first;
-  const Vec3 s = part.squares - scaled(f, c);
-  const Vec3 p = part.products - Vec3{f.y * c.z, f.z * c.x, f.x * c.y};
-  return {{s.y + s.z, -p.z, -p.y}, {-p.z, s.z + s.x, -p.x}, {-p.y, -p.x, s.x + s.y}};
-}
+/// Integrals of a part over its volume: of x, and of squares and products of two coordinates.
+struct Moments {
+  double volume = 0;
+  Vec3 first, squares, products;
+
+  /// About a point of which the part's own is at `offset`.
+  void add(double part_volume, Vec3 f, Vec3 s, Vec3 p, Vec3 offset) {
+    const Vec3 o = offset, g = 2.0 * f + part_volume * o;
+    volume += part_volume, first += f + part_volume * o;
+    squares += s + scaled(o, g);
+    products +=
+        p + Vec3{f.y * o.z + f.z * o.y + part_volume * o.y * o.z, f.z * o.x + f.x * o.z + part_volume * o.z * o.x,
+                 f.x * o.y + f.y * o.x + part_volume * o.x * o.y};
+  }
+  Mat3 inertia_about_centroid() const {
+    const Vec3 c = first / volume, f = first;
+    const Vec3 s = squares - scaled(f, c);
+    const Vec3 p = products - Vec3{f.y * c.z, f.z * c.x, f.x * c.y};
+    return {{s.y + s.z, -p.z, -p.y}, {-p.z, s.z + s.x, -p.x}, {-p.y, -p.x, s.x + s.y}};
+  }
+  /// How many times as far from the point as it is wide, as squares: so many digits second moments lose.
+  double remoteness() const {
+    const Vec3 c = first / volume, q = squares / volume;
+    return norm2(c) / (q.x + q.y + q.z - norm2(c));
+  }
+};
 
 /// Where one plane at most reaches a ball, a cap has fewer terms.
 std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, const Placed& other, int self,
@@ -508,9 +527,12 @@ std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, cons
   const Vec3 on_other = turned(part->flat);
   q.pulls = opposite_pulls(self == 0 ? -on_other : on_other, ball.centre, positions);
   const Mat3 rotation = other.pose.rotation;
-  return MeasuresAndInertia{std::move(q), rotation * inertia(*part) * transposed(rotation)};
+  const Mat3 inertia = Moments{part->volume, part->first, part->squares, part->products}.inertia_about_centroid();
+  return MeasuresAndInertia{std::move(q), rotation * inertia * transposed(rotation)};
 }
 
+/// From parts more remote than that, slices know second moments better.
+constexpr double kRemote = 100;
 /// Of how far a body reaches: nearer to a corner, the planes of its ends are left to slices.
 constexpr double kFlush = 1e-9;
 
@@ -528,13 +550,13 @@ std::optional<MeasuresAndInertia> long_body_and_polyhedron(const Revolved& body,
   part = polyhedron;
   if (!part.cut(h, true) || !part.cut(-h, false)) return std::nullopt;
   Measures q = by_formula();
-  Vec3 first;
-  Pull on_body{};  // about its centre, along its axes
+  Moments moments;  // about its centre, along its axes
+  Pull on_body{};   // likewise
   if (!part.empty()) {
-    const auto middle = quadric::measure_cylinder(part, r, false);
+    const auto middle = quadric::measure_cylinder(part, r, true);
     if (!middle) return std::nullopt;
-    q.volume = middle->volume, q.volume_error = middle->error, q.area = middle->area, q.facets_touched = middle->faces;
-    first = middle->first;
+    q.volume_error = middle->error, q.area = middle->area, q.facets_touched = middle->faces;
+    moments.add(middle->volume, middle->first, middle->squares, middle->products, {});
     on_body = body.round ? middle->curved : Pull{-middle->flat.force, -middle->flat.moment};
     if (!body.round) q.area = middle->whole_area;
   }
@@ -546,22 +568,26 @@ std::optional<MeasuresAndInertia> long_body_and_polyhedron(const Revolved& body,
     const quadric::Polyhedron rest = part.polyhedron();
     if (rest.edges.empty()) return std::nullopt;
     const Vec3 centre{0, 0, end};
-    const auto ball = quadric::measure_ball(rest, centre, r, false);
+    const auto ball = quadric::measure_ball(rest, centre, r, true);
     if (!ball) continue;
-    q.volume += ball->volume, q.volume_error += ball->error, q.area += ball->area, q.facets_touched += ball->faces;
-    first += ball->first + ball->volume * centre;
+    q.volume_error += ball->error, q.area += ball->area, q.facets_touched += ball->faces;
+    moments.add(ball->volume, ball->first, ball->squares, ball->products, centre);
     on_body.force += -ball->flat, on_body.moment += cross(centre, -ball->flat);
   }
+  q.volume = moments.volume;
   if (!(q.volume > 0)) return std::nullopt;
   q.volume_error += rounding * q.area;
   if (!std::isfinite(q.volume_error)) return std::nullopt;
-  q.centroid = reference + placed.pose * (first / q.volume);
+  q.centroid = reference + placed.pose * (moments.first / q.volume);
   const Pull turned{placed.pose.rotation * on_body.force, placed.pose.rotation * on_body.moment};
   for (const int i : {0, 1}) {
     const double side = i == self ? 1 : -1;
     q.pulls[i] = about({side * turned.force, side * turned.moment}, placed.pose.translation, positions[i]);
   }
-  return MeasuresAndInertia{std::move(q), {}};
+  std::optional<Mat3> inertia;
+  if (moments.remoteness() < kRemote)
+    inertia = placed.pose.rotation * moments.inertia_about_centroid() * transposed(placed.pose.rotation);
+  return MeasuresAndInertia{std::move(q), inertia};
 }
 
 std::optional<MeasuresAndInertia> without_inertia(const std::optional<Measures>& measures) {
