@@ -1,5 +1,7 @@
 """Round bodies are measured to a trillionth at any depth: closed forms, rays, cuts that add up, differences."""
 
+from itertools import combinations_with_replacement
+
 import numpy as np
 import pytest
 from families import make
@@ -326,6 +328,20 @@ def test_measures_are_those_that_rays_find(first, second, seed):
     # Where the surface changes, what rays miss is of first order for areas.
     assert found.area == pytest.approx(true.area, rel=1e-5)
     assert_allclose(found.gradient, true.pull, atol=1e-5 * np.abs(true.pull).max())
+
+
+@pytest.mark.parametrize(("first", "second"), [*combinations_with_replacement(("sphere", "capsule", "cylinder"), 2)])
+def test_every_pair_of_round_bodies_deep_in_each_other_is_measured_to_ten_digits(first, second):
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        shapes = [
+            {"sphere": Sphere(r), "capsule": Capsule(r, length), "cylinder": Cylinder(r, length)}[kind]
+            for kind, r, length in zip((first, second), rng.uniform(0.2, 0.8, 2), rng.uniform(0.3, 1.5, 2), strict=True)
+        ]
+        found = overlap(
+            Placed(shapes[0], orientation=quaternion(rng)), Placed(shapes[1], 0.3 * rng.normal(size=3), quaternion(rng))
+        )
+        assert found.volume_error <= 1.2e-11 * found.volume
 
 
 def measured_as_round(found):

@@ -66,10 +66,11 @@ class Candidates {
       static const std::array<double, kSamples> kPlaces = places();
       samples_[k] = middle + half * kPlaces[k];
     }
+    samples_.front() = low, samples_.back() = high;
     for (int row = 0; row < kSamples / kRow; ++row) {
       Row t;
       std::copy_n(samples_.begin() + row * kRow, kRow, t.begin());
-      find_sides(stack_, t, sides_[row]);
+      find_sides(stack_, t, {}, sides_[row]);
     }
     for (int i = 0; i < stack_.lines - 4; ++i) {
       const Line& side = stack_.line[i];
@@ -85,10 +86,11 @@ class Candidates {
   }
 
  private:
-  /// Denser towards both ends, where sides are steep.
+  /// Denser towards both ends, where sides are steep, and the ends themselves: however near to where the sides of a
+  /// cylinder meet a plane cuts off a corner of them, that is between two samples.
   static Samples places() {
     Samples result;
-    for (int k = 0; k < kSamples; ++k) result[k] = -std::cos(std::numbers::pi * (k + 0.5) / kSamples);
+    for (int k = 0; k < kSamples; ++k) result[k] = -std::cos(std::numbers::pi * k / (kSamples - 1));
     return result;
   }
 

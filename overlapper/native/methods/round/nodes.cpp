@@ -22,10 +22,10 @@ class Bundle {
  public:
   Bundle(const Stack& stack, const Outline& outline) : stack_(stack), outline_(outline) {}
 
-  void add(const Row& t, const Row& counts) {
+  void add(const Row& t, const Row& tail, const Row& counts) {
     t_ = t, counts_ = counts;
     area_ = x_ = y_ = xx_ = yy_ = xy_ = surface_ = {};
-    find_sides(stack_, t_, sides_);
+    find_sides(stack_, t_, tail, sides_);
     if (outline_.whole_disc) add_disc();
     else go_round();
     finish();
@@ -399,13 +399,13 @@ class Bundle {
 
 }  // namespace
 
-void find_sides(const Stack& stack, const Row& t, Sides& sides) {
+void find_sides(const Stack& stack, const Row& t, const Row& tail, Sides& sides) {
   for (int i = 0; i < stack.quadrics; ++i) {
     const Quadric& q = stack.quadric[i];
     const double low = q.low, high = q.high, stretch = 1 + dot(q.shear, q.shear), along = q.along, slack = q.slack;
     const Point c = q.centre, s = q.shear;
     Row &half = sides.half[i], &upper = sides.upper[i], &lower = sides.lower[i];
-    for (int k = 0; k < kRow; ++k) half[k] = std::sqrt(std::max(0.0, (t[k] - low) * (high - t[k])));
+    for (int k = 0; k < kRow; ++k) half[k] = std::sqrt(std::max(0.0, (t[k] - low + tail[k]) * (high - t[k] - tail[k])));
     if (q.ball) {
       for (int k = 0; k < kRow; ++k) {
         sides.centre_x[k] = c.x - t[k] * s.x, sides.centre_y[k] = c.y - t[k] * s.y;
@@ -425,12 +425,12 @@ void find_sides(const Stack& stack, const Row& t, Sides& sides) {
 Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices) {
   Bundle bundle(stack, outline);
   for (int first = 0; first < nodes.size; first += kRow) {
-    Row t, counts;
+    Row t, tail, counts;
     for (int k = 0; k < kRow; ++k) {
       const int node = std::min(first + k, nodes.size - 1);
-      t[k] = nodes.t[node], counts[k] = first + k < nodes.size ? nodes.weight[node] : 0;
+      t[k] = nodes.t[node], tail[k] = nodes.tail[node], counts[k] = first + k < nodes.size ? nodes.weight[node] : 0;
     }
-    bundle.add(t, counts);
+    bundle.add(t, tail, counts);
     for (int k = 0; k < kRow && first + k < nodes.size; ++k)
       slices.volume[first + k] = bundle.areas()[k], slices.area[first + k] = bundle.surfaces()[k];
   }
@@ -441,7 +441,7 @@ Integrals measure(const Stack& stack, const Outline& outline, double t) {
   Bundle bundle(stack, outline);
   Row row;
   row.fill(t);
-  bundle.add(row, {1});
+  bundle.add(row, {}, {1});
   return bundle.integrals();
 }
 

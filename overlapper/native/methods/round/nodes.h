@@ -17,14 +17,15 @@ struct Sides {
   std::array<Row, 2> half, upper, lower;
   Row centre_x, centre_y, slack;  ///< of the disc; |centre|² − radius²
 };
-void find_sides(const Stack& stack, const Row& t, Sides& sides);
+/// Each t has a tail, as in double-double: at the ends of a round, half a chord is the root of how far t is from there.
+void find_sides(const Stack& stack, const Row& t, const Row& tail, Sides& sides);
 
 /// Where a rule looks at slices, and what each of them counts.
 struct Nodes {
   int size = 0;
-  std::array<double, kMostNodes> t, weight;
+  std::array<double, kMostNodes> t, tail, weight;  ///< the tail is what a double cannot hold of t
 
-  void append(double at, double counts) { t[size] = at, weight[size] = counts, ++size; }
+  void append(double at, double counts) { t[size] = at, tail[size] = 0, weight[size] = counts, ++size; }
 };
 
 /// Of each slice: its area, and that of the surface per unit of t.

@@ -7,6 +7,7 @@
 #include <limits>
 #include <span>
 
+#include "geometry/wide.h"
 #include "methods/round/nodes.h"
 
 namespace overlapper::slicing {
@@ -117,7 +118,9 @@ Part apply(const Stack& stack, const Outline& outline, double low, double high, 
   nodes.size = size;
   for (int i = 0; i < half; ++i) {
     const double step = width * rule[i].share, weight = width * rule[i].weight;
-    nodes.t[i] = low + step, nodes.t[size - 1 - i] = high - step;
+    const DoubleDouble from_low = two_sum(low, step), from_high = two_sum(high, -step);
+    nodes.t[i] = from_low.head, nodes.t[size - 1 - i] = from_high.head;
+    nodes.tail[i] = from_low.tail, nodes.tail[size - 1 - i] = from_high.tail;
     nodes.weight[i] = nodes.weight[size - 1 - i] = weight;
   }
   Slices slices;
