@@ -22,6 +22,7 @@ from mpmath import mp
 from published import PUBLISHED
 from scipy.spatial import ConvexHull, cKDTree
 from strategies import directions, hull_points, overlapping_points, quaternion, reach, rotation, turn
+from strategies import product as turned_by
 
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere
 
@@ -772,6 +773,49 @@ def flush_round(rng):
     return Case(way, 0.0, bodies if rng.random() < 0.5 else bodies[::-1], float(volume))
 
 
+def special_poses(rng):
+    """Two bodies, one of them round, of few lengths, turned by few angles, so that centres, ends, rims, seams, edges or
+    corners of the one lie on those of the other, or do but for `parameter` of a metre."""
+    off = float(rng.choice([0, 0, *(10.0 ** -np.arange(4.0, 17))]))
+    lengths = [1, 1, 1, 0.5, 0.5, 0.25, 2, 1 / 3, 0.1, np.sqrt(0.5)]
+
+    def body(kind):
+        r, h, *sides = rng.choice(lengths, 5)
+        rim = np.deg2rad(rng.choice([0, 30, 45, 60, 90, 120, 135, 180, 225, 270]))
+        on_rim = [r * np.cos(rim), r * np.sin(rim), h * rng.integers(-1, 2)]
+        ends = rng.integers(-1, 2, 3)
+        if kind == "ball":
+            return Sphere(r), r * ends / max(1.0, float(np.linalg.norm(ends)))
+        if kind in ("capsule", "cylinder"):
+            shape = Capsule(r, 2 * h) if kind == "capsule" else Cylinder(r, 2 * h)
+            return shape, [on_rim, [0, 0, h * ends[2]], [0, 0, (h + r) * ends[2]]][int(rng.integers(3))]
+        if kind == "hull":
+            return Hull(TETRA * r), TETRA[int(rng.integers(4))] * r
+        if kind == "half-space":
+            return HalfSpace(ends + [0, 0, 0.5], 0.0), np.zeros(3)
+        solid = Box(sides) if kind == "box" else RoundedHull((CORNERS if r < 1 else TETRA) * sides, h)
+        return solid, ends * (np.array(sides) + (h if kind == "rounded" else 0) * rng.integers(0, 2))
+
+    def turned(q, axis, angle):
+        return turned_by(np.append(np.sin(angle / 2) * axis / np.linalg.norm(axis), np.cos(angle / 2)), q)
+
+    q = np.array(
+        rng.choice([(0, 0, 0, 1), (0, 0, 1, 1), (1, 0, 0, 1), (0, 1, 0, 1), (1, 1, 1, 1), (1, -1, 1, 1)]), float
+    )
+    if rng.random() < 0.5:
+        q = turned(q, rng.integers(-1, 2, 3) + [0, 0, 0.5], np.deg2rad(rng.choice([30, 45, 60, 90, 120])))
+    if rng.random() < 0.4:
+        q = turned(q, rng.integers(-1, 2, 3) + [0.5, 0, 0], off)
+    round_ones = ["ball", "capsule", "cylinder", "rounded"]
+    first, second = rng.choice(round_ones), rng.choice([*round_ones, "box", "box", "hull", "half-space"])
+    (a, on_a), (b, on_b) = body(first), body(second)
+    at = on_a - mapped(np.array([on_b], float), rotation(q))[0] + off * rng.integers(-1, 2, 3) * (rng.random() < 0.6)
+    if rng.random() < 0.4:
+        at = at + rng.integers(-1, 2, 3) * float(rng.choice([0.5, 0.1, 1e-2, 1e-4, 1e-6, 1e-8])) * 0.25
+    bodies = (Placed(a), Placed(b, at, q))
+    return Case(f"{first} and {second}", off, bodies if rng.random() < 0.5 else bodies[::-1])
+
+
 def ellipsoids(rng):
     """An ellipsoid, up to 1000 times as long as thick, into which a half-space or a box reaches by `parameter` of a
     half axis, so that their common part is a stretched cap; or of which a box has so many octants; or all."""
@@ -844,7 +888,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
-        round_contacts, rounded_hulls, flush_round, ellipsoids, posed_ellipsoids,
+        round_contacts, rounded_hulls, flush_round, special_poses, ellipsoids, posed_ellipsoids,
     )
 }  # fmt: skip
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from round_exact import exactly
 from round_truth import dot, number, truth, vector
-from strategies import quaternion, rotation
+from strategies import product, quaternion, rotation
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
@@ -461,3 +461,85 @@ def test_surfaces_that_nothing_but_rounding_parts_are_measured_truly(first_seed)
         moved_by = found.volume_error + (way + 1e-15 * min(sizes)) * 6 * min(sizes) ** 2
         assert found
         assert abs(found.volume - case.closed_form) <= moved_by, (seed, a, turned)
+
+
+def carried(body, turn, shift):
+    """What is turned about the origin, then moved."""
+    return Placed(body.shape, rotation(turn) @ body.position + shift, product(turn, body.given_orientation))
+
+
+SILENT = [
+    # A plane that is passed in the middle of slices, with samples of it equal on either side.
+    (
+        Placed(Capsule(1.0001, 0)),
+        Placed(Cylinder(np.sqrt(0.5), 2), (-0.5000000000000001, -0.5, -9.999999999998899e-05)),
+    ),
+    (
+        Placed(Cylinder(1.3167934511803734, 1)),
+        Placed(
+            RoundedHull([[0.1, -1.50015, -0.7], [-0.1, 1.50015, -0.7], [0.1, 1.50015, 0.7], [-0.1, -1.50015, 0.7]], 2),
+            (1.1403765802591874, -2.8417532744098137, 0),
+            (0, 5e-10, 0, 1),
+        ),
+    ),
+    # A corner of a piece beside the point inside, by rounding.
+    (
+        Placed(
+            RoundedHull(CORNERS * [1.6818166319403705, 0.7, 0.2745640207051316], np.sqrt(0.5)),
+            (0, 0, 0),
+            (1.0098975874475677, -0.11852107588046074, -1.1350723657897133, 1.2380751038421196),
+        ),
+        Placed(
+            RoundedHull([[-1.5, -0.5, 1 / 3], [1.5, -0.5, -1 / 3], [1.5, 0.5, 1 / 3], [-1.5, 0.5, -1 / 3]], 2),
+            (-3.0400468580066917, 0.3617815906925984, -1.2132326299823868),
+            (-1.3529902503654923e-16, -0.27059805007309845, -0.2705980500730989, 0.9238795325112866),
+        ),
+    ),
+]
+
+
+def assert_motion_changes_nothing(a, b, rng):
+    found, turn, shift = overlap(a, b), quaternion(rng), rng.normal(size=3)
+    again = overlap(*(carried(body, turn, shift) for body in (a, b)))
+    boxes = [body.bounds for body in (a, b) if np.isfinite(body.bounds).all()]
+    rounding = 4e-15 * (sum(float(np.abs(box).max()) for box in boxes) + np.abs(shift).max() + np.abs(b.position).max())
+    allowed = found.volume_error + again.volume_error + rounding * (found.area + again.area)
+    assert abs(found.volume - again.volume) <= allowed, (a, b)
+    return found
+
+
+@pytest.mark.parametrize("which", range(len(SILENT)))
+def test_a_plane_or_a_piece_that_slices_have_missed_is_found(which):
+    for seed in range(10):
+        found = assert_motion_changes_nothing(*SILENT[which], np.random.default_rng(seed))
+        assert found.volume_error <= 1e-11 * found.volume
+
+
+@pytest.mark.parametrize("first_seed", range(0, 900, 300))
+def test_special_poses_are_measured_truly_wherever_they_are(first_seed):
+    """Of those that overlap, most are sliced; what is left to polytopes and what is open are counted."""
+    found = []
+    for seed in range(first_seed, first_seed + 300):
+        a, b = make("special_poses", seed).bodies
+        found.append(assert_motion_changes_nothing(a, b, np.random.default_rng(seed)))
+    overlapping = [one for one in found if one]
+    assert len(overlapping) > 200
+    assert sum(one.volume_error > 1e-11 * one.volume for one in overlapping) <= 0.05 * len(overlapping)
+    assert sum("dual" in one.way for one in overlapping) <= 0.03 * len(overlapping)
+
+
+def test_a_pair_that_a_plane_splits_beside_another_by_rounding_is_sliced():
+    # The plane in which a capsule becomes a half ball lies in a face, turned by the rounding of a quaternion.
+    capsule = Placed(Capsule(2, 1))
+    box = Placed(Box([0.25, 0.5, 0.5]), (0.5000000005, 1.5, 0.25), (-0.5, -0.5, -0.5, 0.5000000000000001))
+    # Beside the middle of its flat end, a cylinder ends in a slice as wide as the root of rounding.
+    flat = Placed(Cylinder(0.1, 1.9998))
+    wide = Placed(
+        Cylinder(333.3333333333333, 0.2),
+        (0.09999999450049986, -0.4499500009999998, -0.4499499999890011),
+        (-1, 5e-9, 1, 5e-9),
+    )
+    for a, b in ((capsule, box), (flat, wide)):
+        found = assert_motion_changes_nothing(a, b, np.random.default_rng(0))
+        assert "dual" not in found.way
+        assert found.volume_error <= 1e-11 * found.volume

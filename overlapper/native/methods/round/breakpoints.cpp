@@ -182,7 +182,8 @@ class Candidates {
       between(samples_[k], samples_[k + 1], value[k], value[k + 1]);
       if (k == 0) continue;
       const double before = value[k - 1], here = value[k], after = value[k + 1], side = here < 0 ? -1 : 1;
-      if (!(side * before > side * here && side * after > side * here)) continue;
+      // In a pose that is symmetric, samples on either side of the turn are equal.
+      if (!(side * before > side * here && side * after >= side * here)) continue;
       // The turning point of the parabola through three samples.
       const double p = samples_[k] - samples_[k - 1], q = samples_[k + 1] - samples_[k];
       const double fall = (here - before) / p, rise = (after - here) / q, curve = (rise - fall) / (p + q);
@@ -210,7 +211,10 @@ class Candidates {
       else at_low *= at_high / (at_high + here);
       high = t, at_high = here;
     }
-    add_if_near(Slice(stack_, t).corner(i, j), t);
+    // Where two lines are nearly parallel, what rounding does to t moves their corner far.
+    const Line &a = stack_.line[i], &b = stack_.line[j];
+    if (std::abs(cross(a.normal, b.normal)) < kNear * a.length * b.length) add(t);
+    else add_if_near(Slice(stack_, t).corner(i, j), t);
   }
 
   void on_ridge(int i, int j) {
@@ -319,6 +323,7 @@ class Settling {
       if (!find_inside(values)) return true;
     }
     close_in();
+    if (pointlike() && find_wide(values)) close_in();
     candidates.trace(low_, high_);
     values.push_back(low_), values.push_back(high_);
     std::sort(values.begin(), values.end());
@@ -333,7 +338,7 @@ class Settling {
  private:
   /// Of an interval, how many parts of it are looked at at most.
   static constexpr int kMostInner = 48;
-  static constexpr double kPointlike = 1e-11;  ///< of the stack
+  static constexpr double kPointlike = 1e-11, kPointlikeClosely = 1e-14;  ///< of the stack
   static constexpr int kMostEvents = 40;
 
   Outline at(double t) const { return outline(Slice(stack_, t)); }
@@ -348,7 +353,7 @@ class Settling {
     // Of a convex set there is no empty slice between others, but by rounding.
     if (!intervals_.empty()) intervals_.back().high = low;
     // A corner and a circle, or three lines, meet in a value of t; rounding makes it an interval of its own.
-    const double pointlike = kPointlike * (high_ - low_);
+    const double pointlike = (closely_ ? kPointlikeClosely : kPointlike) * (high_ - low_);
     if (high - low < pointlike && !intervals_.empty()) {
       intervals_.back().high = high;
       return;
@@ -428,6 +433,21 @@ class Settling {
     for (size_t i = 0; i + 1 < values.size(); ++i) {
       inside_ = values[i] + (values[i + 1] - values[i]) / 2;
       if (holds(inside_)) return true;
+    }
+    return false;
+  }
+
+  bool pointlike() const { return high_ - low_ < kPointlike * (stack_.high - stack_.low); }
+
+  /// Where a piece is no wider than a point, its corner may be near the origin by rounding alone: true if it holds
+  /// something elsewhere, between two breakpoints that are not as near to each other.
+  bool find_wide(const std::vector<double>& values) {
+    const double least = kPointlike * (stack_.high - stack_.low);
+    for (size_t i = 0; i + 1 < values.size(); ++i) {
+      const double middle = values[i] + (values[i + 1] - values[i]) / 2;
+      if (!(values[i + 1] - values[i] > least) || (low_ <= middle && middle <= high_) || !holds(middle)) continue;
+      inside_ = middle, low_ = stack_.low, high_ = stack_.high;
+      return true;
     }
     return false;
   }

@@ -415,8 +415,8 @@ void find_sides(const Stack& stack, const Row& t, const Row& tail, Sides& sides)
     }
     for (int k = 0; k < kRow; ++k) {
       const double constant = stretch * t[k] * t[k] - 2 * along * t[k] + slack, middle = c.x - s.x * t[k];
-      // The nearer of the two roots of y² − 2 middle y + constant: not as a difference.
-      const double far = middle > 0 ? middle + half[k] : middle - half[k], near = far != 0 ? constant / far : 0;
+      const double far = middle > 0 ? middle + half[k] : middle - half[k];
+      const double near = q.nearer(far, middle, constant, t[k]);
       upper[k] = middle > 0 ? far : near, lower[k] = middle > 0 ? near : far;
     }
   }

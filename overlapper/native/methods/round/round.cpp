@@ -27,6 +27,8 @@ constexpr double kClosed = 1e-12;
 constexpr double kSure = 5e-13;
 /// The same of second moments about the centroid.
 constexpr double kSureOfMoments = 5e-11;
+/// The fraction of a piece that may stay open where its centroid tells whether it lies outside.
+constexpr double kTold = 1e-6;
 /// Sums of area vectors are right to this fraction of the area.
 constexpr double kSummation = 16 * DBL_EPSILON;
 
@@ -120,6 +122,8 @@ class Measuring {
   double extent = 0;                           ///< m: no point of the common set is farther from the one inside
   const slicing::Enclosure* common = nullptr;  ///< what lies outside of that belongs to no piece
   bool closely = false;                        ///< looks at all of every interval
+  double layer = 0;                            ///< m: planes no farther from each other are one
+  double surface = 0;                          ///< m²: of the common set, where there are such layers
   PatchSums* patch = nullptr;                  ///< if wanted, of what belongs to `owner`
   Seen seen;                                   ///< of that
   int owner = 0;
@@ -145,8 +149,15 @@ class Measuring {
     return side;
   }
 
-  /// m: nearer than that, walls of the same direction lie in one plane.
-  double coincident() const { return 1e-24 * extent; }
+  /// Whether two planes are one within what is enclosed, their slacks that far from each other and the difference of
+  /// their normals that long. Where one takes the other's place that is not, what lies between them counts as an error.
+  bool coincide(double apart, double tilt) {
+    if (apart <= 1e-24 * extent && tilt <= 1e-24) return true;
+    const double gap = apart + tilt * extent;
+    if (!(gap <= layer)) return false;
+    totals.error += gap * surface;
+    return true;
+  }
 
   /// Calls `use(i, j)` with every two different walls whose normals may be opposite, for `side` -1, or equal, for 1:
   /// both ways round, and until it returns true. Of many walls, those next to each other along a line that no body
@@ -171,18 +182,19 @@ class Measuring {
   /// Whether two walls face each other in one plane, so that there is nothing between them.
   bool flat() {
     return any_two(-1, [&](const Wall& a, const Wall& b) {
-      return norm2(rounded(a.normal + b.normal)) < 1e-48 && (a.slack + b.slack).head < coincident();
+      return coincide(std::max(0.0, (a.slack + b.slack).head), norm(rounded(a.normal + b.normal)));
     });
   }
 
   /// One wall per plane: two lines that are one cross nowhere, or, by rounding, anywhere. A face is kept rather than a
-  /// cut, beyond which the next piece is flat, and of two faces that of the first body.
+  /// cut, beyond which the next piece is flat, and of two faces the inner one, or that of the first body.
   void drop_repeated() {
     any_two(1, [&](Wall& wall, const Wall& other) {
       if (wall.owner == kSuperseded || other.owner == kSuperseded) return false;
       const bool cut = wall.owner == slicing::kCut, other_is_cut = other.owner == slicing::kCut;
-      if ((cut == other_is_cut ? &other < &wall : cut) && norm2(rounded(other.normal - wall.normal)) < 1e-48 &&
-          std::abs((other.slack - wall.slack).head) < coincident())
+      const double outer = (wall.slack - other.slack).head;
+      const bool first = std::abs(outer) > 1e-24 * extent ? outer > 0 : &other < &wall;
+      if ((cut == other_is_cut ? first : cut) && coincide(std::abs(outer), norm(rounded(other.normal - wall.normal))))
         wall.owner = kSuperseded;
       return false;
     });
@@ -456,35 +468,70 @@ class Measuring {
   /// walls leave something there are convex, and reach no farther.
   bool outside(Vec3 centroid) const { return common && common->excludes(centroid + offset_); }
 
+  /// Where the surface does not close, slices across other axes hide less of where surfaces pass or touch each other.
   bool add_stack() {
-    std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent);
-    if (stack) stack->stretch = stretch;
-    if (!stack || !slicing::find_intervals(*stack, closely, intervals_)) return false;
-    if (intervals_.empty()) return true;
-    slicing::View view;
-    if (patch) view = view_of(*stack), stack->view = &view;
+    std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent, 0);
+    if (!stack) return false;
     best_.integrals = {};
     double open = std::numeric_limits<double>::infinity();
-    const auto closed = [&](double part = 1) {
-      return open <= part * kClosed * (totals.volume + best_.integrals.volume);
-    };
-    const auto better = [&](bool few, double strictness) {
-      const double less = integrate(*stack, few, strictness), ratio = less / open;
-      if (less < open) open = less, std::swap(best_, sum_);
-      return ratio;
-    };
-    // Of few nodes, the terms of a stretched area tell too little.
-    better(!stretch, 0);
-    if (!closed(0.1) && move_near(*stack)) return true;
-    if (!closed() && !stretch) better(false, 0);
-    // The rules end where the volume is exact. Where areas are not yet, the surface does not close.
-    if (!closed() && !slicing::find_intervals(*stack, true, intervals_)) return false;
-    for (double strictness = 1; strictness < 1e9 && !closed(); strictness *= 1e3)
-      if (!(better(false, strictness) < 0.5) && strictness > 1e3) break;
-    if (outside(in_world(*stack, best_.integrals.first) / best_.integrals.volume)) return true;
+    bool told = look_at(*stack, closely);
+    if (told && intervals_.empty()) return true;
+    if (told) {
+      // Of few nodes, the terms of a stretched area tell too little.
+      keep_better(*stack, !stretch, 0, open);
+      if (!closed(open, 0.1) && move_near(*stack)) return true;
+      keep_best(*stack, open);
+    }
+    for (int other = 1; other < slicing::kAxes && !closed(open, 2); ++other) {
+      std::optional<slicing::Stack> across = slicing::stack_of(rounds_, walls_, extent, other);
+      if (!across) break;
+      if (!look_at(*across, true) || intervals_.empty()) continue;
+      told = true;
+      const double before = open;
+      keep_best(*across, open);
+      if (open < before) stack = across;
+    }
+    if (!told) return false;
+    // Slices of which nothing is sure may be those of another piece.
+    const double volume = best_.integrals.volume;
+    if (open <= kTold * volume && outside(in_world(*stack, best_.integrals.first) / volume)) return true;
     totals.open += open;
-    add_sum(*stack, best_);
+    if (sound(*stack, best_.integrals)) add_sum(*stack, best_);
+    else totals.open += std::abs(volume);
     return true;
+  }
+
+  /// Whether that is no farther away than anything may be. If not, it is rounding.
+  bool sound(const slicing::Stack& stack, const slicing::Integrals& s) const {
+    const double far = 8 * extent * (1 + std::abs(stack.shear.x) + std::abs(stack.shear.y)),
+                 volume = std::abs(s.volume);
+    return norm(s.first) <= far * volume && std::abs(s.squares.x + s.squares.y + s.squares.z) <= far * far * volume;
+  }
+
+  /// Makes a stack ready and finds its intervals; false if they cannot be told.
+  bool look_at(slicing::Stack& stack, bool all) {
+    stack.stretch = stretch;
+    if (patch) view_ = view_of(stack), stack.view = &view_;
+    return find_intervals(stack, all);
+  }
+
+  bool closed(double open, double part = 1) const {
+    return open <= part * kClosed * (totals.volume + best_.integrals.volume);
+  }
+
+  /// Returns by what factor less is open than before.
+  double keep_better(const slicing::Stack& stack, bool few, double strictness, double& open) {
+    const double less = integrate(stack, few, strictness), ratio = less / open;
+    if (less < open) open = less, std::swap(best_, sum_);
+    return ratio;
+  }
+
+  void keep_best(const slicing::Stack& stack, double& open) {
+    if (!closed(open) && !stretch) keep_better(stack, false, 0, open);
+    // The rules end where the volume is exact. Where areas are not yet, the surface does not close.
+    if (!closed(open) && !find_intervals(stack, true)) return;
+    for (double strictness = 1; strictness < 1e9 && !closed(open); strictness *= 1e3)
+      if (!(keep_better(stack, false, strictness, open) < 0.5) && strictness > 1e3) break;
   }
 
   /// Coordinates count from a point inside of both bodies. A piece that is small beside its way from there is measured
@@ -515,12 +562,44 @@ class Measuring {
     const slicing::Interval &lowest = intervals_.front(), &highest = intervals_.back();
     if (stack.low_plane && lowest.low == stack.low)
       slicing::add_face(*stack.low_plane, stack, lowest.outline, lowest.low, sum.integrals);
+    else if (drawn_low_ >= 0 && !few) add_tip(stack, -1, drawn_low_, lowest.outline, lowest.low);
     if (stack.high_plane && highest.high == stack.high)
       slicing::add_face(*stack.high_plane, stack, highest.outline, highest.high, sum.integrals);
+    else if (drawn_high_ >= 0 && !few) add_tip(stack, 1, drawn_high_, highest.outline, highest.high);
     // A piece for which that does not hold is worth its size as an error. It may be rounding alone.
     if (!sound || !(sum.integrals.volume > 0) || !slicing::within_chords(lowest.low, highest.high, sum))
       return 8 * std::abs(sum.about) + std::abs(sum.integrals.volume);
     return open_part(stack, sum.integrals);
+  }
+
+  /// Finds the intervals of a stack, and draws them out to where a quadric ends that they end before by no more than
+  /// rounding: what is left there is as wide as the root of how thin it is.
+  bool find_intervals(const slicing::Stack& stack, bool all) {
+    drawn_low_ = drawn_high_ = -1;
+    if (!slicing::find_intervals(stack, all, intervals_)) return false;
+    if (intervals_.empty()) return true;
+    double &low = intervals_.front().low, &high = intervals_.back().high;
+    const double thin = 1e-13 * (stack.high - stack.low);
+    for (int i = 0; i < stack.quadrics; ++i) {
+      const slicing::Quadric& q = stack.quadric[i];
+      if (low - stack.low <= thin && stack.low == q.low && holds_to(stack, low, stack.low))
+        low = stack.low, drawn_low_ = q.owner;
+      if (stack.high - high <= thin && stack.high == q.high && holds_to(stack, high, stack.high))
+        high = stack.high, drawn_high_ = q.owner;
+    }
+    return true;
+  }
+
+  /// Whether there is something between where intervals end and where a quadric does.
+  static bool holds_to(const slicing::Stack& stack, double t, double end) {
+    return t == end || !slicing::outline(slicing::Slice(stack, t + (end - t) / 2)).empty();
+  }
+
+  /// What slices that are drawn out to the end of a quadric leave there is a face as thin as rounding.
+  void add_tip(const slicing::Stack& stack, int side, int of_owner, const slicing::Outline& outline, double t) {
+    slicing::Line line;
+    line.rate = side, line.offset = side * t, line.owner = of_owner;
+    slicing::add_face(line, stack, outline, t, sum_.integrals);
   }
 
   /// What may be missing: by how much the volume differs from ∫ t N dA, and what area vectors, which sum to zero over
@@ -566,12 +645,16 @@ class Measuring {
   std::vector<int> owners_;  ///< of the faces of that
   std::vector<slicing::Interval> intervals_;
   slicing::Sum sum_, best_;
-  Vec3 offset_;         ///< of the point that the pieces are about, from the point inside
-  bool moved_ = false;  ///< whether that is another
+  slicing::View view_;
+  int drawn_low_ = -1, drawn_high_ = -1;  ///< the owners of quadrics to whose ends intervals are drawn out
+  Vec3 offset_;                           ///< of the point that the pieces are about, from the point inside
+  bool moved_ = false;                    ///< whether that is another
 };
 
 /// The fraction of a volume that may stay open before slices are looked at more closely, or others are.
 constexpr double kMostOpen = 1e-11;
+/// The fraction of a volume that may lie between planes that are taken for one.
+constexpr double kLayer = 1e-12;
 /// Beyond that fraction of a volume, something is wrong. Polytopes of tangent planes take seconds to be as good.
 constexpr double kMostError = 1e-8;
 
@@ -760,13 +843,25 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   const Totals& totals = measuring.totals;
   const auto open = [&] { return 2 * std::max(totals.open, missing(totals)); };
   const std::optional<PatchSums> patch_before = patch ? std::optional(*patch) : std::nullopt;
-  measuring.closely = false;
+  measuring.closely = false, measuring.layer = 0;
   if (!add_pieces()) return std::nullopt;
-  // Where a surface that is open says so, something is hidden in an interval of which the middle alone was looked at.
-  if (!(open() <= kMostOpen * totals.volume)) {
-    measuring.closely = true;
+  const auto off = [&] { return totals.error + open(); };
+  const auto try_again = [&] {
+    const Totals before = totals;
+    const double off_before = off();
+    const std::optional<PatchSums> with_before = patch ? std::optional(*patch) : std::nullopt;
     if (patch) *patch = *patch_before;
-    if (!add_pieces()) return std::nullopt;
+    if (add_pieces() && off() < off_before) return;
+    measuring.totals = before;
+    if (patch) *patch = *with_before;
+  };
+  // Where a surface that is open says so, something is hidden in an interval of which the middle alone was looked at.
+  measuring.closely = true;
+  if (!(open() <= kMostOpen * totals.volume)) try_again();
+  // Or faces and cuts lie so near each other that rounding tells which of them is where. Then they are one.
+  if (!(open() <= kMostOpen * totals.volume)) {
+    measuring.layer = kLayer * totals.volume / totals.area, measuring.surface = totals.area;
+    try_again();
   }
   RoundMeasures result;
   result.volume = totals.volume;

@@ -17,10 +17,9 @@ Slice::Slice(const Stack& stack_, double t_) : stack(stack_), t(t_) {
       slack = constant;
       radius = half_chord[i];
     } else {
-      // The nearer of the two roots of y² − 2 middle y + constant: not as a difference.
       const double middle = q.centre.x - q.shear.x * t;
       const double far = middle > 0 ? middle + half_chord[i] : middle - half_chord[i];
-      const double near = far != 0 ? constant / far : 0;
+      const double near = q.nearer(far, middle, constant, t);
       upper[i] = middle > 0 ? far : near;
       lower[i] = middle > 0 ? near : far;
     }

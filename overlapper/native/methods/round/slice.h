@@ -34,18 +34,24 @@ struct Quadric {
   bool ball = false;
   int owner = 0;
   double radius = 0;
-  Point across;              ///< of a cylinder: the unit vector orthogonal to the axis
-  Point shear;               ///< what T has along l and m; of a cylinder in x alone, along `across`
-  Point centre;              ///< of a ball at t = 0; of a cylinder in x alone, along `across`
-  double along = 0;          ///< dot(T, centre), in the plane orthogonal to the axis
-  double slack = 0;          ///< |centre|² − radius²: not positive where the origin is inside
-  double low = 0, high = 0;  ///< the values of t between which there are slices
-  double level = 0;          ///< that of its centre
+  Point across;                          ///< of a cylinder: the unit vector orthogonal to the axis
+  Point shear;                           ///< what T has along l and m; of a cylinder in x alone, along `across`
+  Point centre;                          ///< of a ball at t = 0; of a cylinder in x alone, along `across`
+  double along = 0;                      ///< dot(T, centre), in the plane orthogonal to the axis
+  double slack = 0;                      ///< |centre|² − radius²: not positive where the origin is inside
+  double low = 0, high = 0;              ///< the values of t between which there are slices
+  double level = 0;                      ///< that of its centre
+  static constexpr double kPole = 1e-6;  ///< of the terms, the square of a side that is as well known by a difference
 
   double half_chord2(double t) const { return (t - low) * (high - t); }
   /// The part of value() that does not depend on x and y, and the size of its terms.
   double constant(double t) const { return (1 + dot(shear, shear)) * t * t - 2 * along * t + slack; }
   double terms(double t) const { return (1 + dot(shear, shear)) * t * t + std::abs(2 * along * t) + std::abs(slack); }
+  /// Of the two roots of y² − 2 middle y + constant the nearer one to zero, from the other: not as a difference, but
+  /// near an end of the quadric, where that is smaller than what rounding leaves of the constant.
+  double nearer(double far, double middle, double constant, double t) const {
+    return far * far > kPole * terms(t) ? constant / far : 2 * middle - far;
+  }
   /// The value of |X − centre|² − radius² at a point of the slice's coordinates.
   double value(Point p, double t) const {
     const Point q = ball ? p : Point{dot(across, p), 0};

@@ -12,6 +12,8 @@ constexpr double kParallel = 1e-11;
 constexpr double kRushing = 1e-3;
 /// A ridge that rises less than that from slice to slice lies in them rather than across.
 constexpr double kSteep = 0.05;
+/// rad, about: how slices are turned where others do not suit.
+constexpr std::array<double, kAxes> kTurns{0, 0.3, -0.3, 0.7, -0.7};
 
 /// Axes of the slices: l, m and n orthonormal, t = n + x l + y m for the shear (x, y).
 struct Axes {
@@ -129,14 +131,18 @@ bool even(const Axes& axes, std::span<const Wall> walls) {
   });
 }
 
-Axes axes_of(std::span<const Round> rounds, std::span<const Wall> walls) {
+/// Of the ways to turn them, the one after so many that suit; the first of all where none does. Slices orthogonal to
+/// two axes leave no choice.
+std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall> walls, int way) {
   const Axes first = choose(rounds, walls, 0);
-  if (even(first, walls)) return first;
-  for (const double angle : {0.3, -0.3, 0.7, -0.7}) {
-    const Axes other = choose(rounds, walls, angle);
-    if (even(other, walls)) return other;
+  const bool fixed = rounds.size() == 2 && !rounds[0].ball && !rounds[1].ball;
+  int suit = 0;
+  for (const double angle : kTurns) {
+    const Axes axes = angle == 0 ? first : choose(rounds, walls, angle);
+    if (even(axes, walls) && suit++ == way) return axes;
+    if (fixed) break;
   }
-  return first;
+  return way == 0 ? std::optional(first) : std::nullopt;
 }
 
 Line line_of(const Wall& wall, const Axes& axes) {
@@ -201,9 +207,11 @@ void add_round(Stack& stack, const Round& r, const Axes& axes) {
 
 }  // namespace
 
-std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent) {
+std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way) {
   if (walls.size() > static_cast<size_t>(kMostLines - 4)) return std::nullopt;
-  const Axes axes = axes_of(rounds, walls);
+  const std::optional<Axes> chosen = axes_of(rounds, walls, way);
+  if (!chosen) return std::nullopt;
+  const Axes& axes = *chosen;
   Stack stack;
   stack.l = rounded(axes.l), stack.m = rounded(axes.m), stack.n = rounded(axes.n), stack.t = rounded(axes.t);
   stack.shear = {axes.x.head, axes.y.head};

@@ -8,8 +8,12 @@
 
 namespace overlapper::slicing {
 
+/// How many ways there are to lay slices at most.
+inline constexpr int kAxes = 5;
+
 /// The slices of what walls leave of at most two rounds, not both of them balls, orthogonal to every cylinder's axis.
-/// No point of them is farther from the origin than `extent`. Nothing where there are too many walls.
-std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent);
+/// No point of them is farther from the origin than `extent`. Of the ways to lay them, `way` 0 is the one that suits
+/// best. Nothing where there are too many walls, or not so many ways.
+std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way);
 
 }  // namespace overlapper::slicing
