@@ -10,11 +10,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Shape
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Shape
 from overlapper.proof.claims import AXES, OwnedPlane, support_above
 from overlapper.proof.rational import Exact, RationalBody, exact, integers
 
 Floats = NDArray[np.float64]
+
+TINY = np.finfo(float).tiny
 
 
 def supporting(bodies: Sequence[RationalBody], normal: Exact, owner: int) -> OwnedPlane:
@@ -95,7 +97,11 @@ class BodyPlanes:
 
 
 def _round_normal(shape: Shape, point: Floats) -> Floats:
-    """The outward normal of the plane of a sphere, capsule or cylinder that the point is farthest above."""
+    """The outward normal of the plane of a sphere, capsule or cylinder that the point is farthest above; of an ellipsoid
+    that of the smaller or larger one through the point."""
+    if isinstance(shape, Ellipsoid):
+        point = point / shape.half_axes**2
+        point = point / max(abs(point).max(), TINY)
     x, y, z = point
     if isinstance(shape, Cylinder) and abs(z) - shape.length / 2 >= math.hypot(x, y) - shape.radius:
         return np.array([0.0, 0.0, math.copysign(1.0, z)])

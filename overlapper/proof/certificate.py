@@ -41,7 +41,7 @@ BITS = (64, 256)
 
 # Bits to which the volume of a pair with a round body is proved.
 NARROW = 48
-Round = Sphere | Capsule | Cylinder | RoundedHull
+Round = Sphere | Capsule | Cylinder | RoundedHull | Ellipsoid
 
 
 def certificate(overlap: Overlap) -> Certificate:
@@ -50,20 +50,25 @@ def certificate(overlap: Overlap) -> Certificate:
     `verify()` of the result checks it in rational arithmetic, without the core, and returns (lower, upper) bounds of
     the common volume in m³ as fractions. CertificateError says why there is no certificate.
     """
-    if any(isinstance(body.shape, Ellipsoid) for body in overlap.shapes):
-        raise CertificateError("ellipsoids have no certificate")
     bodies = [RationalBody(shape) for shape in overlap.shapes]
     match overlap.status:
         case "separated":
             return _separated(overlap, bodies)
         case "touching":
             return _touching(overlap, bodies)
-        case _ if len(bodies) == 2 and any(isinstance(body.shape, Round) for body in bodies):
+        case _ if len(bodies) == 2 and _in_one_frame(bodies):
             return _bracketed(overlap)
         case _ if any(isinstance(body.shape, RoundedHull) for body in bodies):
-            raise CertificateError("more than two bodies that overlap have no certificate if one is a rounded hull")
+            others = "an ellipsoid" if len(bodies) == 2 else "two bodies or more"
+            raise CertificateError(f"a rounded hull that overlaps with {others} has no certificate")
         case _:
             return _overlapping(overlap, bodies)
+
+
+def _in_one_frame(bodies: list[RationalBody]) -> bool:
+    """Whether one is round, and whether coordinates make all that is round of balls and cylinders."""
+    round_ones = [body.shape for body in bodies if isinstance(body.shape, Round)]
+    return bool(round_ones) and (len(round_ones) == 1 or not any(isinstance(x, Ellipsoid) for x in round_ones))
 
 
 # ----------------------------------------------------------------------------------------------- separated and touching

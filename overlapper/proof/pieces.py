@@ -75,22 +75,25 @@ class Piece:
 
 
 class Frame:
-    """From the axes of a body to those in which all is measured."""
+    """From the axes of a body to those in which all is measured: of an ellipsoid, each in units of its half axis."""
 
     def __init__(self, body: RationalBody, home: RationalBody) -> None:
         turn = home.axes.T @ body.axes
         self._rows = [vector(row) for row in turn]
         self._shift = vector(home.axes.T @ (body.position - home.position))
+        self.units = vector(home.shape.half_axes) if isinstance(home.shape, Ellipsoid) else None
 
     def direction(self, v: Vector) -> Vector:
         return dot(self._rows[0], v), dot(self._rows[1], v), dot(self._rows[2], v)
 
     def point(self, v: Vector) -> Vector:
-        return plus(self.direction(v), self._shift)
+        x, y, z = plus(self.direction(v), self._shift)
+        return (x / self.units[0], y / self.units[1], z / self.units[2]) if self.units else (x, y, z)
 
     def plane(self, normal: Vector, offset: fmpq) -> Plane:
-        turned = self.direction(normal)
-        return Plane(turned, offset + dot(turned, self._shift))
+        x, y, z = turned = self.direction(normal)
+        placed = offset + dot(turned, self._shift)
+        return Plane((x * self.units[0], y * self.units[1], z * self.units[2]) if self.units else turned, placed)
 
 
 def doubles(points: Iterable[Vector]) -> Floats:
@@ -98,8 +101,9 @@ def doubles(points: Iterable[Vector]) -> Floats:
 
 
 def pieces(body: RationalBody, home: RationalBody) -> list[Piece]:
-    """In the axes of `home`."""
+    """In the axes of `home`. An ellipsoid has pieces only at home, and is a ball there; other round bodies are not."""
     frame = Frame(body, home)
+    assert not frame.units or body is home or isinstance(body.shape, Box | Hull | HalfSpace)
     match body.shape:
         case Sphere() as ball:
             return [_ball(frame.point(ORIGIN), ball.radius, ())]
@@ -114,7 +118,8 @@ def pieces(body: RationalBody, home: RationalBody) -> list[Piece]:
         case Hull() | RoundedHull():
             return _Facets(body, frame).pieces()
         case Ellipsoid():
-            raise TypeError("shape must not be an ellipsoid, which has no certificate")
+            assert body is home
+            return [_ball(ORIGIN, 1.0, ())]
 
 
 def _ball(centre: Vector, radius: float, planes: tuple[Plane, ...]) -> Piece:

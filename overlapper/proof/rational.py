@@ -149,8 +149,9 @@ class RationalBody:
                     return None
                 level = Fraction(half.given_offset) * (local @ normal) / (normal @ normal)
                 return base + level / scale, Fraction(0)
-            case Ellipsoid():
-                raise TypeError("shape must not be an ellipsoid, which has no certificate")
+            case Ellipsoid() as ellipsoid:
+                stretched = exact(ellipsoid.half_axes) * local
+                return base, Fraction(stretched @ stretched) / scale**2
 
     @property
     def hull(self) -> Hull:
@@ -195,7 +196,8 @@ class RationalBody:
         """Whether the body holds a ball of radius `margin` about each of the points (n, 3) / scale in the world.
 
         Of points on the surface of a rounded hull this may be said to be false, as the nearest point of the core is
-        only known to rounding.
+        only known to rounding; and of a ball in an ellipsoid, unless it is in one that is smaller by as much of the
+        shortest half axis.
         """
         local, scale = self.local(points, scale)
         x, y, z = local.T
@@ -222,6 +224,12 @@ class RationalBody:
                 inside = (square <= math.floor(own * reach * reach)) & (reach >= 0)
             case Cylinder() as cylinder:
                 inside = (abs(z) <= least(Fraction(cylinder.length) / 2)) & holds(x * x + y * y, cylinder.radius)
+            case Ellipsoid() as ellipsoid:
+                half_axes = exact(ellipsoid.half_axes)
+                inverse, unit = integers(1 / half_axes)
+                left = (1 - margin / min(half_axes)) * scale * unit
+                square = ((local * inverse) ** 2).sum(axis=1)
+                inside = (square <= math.floor(left * left)) & (left >= 0)
             case Hull() | HalfSpace():
                 inside = self._below_facets(local, scale, margin)
             case RoundedHull() as rounded:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Sphere
 from overlapper.proof.body_planes import BodyPlanes
 from overlapper.proof.rational import DOUBT, UNDERFLOW, Exact, bits, exact, in_doubles, integers
 
@@ -34,6 +34,9 @@ def ray_exits(known: BodyPlanes, start: Exact, arms: Exact, fine: int) -> Exact:
         case Cylinder() as cylinder:
             (radius, half), grow = _in_units(scale, cylinder.radius, cylinder.length / 2)
             shares = _out_of_cylinder(grow * origin, grow * rays, radius, half, fine)
+        case Ellipsoid() as ellipsoid:
+            inverse, grow = integers(1 / exact(ellipsoid.half_axes))
+            shares = _out_of_ball((origin * inverse)[None], rays * inverse, scale * grow, fine)
         case Box() | Hull() | HalfSpace():
             shares = _out_of_planes(known.rows, origin, rays, scale, fine)
     least: Exact = np.minimum(shares, one)

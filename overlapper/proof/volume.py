@@ -5,6 +5,7 @@ Decisions are made without rounding or by balls that do not hold zero; where one
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -13,12 +14,12 @@ from fractions import Fraction
 import numpy as np
 from flint import arb, ctx, fmpq
 
-from overlapper import HalfSpace, Placed
+from overlapper import Box, Ellipsoid, HalfSpace, Hull, Placed
 from overlapper.proof import one_quadric
 from overlapper.proof.ball_and_tube import BallAndTube
 from overlapper.proof.corners import Polytope, below
 from overlapper.proof.pieces import DOUBT, Ball, Floats, Piece, Plane, Quadric, Tube, pieces
-from overlapper.proof.rational import RationalBody
+from overlapper.proof.rational import RationalBody, exact
 from overlapper.proof.refusal import Bounds, CertificateError
 from overlapper.proof.signs import Undecided
 from overlapper.proof.slices import Slices
@@ -38,9 +39,16 @@ class Common:
 
     def __init__(self, a: Placed, b: Placed) -> None:
         bodies = RationalBody(a), RationalBody(b)
-        home = next((body for body in bodies if not isinstance(body.shape, HalfSpace)), None)
-        if home is None:
+        stretched = [body for body in bodies if isinstance(body.shape, Ellipsoid)]
+        if stretched and not any(isinstance(body.shape, Box | Hull | HalfSpace) for body in bodies):
+            raise CertificateError("of an ellipsoid and another round body no volume is proved")
+        bounded = [body for body in bodies if not isinstance(body.shape, HalfSpace)]
+        if not bounded:
             raise CertificateError("one of the bodies must be bounded")
+        home = (stretched or bounded)[0]
+        # Of a unit of volume in its axes.
+        shape = home.shape
+        self._unit = math.prod(exact(shape.half_axes)) if isinstance(shape, Ellipsoid) else Fraction(1)
         self._parts: list[Part] = []
         self.lost = fmpq(0)
         first, second = (_Pieces(pieces(body, home)) for body in bodies)
@@ -70,7 +78,7 @@ class Common:
             total = sum(volumes, arb(0))
             self._enough = total.lower().nonnegative_part() / (ENOUGH * len(volumes) + 1)
             lower, upper = dyadic(total.lower()), dyadic(total.upper()) + fraction(self.lost)
-        return max(lower, Fraction(0)), upper
+        return max(lower, Fraction(0)) * self._unit, upper * self._unit
 
 
 Part = Callable[[int], arb]

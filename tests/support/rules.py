@@ -327,12 +327,13 @@ def the_certificate_is_proved(case: Case, found: Overlap) -> str:
     """Within what is stated; of three round bodies, and of a round one that touches, which it encloses by other planes,
     beside that and as narrow."""
     kinds = [type(body.shape) for body in found.shapes]
-    if Ellipsoid in kinds or (len(kinds) > 2 and found and RoundedHull in kinds):
+    if found and RoundedHull in kinds and (len(kinds) > 2 or Ellipsoid in kinds):
         return ""  # they have none
     lower, upper = certificate(found).verify()
     volume, error = Fraction(found.volume), Fraction(found.volume_error)
     within = volume - error <= lower <= upper <= volume + error
-    other_planes = case.round and (len(found.shapes) > 2 or found.status == "touching")
+    of_planes = len(kinds) > 2 or (Ellipsoid in kinds and found.way != "slicing") or found.status == "touching"
+    other_planes = case.round and of_planes
     beside = other_planes and lower <= volume + error and volume - error <= upper
     narrow = upper - lower <= 3 * max(2 * error, Fraction(TOLERANCE) * volume)
     return "" if within or (beside and narrow) else "the proved bounds are not within the stated ones"

@@ -195,7 +195,7 @@ void define_shape_types(nb::module_& m) {
 
 All points with (x / a)² + (y / b)² + (z / c)² <= 1. With equal half axes it answers as the sphere does. With a box, a
 hull or a half-space, it is measured as a ball is, of which it is the image; with other round bodies, between polytopes,
-as closely as `tolerance` asks. It has no certificate.)");
+as closely as `tolerance` asks.)");
   ellipsoid.def(
       "__init__",
       [](Ellipsoid* self, nb::handle half_axes) {
@@ -310,7 +310,7 @@ void define_rounded_hull(nb::module_& m) {
 
 The Minkowski sum of the hull and a ball: what Bullet collides with where a convex mesh has a margin. ValueError as
 for Hull and Sphere. Method "paper" does not take it; more than two bodies that overlap, it among them, have
-no certificate.)");
+no certificate, and neither does it with an ellipsoid that it overlaps.)");
   rounded.def(
       "__init__",
       [](RoundedHull* self, nb::handle vertices, nb::handle radius) {

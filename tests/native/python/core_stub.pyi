@@ -80,7 +80,7 @@ class Ellipsoid:
 
     All points with (x / a)² + (y / b)² + (z / c)² <= 1. With equal half axes it answers as the sphere does. With a box, a
     hull or a half-space, it is measured as a ball is, of which it is the image; with other round bodies, between polytopes,
-    as closely as `tolerance` asks. It has no certificate.
+    as closely as `tolerance` asks.
     """
 
     def __init__(self, half_axes: numpy.typing.ArrayLike) -> None: ...
@@ -315,7 +315,7 @@ class RoundedHull:
 
     The Minkowski sum of the hull and a ball: what Bullet collides with where a convex mesh has a margin. ValueError as
     for Hull and Sphere. Method "paper" does not take it; more than two bodies that overlap, it among them, have
-    no certificate.
+    no certificate, and neither does it with an ellipsoid that it overlaps.
     """
 
     def __init__(self, vertices: numpy.typing.ArrayLike, radius: float) -> None: ...
