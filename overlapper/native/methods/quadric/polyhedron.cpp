@@ -43,14 +43,15 @@ bool Rings::become(const Shape& shape, const Pose& pose) {
 
 /// The corner where an edge that is cut passes the height, the same for both of its faces.
 int Rings::between(int above, int below, double height) {
-  for (const Edge& edge : crossed_)
-    if (edge.from == above && edge.to == below) return edge.left;
-  const Vec3 p = corners_[above], q = corners_[below];
-  Vec3 at = p + (p.z - height) / (p.z - q.z) * (q - p);
-  at.z = height;
-  corners_.push_back(at);
-  crossed_.push_back({above, below, static_cast<int>(corners_.size()) - 1, 0});
-  return crossed_.back().left;
+  // Of a fan of faces, all edges have one end in common.
+  const auto [at_edge, is_new] = crossed_.try_emplace({above, below}, static_cast<int>(corners_.size()));
+  if (is_new) {
+    const Vec3 p = corners_[above], q = corners_[below];
+    Vec3 at = p + (p.z - height) / (p.z - q.z) * (q - p);
+    at.z = height;
+    corners_.push_back(at);
+  }
+  return at_edge->second;
 }
 
 bool Rings::cut(double height, bool keep_below) {

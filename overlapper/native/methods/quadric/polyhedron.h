@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "shapes/shape.h"
@@ -61,7 +63,7 @@ class Rings {
   // To work in.
   std::vector<Plane> kept_;
   std::vector<int> kept_ring_, kept_start_, after_, number_;
-  std::vector<Edge> crossed_;
+  std::map<std::pair<int, int>, int> crossed_;  ///< corners, by the upper and the lower end of the edges cut
 };
 
 }  // namespace overlapper::quadric
