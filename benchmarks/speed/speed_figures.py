@@ -49,6 +49,8 @@ LOOKS = {
     "clipping": Look("#7a4a21", "v", size=5.5),
     "scipy": Look("#1f5fbf", "^", size=6),
     "manifold3d": Look("#1a8a3a", "P", size=7.5),
+    "manifold3d, by the clock": Look("#8cc99a", "P", size=5),
+    "overlap": Look("#e0409a", "*", size=8.5),
     "trimesh": Look("#19a7a7", "X", size=7),
     "Monte Carlo": Look("#8d8d8d", ".", joined=True, size=6),
     "voxels": Look("#9467bd", "s", joined=True, size=3.5),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -142,6 +143,7 @@ def text(results: Results) -> str:
         "families": str(len(pairs)),
         "pairs": str(sum(pairs.values())),
         "targets": targets(rows),
+        **clocks(results),
         "wrong": wrong(rows),
         "powers": power_table(by_size),
         "per_facet": per_facet(rows),
@@ -236,16 +238,43 @@ def table(heading: list[str], lines: Iterable[Iterable[str]]) -> str:
     return "\n".join([f"| {' | '.join(heading)} |", rule, *(f"| {' | '.join(line)} |" for line in lines)])
 
 
+BY_CLOCK = "manifold3d, by the clock"
+
+
+def clocks(results: Results) -> dict[str, str]:
+    """On how many processors the clock was read, and how much slower one of them made manifold3d at most."""
+    ratios = {
+        f"{row.family}{f', {row.setting} segments' if row.setting.isdigit() else ''}": float(bound.us) / float(row.us)
+        for row in results.rows
+        if row.method == BY_CLOCK
+        and row.us
+        and float(row.us) >= 1e3
+        and (bound := find(results.rows, row.family, "manifold3d", row.setting))
+    }
+    cores = re.search(r"(\d+) cores", " ".join(results.notes))
+    worst = max(ratios, key=lambda name: ratios[name], default="none, as it was not asked")
+    return {
+        "processors": cores[1] if cores else "its",
+        "slower": f"{ratios.get(worst, 1.0):.1f}",
+        "slower_at": worst,
+    }
+
+
 def targets(rows: list[Row]) -> str:
     lines = []
     for family, (aim, aim_batch) in TARGETS.items():
         peer, alone, many = (best(rows, family, name) for name in ("manifold3d", "auto", "auto, batch"))
         if not (peer and alone):
             continue
-        cells = [family, duration(float(peer.us)), duration(float(alone.us)), held(peer, alone, aim)]
+        clock = find(rows, family, BY_CLOCK, "prebuilt")
+        cells = [family, duration(float(peer.us)), duration(float(clock.us)) if clock else ""]
+        cells += [duration(float(alone.us)), held(peer, alone, aim)]
         cells += [duration(float(many.us)), held(peer, many, aim_batch)] if many else ["", ""]
         lines.append(cells)
-    return table(["", "manifold3d", "a call", "times faster (aim)", "a pair of a batch", "times faster (aim)"], lines)
+    return table(
+        ["", "manifold3d", "by the clock", "a call", "times faster (aim)", "a pair of a batch", "times faster (aim)"],
+        lines,
+    )
 
 
 def held(peer: Row, ours: Row, aim: float | None) -> str:

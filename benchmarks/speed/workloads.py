@@ -2,7 +2,8 @@
 
 A family is one function of a numpy generator that makes one pair; to add one, write it and name it in FAMILIES with the
 number of pairs that are made of it. Each pair has an exact truth: rational arithmetic (tests/support/exact.py) for
-polyhedra, a closed form for round shapes.
+polyhedra; for round shapes a closed form, slices in sixty digits (tests/support/round_exact.py), or the bounds that the
+proof in ball arithmetic (overlapper/proof) comes to, which asks nothing of the core.
 """
 
 from __future__ import annotations
@@ -17,25 +18,41 @@ from zlib import crc32
 import families
 import numpy as np
 import truth
+from round_exact import exactly
 from strategies import directions, product, quaternion, rotation, turn
 
-from overlapper import Box, Cylinder, HalfSpace, Hull, Placed, Sphere, distance
+from overlapper import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Placed,
+    RoundedHull,
+    Shape,
+    Sphere,
+    distance,
+    overlap,
+)
 
 PI = Fraction(Decimal("3.14159265358979323846264338327950288419716939937510582"))
 
-ROUND = (Sphere, Cylinder)
+ROUND = (Sphere, Capsule, Cylinder, Ellipsoid, RoundedHull)
 
 GROUND = 10.0  # m, side of the box that stands for the ground where a peer takes no half-space
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two placed shapes. Round ones bring their volume along, and their depth if it is known."""
+    """Two placed shapes. Round ones bring their volume along, how far that may be off if it is no closed form, and
+    their depth if it is known."""
 
     a: Placed
     b: Placed
     volume_of_round: Fraction | None = None
     depth_of_round: Fraction | None = None
+    volume_within: Fraction = Fraction(0)
 
     @property
     def bodies(self) -> tuple[Placed, Placed]:
@@ -211,6 +228,102 @@ def cylinder_wedge(rng: np.random.Generator) -> Pair:
     return Pair(Placed(Cylinder(float(r), 4.0)), Placed(below), r**2 * (r * 3 / 4) * 2 / 3)
 
 
+# Round shapes at any pose
+
+SHALLOW = 1e-6  # m
+
+
+def sliced(a: Placed, b: Placed) -> Pair:
+    """A ball, capsule or cylinder and a box or hull, with their volume as a double."""
+    volume = Fraction(exactly(a, b).volume)
+    return Pair(a, b, volume, None, volume / 2**53)
+
+
+def proved(a: Placed, b: Placed) -> Pair:
+    """Any two that have a certificate, with the middle of what it proves."""
+    low, high = overlap(a, b).certificate().verify()
+    return Pair(a, b, (low + high) / 2, None, (high - low) / 2)
+
+
+def crossing(rng: np.random.Generator, one: Shape, other: Shape) -> tuple[Placed, Placed]:
+    """A third of a metre apart, turned at random."""
+    at = directions(rng, 1)[0]
+    return Placed(one, at, quaternion(rng)), Placed(other, at + directions(rng, 1)[0] / 3, quaternion(rng))
+
+
+def ball_and_box(rng: np.random.Generator) -> Pair:
+    return sliced(*crossing(rng, Sphere(rng.uniform(0.4, 0.6)), Box(rng.uniform(0.3, 0.5, 3))))
+
+
+def ball_over_edge(rng: np.random.Generator) -> Pair:
+    """A ball that reaches SHALLOW deep over the edge of a box."""
+    r, sides = rng.uniform(0.4, 0.6), rng.uniform(0.5, 1.0, 3)
+    out = (r - SHALLOW) / np.sqrt(2)
+    tilt, at = quaternion(rng), directions(rng, 1)[0]
+    centre = rotation(tilt) @ [sides[0] + out, sides[1] + out, rng.uniform(-0.1, 0.1)]
+    return sliced(Placed(Sphere(r), at + centre), Placed(Box(sides), at, tilt))
+
+
+def capsule_and_box(rng: np.random.Generator) -> Pair:
+    return sliced(*crossing(rng, capsule(rng), Box(rng.uniform(0.3, 0.5, 3))))
+
+
+def cylinder_and_hull(rng: np.random.Generator) -> Pair:
+    return sliced(*crossing(rng, Cylinder(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1)), hull(rng, 20)))
+
+
+def capsule_on_ground(rng: np.random.Generator) -> Pair:
+    """Lying 1e-3 m deep and not quite level, so that one end is out."""
+    shape, tilt = capsule(rng), product(turn([0, 0.05, 0]), turn([0, np.pi / 2, 0]))
+    lowest = shape.length / 2 * abs((rotation(tilt) @ [0, 0, 1])[2]) + shape.radius
+    return sliced(Placed(shape, (*rng.uniform(-1, 1, 2), lowest - 1e-3), tilt), Placed(HalfSpace([0, 0, 1], 0)))
+
+
+def ball_and_capsule(rng: np.random.Generator) -> Pair:
+    return proved(*crossing(rng, Sphere(rng.uniform(0.4, 0.6)), capsule(rng)))
+
+
+def two_capsules(rng: np.random.Generator) -> Pair:
+    return proved(*crossing(rng, capsule(rng), capsule(rng)))
+
+
+def capsule_and_cylinder(rng: np.random.Generator) -> Pair:
+    return proved(*crossing(rng, capsule(rng), Cylinder(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1))))
+
+
+def ellipsoid_and_hull(rng: np.random.Generator) -> Pair:
+    """Half axes of powers of two along the axes, so that the hull can be stretched to where it is a ball, unrounded."""
+    half = 2.0 ** -rng.permutation([0, 1, 2])
+    points = np.round(families.mapped(hull(rng, 20).vertices, rotation(quaternion(rng))) * 2**20) / 2**20
+    stretched = sliced(Placed(Sphere(1.0)), Placed(Hull(points / half)))
+    share = Fraction(float(half.prod()))
+    a, b = Placed(Ellipsoid(half)), Placed(Hull(points))
+    return Pair(a, b, stretched.volume * share, None, stretched.volume_within * share)
+
+
+def rounded_hull_and_box(rng: np.random.Generator) -> Pair:
+    return proved(*crossing(rng, RoundedHull(hull(rng, 12).vertices, 0.05), Box(rng.uniform(0.3, 0.5, 3))))
+
+
+def rounded_hull_on_ground(rng: np.random.Generator) -> Pair:
+    shape, turned = RoundedHull(hull(rng, 12).vertices, 0.05), quaternion(rng)
+    lowest = (shape.core.vertices @ rotation(turned).T)[:, 2].min() - shape.radius
+    return proved(Placed(shape, (0, 0, -lowest - 1e-3), turned), Placed(HalfSpace([0, 0, 1], 0)))
+
+
+def meshes_with_margins(rng: np.random.Generator) -> Pair:
+    """As Bullet has convex meshes."""
+    return proved(*crossing(rng, *(RoundedHull(hull(rng, 40).vertices, 1e-3) for _ in range(2))))
+
+
+def capsule(rng: np.random.Generator) -> Capsule:
+    return Capsule(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1))
+
+
+def hull(rng: np.random.Generator, corners: int) -> Hull:
+    return Hull(directions(rng, corners) * rng.uniform(0.4, 0.6, 3))
+
+
 FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Pair], int]] = {
     "box deep": (boxes_deep, 16),
     "box sliver": (box_sliver, 16),
@@ -232,6 +345,18 @@ FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Pair], int]] = {
     "ball at box corner": (ball_at_corner, 4),
     "crossing cylinders": (crossing_cylinders, 4),
     "cylinder wedge": (cylinder_wedge, 4),
+    "ball and box": (ball_and_box, 8),
+    "ball over edge, 1 µm": (ball_over_edge, 8),
+    "capsule and box": (capsule_and_box, 8),
+    "capsule on ground": (capsule_on_ground, 8),
+    "cylinder and hull": (cylinder_and_hull, 8),
+    "ball and capsule": (ball_and_capsule, 4),
+    "two capsules": (two_capsules, 4),
+    "capsule and cylinder": (capsule_and_cylinder, 4),
+    "ellipsoid and hull": (ellipsoid_and_hull, 4),
+    "rounded hull and box": (rounded_hull_and_box, 4),
+    "rounded hull on ground": (rounded_hull_on_ground, 4),
+    "meshes with margins": (meshes_with_margins, 2),
 }
 
 
