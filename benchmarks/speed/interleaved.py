@@ -35,7 +35,7 @@ DEAR, TIME_LIMIT = 0.25, 20
 # s, after which a process is taken to hang, however busy the machine is.
 PATIENCE = 600.0
 
-TRUTHS = ("volume", "volume_of_points", "depth", "depth_of_points")
+TRUTHS = ("volume", "volume_within", "volume_of_points", "depth", "depth_of_points")
 
 SAMPLE = 2e-3  # s, the least that is timed at once
 SLOW = 0.2  # s: pairs that take longer together are as many as there need be, and are timed once

@@ -239,7 +239,11 @@ def strobl(pair: Pair, _: None) -> Asked:
     if len(balls) != 1 or len(others) != 1 or (isinstance(others[0].shape, Hull) and len(corners(others[0])) != 4):
         raise Unfit("knows balls with hexahedra, wedges and tetrahedra")
     where = vertices(others[0])
-    element = peer.Tetrahedron(where) if len(where) == 4 else peer.Hexahedron(where[HEXAHEDRON])
+    if len(where) == 4:
+        mirrored = np.linalg.det(where[1:] - where[0]) < 0
+        element = peer.Tetrahedron(where[[0, 2, 1, 3] if mirrored else [0, 1, 2, 3]])
+    else:
+        element = peer.Hexahedron(where[HEXAHEDRON])
     sphere = peer.Sphere(balls[0].position, balls[0].shape.radius)
     return lambda: peer.overlap_volume(sphere, element)
 

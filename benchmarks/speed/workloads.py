@@ -45,14 +45,13 @@ GROUND = 10.0  # m, side of the box that stands for the ground where a peer take
 
 @dataclass(frozen=True)
 class Pair:
-    """Two placed shapes. Round ones bring their volume along, how far that may be off if it is no closed form, and
-    their depth if it is known."""
+    """Two placed shapes. Round ones bring their volume along, or how it and its error are found, and their depth if it
+    is known."""
 
     a: Placed
     b: Placed
-    volume_of_round: Fraction | None = None
+    volume_of_round: Fraction | Callable[[Placed, Placed], tuple[Fraction, Fraction]] | None = None
     depth_of_round: Fraction | None = None
-    volume_within: Fraction = Fraction(0)
 
     @property
     def bodies(self) -> tuple[Placed, Placed]:
@@ -62,8 +61,18 @@ class Pair:
     def volume(self) -> Fraction:
         """Of the shapes as placed, without any rounding."""
         if self.volume_of_round is not None:
-            return self.volume_of_round
+            return self._found[0]
         return truth.common_volume(*map(exact_points, self.bodies))
+
+    @cached_property
+    def volume_within(self) -> Fraction:
+        """How far the volume may be off: nothing if it is a closed form or rational arithmetic."""
+        return self._found[1] if callable(self.volume_of_round) else Fraction(0)
+
+    @cached_property
+    def _found(self) -> tuple[Fraction, Fraction]:
+        known = self.volume_of_round
+        return known(self.a, self.b) if callable(known) else (known, Fraction(0))
 
     @cached_property
     def volume_of_points(self) -> Fraction:
@@ -233,16 +242,24 @@ def cylinder_wedge(rng: np.random.Generator) -> Pair:
 SHALLOW = 1e-6  # m
 
 
-def sliced(a: Placed, b: Placed) -> Pair:
-    """A ball, capsule or cylinder and a box or hull, with their volume as a double."""
+def by_slices(a: Placed, b: Placed) -> tuple[Fraction, Fraction]:
+    """Of a ball, capsule or cylinder and a polyhedron: the volume as a double."""
     volume = Fraction(exactly(a, b).volume)
-    return Pair(a, b, volume, None, volume / 2**53)
+    return volume, volume / 2**53
 
 
-def proved(a: Placed, b: Placed) -> Pair:
-    """Any two that have a certificate, with the middle of what it proves."""
+def by_proof(a: Placed, b: Placed) -> tuple[Fraction, Fraction]:
+    """Of two that have a certificate: the middle of what it proves."""
     low, high = overlap(a, b).certificate().verify()
-    return Pair(a, b, (low + high) / 2, None, (high - low) / 2)
+    return (low + high) / 2, (high - low) / 2
+
+
+def by_stretching(ellipsoid: Placed, hull: Placed) -> tuple[Fraction, Fraction]:
+    """Where the ellipsoid is a unit ball. Half axes are powers of two along the axes, so that nothing is rounded."""
+    half = ellipsoid.shape.half_axes
+    volume, within = by_slices(Placed(Sphere(1.0)), Placed(Hull(hull.shape.vertices / half)))
+    share = Fraction(float(half.prod()))
+    return volume * share, within * share
 
 
 def crossing(rng: np.random.Generator, one: Shape, other: Shape) -> tuple[Placed, Placed]:
@@ -252,7 +269,7 @@ def crossing(rng: np.random.Generator, one: Shape, other: Shape) -> tuple[Placed
 
 
 def ball_and_box(rng: np.random.Generator) -> Pair:
-    return sliced(*crossing(rng, Sphere(rng.uniform(0.4, 0.6)), Box(rng.uniform(0.3, 0.5, 3))))
+    return Pair(*crossing(rng, Sphere(rng.uniform(0.4, 0.6)), Box(rng.uniform(0.3, 0.5, 3))), by_slices)
 
 
 def ball_over_edge(rng: np.random.Generator) -> Pair:
@@ -261,59 +278,57 @@ def ball_over_edge(rng: np.random.Generator) -> Pair:
     out = (r - SHALLOW) / np.sqrt(2)
     tilt, at = quaternion(rng), directions(rng, 1)[0]
     centre = rotation(tilt) @ [sides[0] + out, sides[1] + out, rng.uniform(-0.1, 0.1)]
-    return sliced(Placed(Sphere(r), at + centre), Placed(Box(sides), at, tilt))
+    return Pair(Placed(Sphere(r), at + centre), Placed(Box(sides), at, tilt), by_slices)
 
 
 def capsule_and_box(rng: np.random.Generator) -> Pair:
-    return sliced(*crossing(rng, capsule(rng), Box(rng.uniform(0.3, 0.5, 3))))
+    return Pair(*crossing(rng, capsule(rng), Box(rng.uniform(0.3, 0.5, 3))), by_slices)
 
 
 def cylinder_and_hull(rng: np.random.Generator) -> Pair:
-    return sliced(*crossing(rng, Cylinder(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1)), hull(rng, 20)))
+    return Pair(*crossing(rng, Cylinder(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1)), hull(rng, 20)), by_slices)
 
 
 def capsule_on_ground(rng: np.random.Generator) -> Pair:
     """Lying 1e-3 m deep and not quite level, so that one end is out."""
     shape, tilt = capsule(rng), product(turn([0, 0.05, 0]), turn([0, np.pi / 2, 0]))
     lowest = shape.length / 2 * abs((rotation(tilt) @ [0, 0, 1])[2]) + shape.radius
-    return sliced(Placed(shape, (*rng.uniform(-1, 1, 2), lowest - 1e-3), tilt), Placed(HalfSpace([0, 0, 1], 0)))
+    at = (*rng.uniform(-1, 1, 2), lowest - 1e-3)
+    return Pair(Placed(shape, at, tilt), Placed(HalfSpace([0, 0, 1], 0)), by_slices)
 
 
 def ball_and_capsule(rng: np.random.Generator) -> Pair:
-    return proved(*crossing(rng, Sphere(rng.uniform(0.4, 0.6)), capsule(rng)))
+    return Pair(*crossing(rng, Sphere(rng.uniform(0.4, 0.6)), capsule(rng)), by_proof)
 
 
 def two_capsules(rng: np.random.Generator) -> Pair:
-    return proved(*crossing(rng, capsule(rng), capsule(rng)))
+    return Pair(*crossing(rng, capsule(rng), capsule(rng)), by_proof)
 
 
 def capsule_and_cylinder(rng: np.random.Generator) -> Pair:
-    return proved(*crossing(rng, capsule(rng), Cylinder(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1))))
+    return Pair(*crossing(rng, capsule(rng), Cylinder(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1))), by_proof)
 
 
 def ellipsoid_and_hull(rng: np.random.Generator) -> Pair:
-    """Half axes of powers of two along the axes, so that the hull can be stretched to where it is a ball, unrounded."""
+    """Fit for by_stretching."""
     half = 2.0 ** -rng.permutation([0, 1, 2])
     points = np.round(families.mapped(hull(rng, 20).vertices, rotation(quaternion(rng))) * 2**20) / 2**20
-    stretched = sliced(Placed(Sphere(1.0)), Placed(Hull(points / half)))
-    share = Fraction(float(half.prod()))
-    a, b = Placed(Ellipsoid(half)), Placed(Hull(points))
-    return Pair(a, b, stretched.volume * share, None, stretched.volume_within * share)
+    return Pair(Placed(Ellipsoid(half)), Placed(Hull(points)), by_stretching)
 
 
 def rounded_hull_and_box(rng: np.random.Generator) -> Pair:
-    return proved(*crossing(rng, RoundedHull(hull(rng, 12).vertices, 0.05), Box(rng.uniform(0.3, 0.5, 3))))
+    return Pair(*crossing(rng, RoundedHull(hull(rng, 12).vertices, 0.05), Box(rng.uniform(0.3, 0.5, 3))), by_proof)
 
 
 def rounded_hull_on_ground(rng: np.random.Generator) -> Pair:
     shape, turned = RoundedHull(hull(rng, 12).vertices, 0.05), quaternion(rng)
     lowest = (shape.core.vertices @ rotation(turned).T)[:, 2].min() - shape.radius
-    return proved(Placed(shape, (0, 0, -lowest - 1e-3), turned), Placed(HalfSpace([0, 0, 1], 0)))
+    return Pair(Placed(shape, (0, 0, -lowest - 1e-3), turned), Placed(HalfSpace([0, 0, 1], 0)), by_proof)
 
 
 def meshes_with_margins(rng: np.random.Generator) -> Pair:
     """As Bullet has convex meshes."""
-    return proved(*crossing(rng, *(RoundedHull(hull(rng, 40).vertices, 1e-3) for _ in range(2))))
+    return Pair(*crossing(rng, *(RoundedHull(hull(rng, 40).vertices, 1e-3) for _ in range(2))), by_proof)
 
 
 def capsule(rng: np.random.Generator) -> Capsule:

@@ -53,7 +53,7 @@ def test_the_depth_is_that_of_the_exact_difference():
     assert truth.depth(families.CORNERS, families.CORNERS + 3) == 0
 
 
-ROUND = [name for name in workloads.FAMILIES if any(map(workloads.is_round, workloads.pairs_of(name)[0].bodies))]
+ROUND = [name for name in workloads.FAMILIES if workloads.pairs_of(name)[0].volume_of_round is not None]
 
 
 @pytest.mark.parametrize("family", ROUND)
@@ -88,10 +88,10 @@ def test_tessellations_come_near_from_below_with_segments(family):
 
 def test_strobl_s_package_gets_the_corners_in_its_own_order():
     pytest.importorskip("overlap")
-    pairs = workloads.pairs_of("ball and box")[:3] + [
-        workloads.sliced(Placed(Sphere(0.7), (0.1, 0.2, 0)), Placed(Hull(families.TETRA)))
-    ]
-    for pair in pairs:
+    ball = Placed(Sphere(0.7), (0.1, 0.2, 0))
+    elements = [families.TETRA, families.TETRA[[1, 0, 2, 3]]]
+    pairs = [workloads.Pair(ball, Placed(Hull(some)), workloads.by_slices) for some in elements]
+    for pair in pairs + workloads.pairs_of("ball and box")[:3]:
         assert timed_peers.strobl(pair, None)() == pytest.approx(float(pair.volume), rel=1e-12)
 
 
