@@ -238,8 +238,11 @@ def way_bodies(case: Case, found: Overlap) -> list[exact.Polytope | Placed]:
 def body_of(case: Case, i: int, placed: Placed) -> exact.Polytope:
     if isinstance(placed.shape, Box):
         corners = CORNERS * placed.shape.half_extents
-        return exact.hull(exact.placed(corners, placed.position, placed.given_orientation))
-    return solid(points_of(case.bodies[i]))
+    elif isinstance(case.bodies[i], Placed):
+        corners = placed.shape.vertices
+    else:
+        return solid(points_of(case.bodies[i]))
+    return exact.hull(exact.placed(corners, placed.position, placed.given_orientation))
 
 
 def way_out(case: Case, found: Overlap) -> Fraction | None:
