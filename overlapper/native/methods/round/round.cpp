@@ -401,7 +401,8 @@ class Measuring {
       if (body == 0) piece.pull += force, piece.moment += turned(local.moment) + cross(centre, force);
       if (body != slicing::kCut) piece.unbalanced += force;
     };
-    if (!(piece.volume > 0)) return piece.volume == 0;
+    const bool nothing = std::ranges::none_of(sections, [](const quadric::Section& s) { return s.area != 0; });
+    if (!(piece.volume > 0)) return piece.volume == 0 && nothing;
     act(round_owner, curved);
     for (size_t f = 0; f < owners_.size(); ++f) {
       const quadric::Section& section = sections[f];
@@ -684,6 +685,7 @@ struct Workspace {
   slicing::Enclosure polytope;
   std::vector<Round> rounds;
   std::vector<std::array<int, 2>> rest;  ///< pairs of pieces
+  std::vector<char> has_face;            ///< of walls
 };
 
 /// Makes a ball of radius 1 of the ellipsoid that a body is, and of all else what that makes of it, turned to the axes
@@ -818,10 +820,23 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
     walls.insert(walls.end(), of_b.walls.begin() + q.first_wall, of_b.walls.begin() + q.first_wall + q.walls);
     return true;
   };
+  // True if that is nothing, or measured; else, of its walls those are left that have a face there.
   const auto in_closed_form = [&] {
-    if (!many || rounds.size() > 1) return false;
+    if (!many) return false;
+    const slicing::Enclosure& polytope = scratch->polytope;
     if (!culling.share(meeting, scratch->polytope)) return true;
-    return measuring.add_in_closed_form(rounds.empty() ? nullptr : &rounds[0], scratch->polytope, walls);
+    if (rounds.size() < 2 && measuring.add_in_closed_form(rounds.empty() ? nullptr : &rounds[0], polytope, walls))
+      return true;
+    std::vector<char>& has_face = scratch->has_face;
+    has_face.assign(walls.size(), false);
+    for (const slicing::Enclosure::Corner& corner : polytope.corners)
+      for (const int f : corner.face)
+        if (polytope.faces[f].wall != slicing::kNoWall) has_face[polytope.faces[f].wall] = true;
+    size_t left = 0;
+    for (size_t w = 0; w < walls.size(); ++w)
+      if (has_face[w]) walls[left++] = walls[w];
+    walls.resize(left);
+    return false;
   };
   const auto add_pieces = [&] {
     measuring.totals = {};
@@ -833,7 +848,8 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
         for (int j = 0; j < static_cast<int>(of_b.pieces.size()); ++j) {
           cancellation_point();
           if ((of_a.pieces[i].round >= 0) + (of_b.pieces[j].round >= 0) != round_ones) continue;
-          if (meet(i, j) && !in_closed_form()) rest.push_back({i, j});
+          if (!meet(i, j)) continue;
+          if (round_ones == 2 || !in_closed_form()) rest.push_back({i, j});
         }
     // What was not sure to a fraction of the pieces before it may be to one of them all.
     for (const auto& [i, j] : rest)
