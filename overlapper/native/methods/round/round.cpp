@@ -121,6 +121,7 @@ class Measuring {
   const slicing::Stretch* stretch = nullptr;   ///< of an ellipsoid: from the ball and the planes that are added
   double extent = 0;                           ///< m: no point of the common set is farther from the one inside
   const slicing::Enclosure* common = nullptr;  ///< what lies outside of that belongs to no piece
+  const slicing::Enclosure* around = nullptr;  ///< a polytope that holds all of the next piece, if known
   bool closely = false;                        ///< looks at all of every interval
   double layer = 0;                            ///< m: planes no farther from each other are one
   double surface = 0;                          ///< m²: of the common set, where there are such layers
@@ -512,6 +513,12 @@ class Measuring {
   /// Makes a stack ready and finds its intervals; false if they cannot be told.
   bool look_at(slicing::Stack& stack, bool all) {
     stack.stretch = stretch;
+    if (around) {
+      const auto [least, most] = around->range(stack.n);
+      const double here = dot(offset_, stack.n), margin = 1e-9 * (most - least) + 1e-13 * extent;
+      stack.low = std::max(stack.low, least - here - margin);
+      stack.high = std::min(stack.high, most - here + margin);
+    }
     if (patch) view_ = view_of(stack), stack.view = &view_;
     return find_intervals(stack, all);
   }
@@ -806,6 +813,7 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   const bool many = std::holds_alternative<RoundedHull>(a.shape) || std::holds_alternative<RoundedHull>(b.shape);
   if (many) slicing::enclose(a, b, rounded(inside), around);
   measuring.common = many ? &around : nullptr;
+  measuring.around = many ? &scratch->polytope : nullptr;
   slicing::cut(a, b, measuring.common, 0, reference, inside, of_a);
   slicing::cut(b, a, measuring.common, 1, reference, inside, of_b);
   if (many) culling.look_at(of_a, of_b, around);
