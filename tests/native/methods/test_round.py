@@ -543,3 +543,19 @@ def test_a_pair_that_a_plane_splits_beside_another_by_rounding_is_sliced():
         found = assert_motion_changes_nothing(a, b, np.random.default_rng(0))
         assert "dual" not in found.way
         assert found.volume_error <= 1e-11 * found.volume
+
+
+# In the first, corners of cuts meet outside of the ball, and a face between them is nothing but rounding.
+@pytest.mark.parametrize("seed", [248, *range(4)])
+def test_a_ball_and_a_mesh_with_a_margin_share_what_is_proved(seed):
+    rng = np.random.default_rng(seed)
+    mesh = RoundedHull(rng.normal(size=(2, 30, 3))[1] * 0.3, 0.01)
+    placed = [
+        Placed(shape, rng.normal(size=3) * spread, rng.normal(size=4))
+        for shape, spread in ((Sphere(0.3), 0.1), (mesh, 0.3))
+    ]
+    found = overlap(*placed)
+    assert found.way == "slicing"
+    assert found.volume_error <= 1e-11 * found.volume
+    lower, upper = found.certificate().verify()
+    assert found.volume - found.volume_error <= lower <= upper <= found.volume + found.volume_error

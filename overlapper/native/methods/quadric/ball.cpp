@@ -24,6 +24,7 @@ struct Disc {
   bool around = true;    ///< the face holds the middle, as none of its edges lies this side of that
   bool touched = false;  ///< by an edge
   int ends = 0;          ///< of edges, on the sphere
+  double whole = 0;      ///< twice the area of the face, as its edges tell
   double angle = 0;      ///< of the edges' parts inside the ball, as the middle sees them
   double sizes = 0;      ///< of these
   double twice = 0;      ///< twice the area of their triangles
@@ -150,6 +151,7 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     const double other = through ? 0 : sine * left.height - cosine * height + 0.0;
     if (from_middle) left.goes = right.comes = along;
     if (to_middle) left.comes = right.goes = -along;
+    left.whole += height * length, right.whole += other * length;
     if (height < 0) left.around = false;
     if (other < 0) right.around = false;
     const double half = std::sqrt(std::max(0.0, left.square - height * height));
@@ -193,7 +195,9 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
   double pressure = 0;  // Σ h ∫ (|x|² − r²) dA
   for (size_t f = 0; f < discs.size(); ++f) {
     const Disc& disc = discs[f];
-    const bool whole_turn = disc.around && disc.square > 0;
+    // A face that is nothing but rounding may seem to lie around anything.
+    const bool wide_enough = disc.touched || disc.whole >= 6 * disc.square;
+    const bool whole_turn = disc.around && disc.square > 0 && wide_enough;
     if (!whole_turn && !disc.touched) continue;
     ++part.faces;
     const Vec3 n = polyhedron.planes[f].normal;

@@ -212,13 +212,14 @@ class Measuring {
   /// Whether a face that has no edge inside reaches all around: one steeper would be higher than the polyhedron.
   bool around(std::span<const int> ring, Vec3 n) const {
     if (!(std::abs(n.z) * height_ > radius_ * std::hypot(n.x, n.y))) return false;
-    bool turns = false;  // what is but a point does not
+    double twice = 0;  // its area as seen along the axis
     for (size_t k = 0; k < ring.size(); ++k) {
       const double turn = cross2(corners_[ring[k]], corners_[ring[k + 1 < ring.size() ? k + 1 : 0]]) * n.z;
       if (turn < 0) return false;
-      turns = turns || turn > 0;
+      twice += turn;
     }
-    return turns;
+    // What is nothing but rounding may seem to lie around anything.
+    return twice >= 6 * std::abs(n.z) * radius_ * radius_;
   }
 
   void add_ellipse(const Plane& plane, Sum& section) {
