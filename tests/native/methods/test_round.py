@@ -559,3 +559,15 @@ def test_a_ball_and_a_mesh_with_a_margin_share_what_is_proved(seed):
     assert found.volume_error <= 1e-11 * found.volume
     lower, upper = found.certificate().verify()
     assert found.volume - found.volume_error <= lower <= upper <= found.volume + found.volume_error
+
+
+# Thin wedges of margins, far from the point that coordinates count from: what rounding makes of their ends is no slice.
+@pytest.mark.parametrize("seed", [1987, 2558, 2647, 3027, *range(8)])
+def test_meshes_with_margins_deep_in_each_other_are_measured_of_their_round_shapes(seed):
+    rng = np.random.default_rng(seed)
+    meshes = [RoundedHull(points * 0.3, 0.01) for points in rng.normal(size=(2, 30, 3))]
+    first = [Sphere(0.3), Capsule(0.2, 0.5), Cylinder(0.2, 0.5), meshes[0]][seed % 4]
+    a = Placed(first, rng.normal(size=3) * 0.1, rng.normal(size=4))
+    b = Placed(meshes[1], rng.normal(size=3) * 0.3, rng.normal(size=4))
+    found = overlap(a, b)
+    assert not found or (found.way == "slicing" and found.volume_error <= 1e-11 * found.volume)

@@ -28,7 +28,6 @@ from overlapper import (
     penetration_depth,
 )
 from overlapper.polytopes.shape_text import alike, shape_of, text_of
-from overlapper.proof.certificate import CertificateError
 from overlapper.reference import Fcl, fcl
 from overlapper.simulation.inventory import _listed
 from overlapper.viewer.outline import outline

@@ -339,6 +339,7 @@ class Settling {
   /// Of an interval, how many parts of it are looked at at most.
   static constexpr int kMostInner = 48;
   static constexpr double kPointlike = 1e-11, kPointlikeClosely = 1e-14;  ///< of the stack
+  static constexpr double kRounded = 1e-12;                               ///< of how far all slices are from the origin
   static constexpr int kMostEvents = 40;
 
   Outline at(double t) const { return outline(Slice(stack_, t)); }
@@ -353,7 +354,8 @@ class Settling {
     // Of a convex set there is no empty slice between others, but by rounding.
     if (!intervals_.empty()) intervals_.back().high = low;
     // A corner and a circle, or three lines, meet in a value of t; rounding makes it an interval of its own.
-    const double pointlike = (closely_ ? kPointlikeClosely : kPointlike) * (high_ - low_);
+    const double far = std::max({0.0, low_, -high_});
+    const double pointlike = std::max((closely_ ? kPointlikeClosely : kPointlike) * (high_ - low_), kRounded * far);
     if (high - low < pointlike && !intervals_.empty()) {
       intervals_.back().high = high;
       return;

@@ -835,7 +835,8 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
     if (!culling.share(meeting, scratch->polytope)) return true;
     // Where the surface of the whole is open, slices look at all of it.
     const Round* round = rounds.empty() ? nullptr : &rounds[0];
-    if (rounds.size() < 2 && !measuring.closely && measuring.add_in_closed_form(round, polytope, walls)) return true;
+    const bool in_slices = round && measuring.closely;
+    if (rounds.size() < 2 && !in_slices && measuring.add_in_closed_form(round, polytope, walls)) return true;
     std::vector<char>& has_face = scratch->has_face;
     has_face.assign(walls.size(), false);
     for (const slicing::Enclosure::Corner& corner : polytope.corners)

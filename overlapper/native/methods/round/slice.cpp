@@ -163,6 +163,17 @@ void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
   }
 }
 
+/// Whether two lines that run against each other follow one another: by rounding, as they meet nowhere.
+bool is_flat(const Polygon& polygon, const Stack& stack) {
+  constexpr double kParallel = 1e-12;
+  for (int i = 0; i < polygon.size; ++i) {
+    const Line &a = stack.line[polygon.line[i]], &b = stack.line[polygon.line[i + 1 < polygon.size ? i + 1 : 0]];
+    if (std::abs(slicing::cross(a.normal, b.normal)) < kParallel * a.length * b.length && dot(a.normal, b.normal) < 0)
+      return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Outline outline(const Slice& slice) {
@@ -174,6 +185,7 @@ Outline outline(const Slice& slice) {
   for (int i = 0; i < 4; ++i) polygon->append(square + i, slice.corner(square + i, square + (i + 1) % 4));
   for (int i = 0; i < square; ++i)
     if (!clip(polygon, spare, slice, i)) return result;
+  if (is_flat(*polygon, stack)) return result;
   if (stack.ball >= 0) {
     cut_by_disc(*polygon, slice, result);
     return result;
