@@ -6,15 +6,33 @@
 #include <numbers>
 #include <vector>
 
+#include "geometry/wide.h"
+
 namespace overlapper::quadric {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+constexpr DoubleDouble kWidePi{kPi, 1.2246467991473532e-16};
 constexpr double kUnit = 0x1p-53;  ///< of rounding
 /// Lengths are right to this fraction of how far the numbers reach that they are made of: a unit vector to 4 roundings,
 /// a difference to one, their product to 3.
 constexpr double kPlacing = 8 * kUnit;
 constexpr double kOpen = 1e-9;  ///< of the radius' square: areas are right to less, without a wrong turn
+
+/// A sum that is rounded but once.
+class Sum {
+ public:
+  Sum& operator+=(DoubleDouble term) {
+    const DoubleDouble sum = two_sum(sum_.head, term.head);
+    sum_ = {sum.head, sum_.tail + sum.tail + term.tail};
+    return *this;
+  }
+  Sum& operator+=(double term) { return *this += DoubleDouble{term}; }
+  double value() const { return sum_.head + sum_.tail; }
+
+ private:
+  DoubleDouble sum_;
+};
 
 /// A disc that the plane of a face cuts from the ball, and what is known of the face's part of it, from edge to edge:
 /// a polygon seen from the middle, as angles and triangles, and sectors for what the angles leave of the whole turn.
@@ -25,9 +43,9 @@ struct Disc {
   bool touched = false;  ///< by an edge
   int ends = 0;          ///< of edges, on the sphere
   double whole = 0;      ///< twice the area of the face, as its edges tell
-  double angle = 0;      ///< of the edges' parts inside the ball, as the middle sees them
+  Sum angle;             ///< of the edges' parts inside the ball, as the middle sees them
   double sizes = 0;      ///< of these
-  double twice = 0;      ///< twice the area of their triangles
+  Sum twice;             ///< twice the area of their triangles
   double second = 0;     ///< four times ∫ |y|² dA over the triangles
   Vec3 first;            ///< ∫ y dA over triangles and sectors
   Vec3 third;            ///< ∫ (|y|² − ρ²) y dA over the same
@@ -101,7 +119,8 @@ double turn_at(double t, double radius, double cosine, double sine, double heigh
 // Where the ball's centre is itself a corner, it is seen from there as if it were a little farther along the edge that
 // leaves it: the middles of its faces' discs are outside.
 //
-// The error. Every term has ten roundings or fewer, and every sum on the way one more. An edge is where rounding has
+// The error. Every term has ten roundings or fewer, and sums that many terms make are rounded once: of the turns of a
+// fine polyhedron, all but the last digits cancel. An edge is where rounding has
 // put it, to kPlacing of how far its numbers reach: seen along it, the two planes and their line still meet, so that
 // what it gives to the volume, a signed part of the ball between its planes and two of its disc's radii, changes by no
 // more than the parts of the discs that it cuts off, each a part of a sector. Where it ends in a corner inside, it is
@@ -127,8 +146,8 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     characteristic -= inside[i];
   }
   BallPart part;
-  double turns = 0;    // at corners of the curved part
-  double partial = 0;  // the size of sums on the way
+  Sum curved;  // the curved part's area, by r²
+  double sizes = 0, cone_sizes = 0;
   for (const Edge& edge : polyhedron.edges) {
     Disc &left = discs[edge.left], &right = discs[edge.right];
     const bool from_inside = inside[edge.from], to_inside = inside[edge.to];
@@ -163,9 +182,10 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     const auto turn = [&](double t) { return turn_at(t, r, cosine, sine, height * other); };
     const int ends = !from_inside + !to_inside;
     left.ends += ends, right.ends += ends;
-    if (ends == 2 && -from == to) turns += 2 * turn(to);
-    else turns += (from_inside ? 0 : turn(-from)) + (to_inside ? 0 : turn(to));
-    partial += turns;
+    const double at_from = from_inside ? 0 : turn(-from);
+    const double at_to = to_inside ? 0 : ends == 2 && -from == to ? at_from : turn(to);
+    curved += -at_from, curved += -at_to;
+    sizes += at_from + at_to;
     const Chord of_left{out, along, height, from, to};
     const Chord of_right{sine * n - cosine * out, along, other, from, to};
     const double beside =
@@ -189,8 +209,7 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     disc.angle += angle, disc.sizes += std::abs(angle);
     add_sector(cross(disc.comes - disc.goes, n), with_second, disc);
   }
-  double curved = 2 * kPi * characteristic - turns, cones = 0;
-  double sizes = 2 * kPi * std::abs(characteristic) + turns, cone_sizes = 0;
+  Sum cones;
   double flats = 0;     // m², of all faces
   double pressure = 0;  // Σ h ∫ (|x|² − r²) dA
   for (size_t f = 0; f < discs.size(); ++f) {
@@ -202,20 +221,20 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     ++part.faces;
     const Vec3 n = polyhedron.planes[f].normal;
     // Without an end on the sphere, edges are the whole border, and what they turn beside a whole turn is rounding.
-    const double h = disc.height, turn = whole_turn ? 2 * kPi : 0, rest = turn - disc.angle;
+    const double h = disc.height, turn = whole_turn ? 2 * kPi : 0, rest = turn - disc.angle.value();
     const double arcs = disc.touched && disc.ends == 0 ? 0 : rest;
     if (!(arcs > -kOpen && arcs < 2 * kPi + kOpen)) part.error = std::numeric_limits<double>::infinity();
-    const double face = (disc.square * arcs + disc.twice) / 2;
-    curved += arcs * h / r - 2 * kPi;
+    const double twice = disc.twice.value(), face = (disc.square * arcs + twice) / 2;
+    --characteristic;
+    curved += arcs * h / r;
     cones += h * face;
-    partial += std::abs(curved) + std::abs(arcs);
-    sizes += (turn + disc.sizes) * std::abs(h) / r + 2 * kPi;
-    cone_sizes += std::abs(h) * (disc.square * (turn + disc.sizes) + std::abs(disc.twice)) / 2;
+    sizes += (turn + disc.sizes) * std::abs(h) / r;
+    cone_sizes += std::abs(h) * (disc.square * (turn + disc.sizes) + std::abs(twice)) / 2;
     flats += face;
     if (f < polyhedron.faces) part.area += face;
     part.flat += face * n;
     sections[f].area = face, sections[f].first = face * h * n + disc.first;
-    const double on_face = (disc.second - disc.square * disc.square * arcs) / 4 - disc.square * disc.twice / 2;
+    const double on_face = (disc.second - disc.square * disc.square * arcs) / 4 - disc.square * twice / 2;
     part.first += on_face / 2 * n;
     if (!with_second) continue;
     pressure += h * on_face;
@@ -223,6 +242,8 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     part.squares += scaled(n, w);
     part.products += 0.5 * Vec3{n.y * w.z + n.z * w.y, n.z * w.x + n.x * w.z, n.x * w.y + n.y * w.x};
   }
+  curved += DoubleDouble{characteristic * 2.0} * kWidePi;
+  const double area = r2 * curved.value();
   const bool holds_centre = std::ranges::none_of(discs, [](const Disc& disc) { return disc.height < 0; });
   if (part.faces == 0 && !holds_centre) return BallPart{};
   // A ball that no face reaches no plane reaches either, unless the polyhedron is nothing but rounding.
@@ -231,11 +252,11 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
   // What lies beyond the faces is farther around the ball than they are, and the curved part than its vector is long;
   // by a wrong turn, one of them would not be so.
   const double slack = kOpen * r2;
-  if (!(r2 * curved + flats <= 4 * kPi * r2 + slack && norm(part.flat) <= r2 * curved + slack))
+  if (!(area + flats <= 4 * kPi * r2 + slack && norm(part.flat) <= area + slack))
     part.error = std::numeric_limits<double>::infinity();
-  part.area += r2 * curved;
-  part.volume = (cones + r3 * curved) / 3;
-  part.error += kUnit * (10 * (cone_sizes + r3 * sizes) / 3 + r3 * partial);
+  part.area += area;
+  part.volume = (cones.value() + r * area) / 3;
+  part.error += kUnit * 10 * (cone_sizes + r3 * sizes + r * std::abs(area)) / 3;
   if (with_second) {
     const double all = (3 * r2 * part.volume + pressure) / 5, each = r2 * part.volume - all;
     part.squares = 0.5 * (part.squares + Vec3{each, each, each});
