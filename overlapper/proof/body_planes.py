@@ -97,8 +97,8 @@ class BodyPlanes:
 
 
 def _round_normal(shape: Shape, point: Floats) -> Floats:
-    """The outward normal of the plane of a sphere, capsule or cylinder that the point is farthest above; of an ellipsoid
-    that of the smaller or larger one through the point."""
+    """The outward normal of the plane of a sphere, capsule or cylinder that the point is farthest above; of an
+    ellipsoid that of the smaller or larger one through the point."""
     if isinstance(shape, Ellipsoid):
         point = point / shape.half_axes**2
         point = point / max(abs(point).max(), TINY)
