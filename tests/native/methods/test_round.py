@@ -508,6 +508,17 @@ def assert_motion_changes_nothing(a, b, rng):
     return found
 
 
+@pytest.mark.parametrize(("points", "margin"), [(250, 0.05), (1000, 0.05), (2000, 0)])
+def test_meshes_of_many_facets_deep_in_each_other_are_sliced(points, margin):
+    """Of more walls than slices have lines, few bound a piece, and pieces lie far from the deepest point."""
+    clouds = [np.random.default_rng(seed).normal(size=(points, 3)) for seed in (0, 1)]
+    one, other = (cloud / np.linalg.norm(cloud, axis=1)[:, None] for cloud in clouds)
+    second = RoundedHull(other, margin) if margin else Hull(other)
+    pair = Placed(RoundedHull(one, 0.05)), Placed(second, (0.3, 0.2, 0.4), (0.1, 0.2, 0.3, 0.9))
+    found = assert_motion_changes_nothing(*pair, np.random.default_rng(0))
+    assert found.way == "slicing" and found.volume_error <= 1e-10 * found.volume
+
+
 @pytest.mark.parametrize("which", range(len(SILENT)))
 def test_a_plane_or_a_piece_that_slices_have_missed_is_found(which):
     for seed in range(10):

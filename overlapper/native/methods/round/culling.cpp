@@ -90,6 +90,39 @@ void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side)
   }
 }
 
+void Culling::sweep(const Side& side, std::vector<Swept>& swept) {
+  swept.clear();
+  for (size_t i = 0; i < side.pieces->pieces.size(); ++i) {
+    const Part& part = side.parts[i];
+    if (!part.empty) swept.push_back({part.box.lower.x, part.box.upper.x, static_cast<int>(i)});
+  }
+  std::ranges::sort(swept, {}, &Swept::low);
+}
+
+void Culling::near(std::vector<std::array<int, 2>>& pairs) {
+  sweep(a_, swept_a_), sweep(b_, swept_b_);
+  const auto add = [&](int p, int q) {
+    const Bounds &one = a_.parts[p].box, &two = b_.parts[q].box;
+    if (one.lower.y <= two.upper.y && two.lower.y <= one.upper.y && one.lower.z <= two.upper.z &&
+        two.lower.z <= one.upper.z)
+      pairs.push_back({p, q});
+  };
+  // Of two that meet, the one that begins later begins within the other.
+  const auto begin_within = [](const std::vector<Swept>& ones, const std::vector<Swept>& others, bool equal, auto use) {
+    size_t first = 0;
+    for (const Swept& one : ones) {
+      while (first < others.size() && (equal ? others[first].low < one.low : others[first].low <= one.low)) ++first;
+      for (size_t i = first; i < others.size() && others[i].low <= one.high; ++i) {
+        cancellation_point();
+        use(one.piece, others[i].piece);
+      }
+    }
+  };
+  begin_within(swept_a_, swept_b_, true, add);
+  begin_within(swept_b_, swept_a_, false, [&](int q, int p) { add(p, q); });
+  std::ranges::sort(pairs);
+}
+
 bool Culling::keep_walls(const Side& side, int piece, const Part& other, std::vector<int>& kept,
                          std::vector<Wall>& walls) const {
   kept.clear();
@@ -102,21 +135,18 @@ bool Culling::keep_walls(const Side& side, int piece, const Part& other, std::ve
   return true;
 }
 
-bool Culling::beyond(const Part& part, const Part& other) const {
-  if (!(part.round.radius > 0)) return false;
-  const Vec3 normal = part.round.outward(other.middle);
-  return normal != Vec3{} && other.around.least(normal) > part.round.reach(normal) + margin_;
+bool Culling::beyond(const Solid& round, const Enclosure& other, Vec3 middle) const {
+  if (!(round.radius > 0)) return false;
+  const Vec3 normal = round.outward(middle);
+  return normal != Vec3{} && other.least(normal) > round.reach(normal) + margin_;
 }
 
 bool Culling::meet(int p, int q, Meeting& meeting) const {
   const Part &one = a_.parts[p], &two = b_.parts[q];
-  if (one.empty || two.empty) return false;
-  const Vec3 lower = max(one.box.lower, two.box.lower), upper = min(one.box.upper, two.box.upper);
   meeting.p = p, meeting.q = q, meeting.walls.clear();
-  if (lower.x > upper.x || lower.y > upper.y || lower.z > upper.z ||
-      !keep_walls(a_, p, two, meeting.of_p, meeting.walls) || !keep_walls(b_, q, one, meeting.of_q, meeting.walls))
+  if (!keep_walls(a_, p, two, meeting.of_p, meeting.walls) || !keep_walls(b_, q, one, meeting.of_q, meeting.walls))
     return false;
-  return !beyond(one, two) && !beyond(two, one);
+  return !beyond(one.round, two.around, two.middle) && !beyond(two.round, one.around, one.middle);
 }
 
 bool Culling::share(const Meeting& meeting, Enclosure& polytope) const {
@@ -139,6 +169,11 @@ bool Culling::share(const Meeting& meeting, Enclosure& polytope) const {
   for (int w = from_p ? of_p : 0; w < (from_p ? size : of_p); ++w)
     if (!cut(w)) return false;
   return true;
+}
+
+bool Culling::outside(const Enclosure& polytope, const Meeting& meeting) const {
+  const Vec3 middle = polytope.middle();
+  return beyond(a_.parts[meeting.p].round, polytope, middle) || beyond(b_.parts[meeting.q].round, polytope, middle);
 }
 
 }  // namespace overlapper::slicing

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "methods/round/enclosure.h"
@@ -13,7 +14,10 @@ class Culling {
  public:
   void look_at(const Pieces& a, const Pieces& b, const Enclosure& common);
 
-  /// Of a piece of a and one of b.
+  /// Adds the pairs of pieces whose boxes meet, in the order of their numbers.
+  void near(std::vector<std::array<int, 2>>& pairs);
+
+  /// Of a piece of a and one of b, which are near each other.
   struct Meeting {
     int p = 0, q = 0;
     std::vector<Wall> walls;      ///< those that matter: where no other does, the common set ends sooner
@@ -26,6 +30,9 @@ class Culling {
   /// The polytope that the walls leave of what encloses the common set, every face with the number of its wall among
   /// `meeting.walls`, or kNoWall; false if that is nothing.
   bool share(const Meeting& meeting, Enclosure& polytope) const;
+
+  /// Whether such a polytope lies outside of a round.
+  bool outside(const Enclosure& polytope, const Meeting& meeting) const;
 
  private:
   /// A ball, or a cylinder by the point of its axis that is nearest to the origin; nothing without a radius.
@@ -63,9 +70,17 @@ class Culling {
   bool cut_around(const Pieces& pieces, const Piece& piece);
   bool keep_walls(const Side& side, int piece, const Part& other, std::vector<int>& kept,
                   std::vector<Wall>& walls) const;
-  bool beyond(const Part& part, const Part& other) const;
+  bool beyond(const Solid& round, const Enclosure& other, Vec3 middle) const;
+
+  /// A piece along the axis along which all are swept.
+  struct Swept {
+    double low, high;
+    int piece;
+  };
+  static void sweep(const Side& side, std::vector<Swept>& swept);
 
   Side a_, b_;
+  std::vector<Swept> swept_a_, swept_b_;
   Enclosure around_;  ///< what a piece leaves of the polytope around the common set
   std::vector<Cut> uncut_;
   double margin_ = 0;  ///< m: of rounding

@@ -134,10 +134,10 @@ Vec3 Enclosure::middle() const {
   return sum / static_cast<double>(corners.size());
 }
 
-double Enclosure::extent() const {
-  double extent2 = 0;
-  for (const Corner& corner : corners) extent2 = std::max(extent2, norm2(corner.at));
-  return std::sqrt(extent2);
+double Enclosure::reach(Vec3 point) const {
+  double reach2 = 0;
+  for (const Corner& corner : corners) reach2 = std::max(reach2, norm2(corner.at - point));
+  return std::sqrt(reach2);
 }
 
 double Enclosure::surface() const {

@@ -50,7 +50,8 @@ struct Enclosure {
   std::pair<double, double> range(Vec3 direction) const;
   double least(Vec3 direction) const { return range(direction).first; }
   Vec3 middle() const;
-  double extent() const;   ///< no corner is farther from the origin
+  double reach(Vec3 point) const;  ///< no corner is farther from it
+  double extent() const { return reach({}); }
   double surface() const;  ///< its area
 };
 

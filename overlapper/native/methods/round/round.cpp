@@ -107,7 +107,10 @@ class Measuring {
       add_cap(rounds_[0], walls_.empty() ? nullptr : &walls_[0]);
       return true;
     }
-    return add_stack();
+    if (!around) return add_stack();
+    // Axes of slices are chosen by what is near the point that coordinates count from.
+    const Vec3 middle = around->middle();
+    return add_about(norm(middle) > around->reach(middle) ? middle : Vec3{});
   }
 
   /// In closed form, what a polytope, whose faces tell which of the walls they are, and one round at most share. False,
@@ -413,13 +416,17 @@ class Measuring {
       if (owners_[f] == slicing::kCut) piece.area -= section.area;
     }
     piece.error += rounding_of(polytope, piece.border);
-    // Second moments lose as much more as the part is farther from the centre than it is wide.
-    const Vec3 mean = piece.first / piece.volume, q = piece.squares / piece.volume;
-    const double spread2 = q.x + q.y + q.z - norm2(mean);
-    if (!(piece.error * norm2(mean) <= kSureOfMoments * (totals.volume + piece.volume) * spread2)) return false;
-    if (!sure(piece)) return false;
     const Vec3 first = turned(piece.first), squares = piece.squares, products = piece.products;
-    piece.first = first + piece.volume * centre, piece.squares = piece.products = {};
+    const Vec3 mean = piece.first / piece.volume;
+    piece.first = first + piece.volume * centre;
+    // Second moments lose as much more as the part is farther from the centre than all, up to here, is wide.
+    const double volume = totals.volume + piece.volume, from_centre2 = squares.x + squares.y + squares.z;
+    const Vec3 s = totals.squares;
+    const double about_inside = s.x + s.y + s.z + from_centre2 + 2 * dot(first, centre) + piece.volume * norm2(centre);
+    const double about_mean = about_inside - norm2(totals.first + piece.first) / volume;
+    if (!(piece.error * norm2(mean) <= kSureOfMoments * about_mean)) return false;
+    if (!sure(piece)) return false;
+    piece.squares = piece.products = {};
     add_second({turn.row0, turn.row1, turn.row2}, piece.volume, squares, products, first, centre, piece);
     totals.add(piece);
     return true;
@@ -476,7 +483,8 @@ class Measuring {
     if (!stack) return false;
     best_.integrals = {};
     double open = std::numeric_limits<double>::infinity();
-    bool told = look_at(*stack, closely);
+    // Where, closely, more changes than can be told, the middle of every interval says more.
+    bool told = look_at(*stack, closely) || (closely && look_at(*stack, false));
     if (told && intervals_.empty()) return true;
     if (told) {
       // Of few nodes, the terms of a stretched area tell too little.
@@ -549,16 +557,22 @@ class Measuring {
     const Vec3 mean = s.first / s.volume, offset = in_world(stack, mean);
     const double spread = (s.squares.x + s.squares.y + s.squares.z) / s.volume - norm2(mean);
     if (moved_ || !(norm2(mean) > 25 * spread) || !(norm(offset) <= extent)) return false;
-    offset_ = offset;
-    for (Round& r : rounds_) r.centre = r.centre - wide(offset_);
-    for (Wall& wall : walls_) wall.slack = wall.slack - dot(wall.normal, wide(offset_));
-    const double usual = extent;
-    extent += norm(offset_);
     moved_ = true;
-    const bool done = add_stack();
+    const bool done = add_about(offset);
     moved_ = false;
-    extent = usual;
-    offset_ = {};
+    return done;
+  }
+
+  /// Counts from a point `step` away.
+  bool add_about(Vec3 step) {
+    if (step == Vec3{}) return add_stack();
+    for (Round& r : rounds_) r.centre = r.centre - wide(step);
+    for (Wall& wall : walls_) wall.slack = wall.slack - dot(wall.normal, wide(step));
+    const Vec3 offset = offset_;
+    const double usual = extent;
+    offset_ += step, extent += norm(step);
+    const bool done = add_stack();
+    offset_ = offset, extent = usual;
     return done;
   }
 
@@ -691,7 +705,8 @@ struct Workspace {
   slicing::Culling::Meeting meeting;
   slicing::Enclosure polytope;
   std::vector<Round> rounds;
-  std::vector<std::array<int, 2>> rest;  ///< pairs of pieces
+  std::vector<std::array<int, 2>> near;  ///< pairs of pieces that may share something
+  std::vector<std::array<int, 2>> rest;  ///< such as are not measured in closed form
   std::vector<char> has_face;            ///< of walls
 };
 
@@ -837,6 +852,7 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
     const Round* round = rounds.empty() ? nullptr : &rounds[0];
     const bool in_slices = round && measuring.closely;
     if (rounds.size() < 2 && !in_slices && measuring.add_in_closed_form(round, polytope, walls)) return true;
+    if (culling.outside(polytope, meeting)) return true;
     std::vector<char>& has_face = scratch->has_face;
     has_face.assign(walls.size(), false);
     for (const slicing::Enclosure::Corner& corner : polytope.corners)
@@ -848,19 +864,24 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
     walls.resize(left);
     return false;
   };
+  std::vector<std::array<int, 2>>&near = scratch->near, &rest = scratch->rest;
+  near.clear();
+  if (many) {
+    culling.near(near);
+  } else {
+    for (int i = 0; i < static_cast<int>(of_a.pieces.size()); ++i)
+      for (int j = 0; j < static_cast<int>(of_b.pieces.size()); ++j) near.push_back({i, j});
+  }
   const auto add_pieces = [&] {
     measuring.totals = {};
-    std::vector<std::array<int, 2>>& rest = scratch->rest;
     rest.clear();
     // Pieces without rounds first: others then need to be exact only to a fraction of what these hold.
     for (const int round_ones : {0, 1, 2})
-      for (int i = 0; i < static_cast<int>(of_a.pieces.size()); ++i)
-        for (int j = 0; j < static_cast<int>(of_b.pieces.size()); ++j) {
-          cancellation_point();
-          if ((of_a.pieces[i].round >= 0) + (of_b.pieces[j].round >= 0) != round_ones) continue;
-          if (!meet(i, j)) continue;
-          if (round_ones == 2 || !in_closed_form()) rest.push_back({i, j});
-        }
+      for (const auto& [i, j] : near) {
+        cancellation_point();
+        if ((of_a.pieces[i].round >= 0) + (of_b.pieces[j].round >= 0) != round_ones) continue;
+        if (round_ones == 2 || (meet(i, j) && !in_closed_form())) rest.push_back({i, j});
+      }
     // What was not sure to a fraction of the pieces before it may be to one of them all.
     for (const auto& [i, j] : rest)
       if (meet(i, j) && !in_closed_form() && !measuring.add(rounds, walls)) return false;
