@@ -87,7 +87,6 @@ def test_tessellations_come_near_from_below_with_segments(family):
 
 
 def test_strobl_s_package_gets_the_corners_in_its_own_order():
-    pytest.importorskip("overlap")
     ball = Placed(Sphere(0.7), (0.1, 0.2, 0))
     elements = [families.TETRA, families.TETRA[[1, 0, 2, 3]]]
     pairs = [workloads.Pair(ball, Placed(Hull(some)), workloads.by_slices) for some in elements]
@@ -122,13 +121,11 @@ def test_a_peer_that_cannot_be_asked_says_why():
 
 
 def test_strobl_s_package_is_asked_for_what_it_knows():
-    pytest.importorskip("overlap")
     with pytest.raises(timed_peers.Unfit, match="balls with"):
         timed_peers.strobl(workloads.pairs_of("two capsules")[0], None)
 
 
 def test_threads_of_a_peer_s_own_are_timed_by_the_clock_in_a_process_that_has_all_processors():
-    pytest.importorskip("manifold3d")
     pairs = workloads.pairs_of("box deep")[:2]
     rows = interleaved.rows_of("box deep", pairs, ["auto", "manifold3d, by the clock"], 0.1)
     assert [row.method for row in rows] == ["auto"] * 3 + ["manifold3d, by the clock"]
