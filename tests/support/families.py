@@ -778,6 +778,7 @@ def special_poses(rng):
     corners of the one lie on those of the other, or do but for `parameter` of a metre."""
     off = float(rng.choice([0, 0, *(10.0 ** -np.arange(4.0, 17))]))
     lengths = [1, 1, 1, 0.5, 0.5, 0.25, 2, 1 / 3, 0.1, np.sqrt(0.5)]
+    cores = [CORNERS, CORNERS, TETRA, OCTAHEDRON, prism(3), prism(6), np.vstack([prism(12)[:12], [[0, 0, 1]]])]
 
     def body(kind):
         r, h, *sides = rng.choice(lengths, 5)
@@ -789,12 +790,16 @@ def special_poses(rng):
         if kind in ("capsule", "cylinder"):
             shape = Capsule(r, 2 * h) if kind == "capsule" else Cylinder(r, 2 * h)
             return shape, [on_rim, [0, 0, h * ends[2]], [0, 0, (h + r) * ends[2]]][int(rng.integers(3))]
-        if kind == "hull":
-            return Hull(TETRA * r), TETRA[int(rng.integers(4))] * r
         if kind == "half-space":
             return HalfSpace(ends + [0, 0, 0.5], 0.0), np.zeros(3)
-        solid = Box(sides) if kind == "box" else RoundedHull((CORNERS if r < 1 else TETRA) * sides, h)
-        return solid, ends * (np.array(sides) + (h if kind == "rounded" else 0) * rng.integers(0, 2))
+        if kind == "box":
+            return Box(sides), ends * np.array(sides)
+        core = cores[int(rng.integers(len(cores)))] * (sides if rng.random() < 0.5 else r)
+        on = core[rng.integers(len(core), size=2)].mean(0)
+        if kind == "hull":
+            return Hull(core), on
+        margin = h * float(rng.choice([1, 1, 0.1, 1e-3]))
+        return RoundedHull(core, margin), on + margin * ends * rng.integers(0, 2)
 
     def turned(q, axis, angle):
         return turned_by(np.append(np.sin(angle / 2) * axis / np.linalg.norm(axis), np.cos(angle / 2)), q)

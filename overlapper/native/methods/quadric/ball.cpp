@@ -120,8 +120,8 @@ double turn_at(double t, double radius, double cosine, double sine, double heigh
 // leaves it: the middles of its faces' discs are outside.
 //
 // The error. Every term has ten roundings or fewer, and sums that many terms make are rounded once: of the turns of a
-// fine polyhedron, all but the last digits cancel. An edge is where rounding has
-// put it, to kPlacing of how far its numbers reach: seen along it, the two planes and their line still meet, so that
+// fine polyhedron, all but the last digits cancel. An edge is where rounding has put it, to kPlacing of how far its
+// numbers reach, or as far as they were misplaced: seen along it, the two planes and their line still meet, so that
 // what it gives to the volume, a signed part of the ball between its planes and two of its disc's radii, changes by no
 // more than the parts of the discs that it cuts off, each a part of a sector. Where it ends in a corner inside, it is
 // seen from a disc's middle in a direction that is off by the corner's misplacement over its distance from there, and
@@ -192,12 +192,13 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
         left.square * add(of_left, with_second, left) + right.square * add(of_right, with_second, right);
     ++characteristic;
     const double far = std::abs(first) + std::abs(height) + std::abs(left.height);
+    const double misplaced = kPlacing * far + polyhedron.misplaced;
     const auto seen = [&](double t) {
       return through && t == 0 ? 0 : 1 / std::sqrt(of_left.distance2(t)) + 1 / std::sqrt(of_right.distance2(t));
     };
-    part.error += kPlacing * far * beside;
-    if (from_inside) part.error += kPlacing * far * r3 / 2 * seen(from);
-    if (to_inside) part.error += kPlacing * (far + length) * r3 / 2 * seen(to);
+    part.error += misplaced * beside;
+    if (from_inside) part.error += misplaced * r3 / 2 * seen(from);
+    if (to_inside) part.error += (misplaced + kPlacing * length) * r3 / 2 * seen(to);
     part.error += ends * r3 * (std::abs(dot(along, n)) + std::abs(dot(along, m)) + kPlacing);
   }
   for (size_t f = 0; f < discs.size(); ++f) {

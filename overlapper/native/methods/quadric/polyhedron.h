@@ -14,7 +14,8 @@ struct Polyhedron {
   std::span<const Vec3> corners;
   std::span<const Plane> planes;
   std::span<const Edge> edges;
-  size_t faces = 0;  ///< the first of the planes; where others have cut it, its surface goes on in the next piece
+  size_t faces = 0;      ///< the first of the planes; where others have cut it, its surface goes on in the next piece
+  double misplaced = 0;  ///< m: how far rounding may have moved corners, beyond that of their own numbers
 };
 
 /// The part of a polyhedron's face inside a quadric.

@@ -113,11 +113,25 @@ class Measuring {
     return add_about(norm(middle) > around->reach(middle) ? middle : Vec3{});
   }
 
-  /// In closed form, what a polytope, whose faces tell which of the walls they are, and one round at most share. False,
-  /// and nothing is added, if doubles are not sure of it to a fraction of the whole that matters.
-  bool add_in_closed_form(const Round* round, const slicing::Enclosure& polytope, std::span<const Wall> walls) {
-    if (!round) return add_polytope(polytope, walls);
-    return round->ball ? add_ball(*round, polytope, walls) : add_cylinder(*round, polytope, walls);
+  /// Takes the walls of a polytope and finds out which of them are one; false if there is nothing between them.
+  bool take(std::span<const Wall> walls) {
+    walls_.assign(walls.begin(), walls.end());
+    if (flat()) return false;
+    find_repeated();
+    return true;
+  }
+
+  /// The one of the walls taken that tells whose the surface in the plane of a wall is.
+  int telling(int wall) const {
+    while (instead_[wall] != kItself) wall = instead_[wall];
+    return wall;
+  }
+
+  /// In closed form, what a polytope, whose faces tell which of the walls taken they are, and one round at most share.
+  /// False, and nothing is added, if doubles are not sure of it to a fraction of the whole that matters.
+  bool add_in_closed_form(const Round* round, const slicing::Enclosure& polytope) {
+    if (!round) return add_polytope(polytope);
+    return round->ball ? add_ball(*round, polytope) : add_cylinder(*round, polytope);
   }
 
   Totals totals;
@@ -190,18 +204,28 @@ class Measuring {
     });
   }
 
-  /// One wall per plane: two lines that are one cross nowhere, or, by rounding, anywhere. A face is kept rather than a
-  /// cut, beyond which the next piece is flat, and of two faces the inner one, or that of the first body.
-  void drop_repeated() {
+  /// Of walls in one plane, all but one are superseded: by a face rather than a cut, beyond which the next piece is
+  /// flat, and of two faces by the inner one, or that of the first body.
+  void find_repeated() {
+    instead_.assign(walls_.size(), kItself);
     any_two(1, [&](Wall& wall, const Wall& other) {
       if (wall.owner == kSuperseded || other.owner == kSuperseded) return false;
       const bool cut = wall.owner == slicing::kCut, other_is_cut = other.owner == slicing::kCut;
       const double outer = (wall.slack - other.slack).head;
       const bool first = std::abs(outer) > 1e-24 * extent ? outer > 0 : &other < &wall;
-      if ((cut == other_is_cut ? first : cut) && coincide(std::abs(outer), norm(rounded(other.normal - wall.normal))))
+      if ((cut == other_is_cut ? first : cut) && coincide(std::abs(outer), norm(rounded(other.normal - wall.normal)))) {
         wall.owner = kSuperseded;
+        instead_[&wall - walls_.data()] = static_cast<int>(&other - walls_.data());
+      }
       return false;
     });
+  }
+
+  int owner_at(int wall) const { return wall == slicing::kNoWall ? kNobody : walls_[telling(wall)].owner; }
+
+  /// One wall per plane: two lines that are one cross nowhere, or, by rounding, anywhere.
+  void drop_repeated() {
+    find_repeated();
     std::erase_if(walls_, [](const Wall& wall) { return wall.owner == kSuperseded; });
   }
 
@@ -294,18 +318,18 @@ class Measuring {
   }
 
   /// No tetrahedron is negative, but by rounding.
-  bool add_polytope(const slicing::Enclosure& polytope, std::span<const Wall> walls) {
+  bool add_polytope(const slicing::Enclosure& polytope) {
     Totals piece;
     std::optional<PatchSums> with_piece;
     if (patch) with_piece = *patch;
     const Vec3 apex = polytope.corners[0].at;
     bool closed = true;
     polytope.for_faces([&](const slicing::Enclosure::Face& face, std::span<const int> ring) {
-      if (face.wall == slicing::kNoWall) {
+      const int of_wall = owner_at(face.wall);
+      if (of_wall == kNobody) {
         closed = false;
         return;
       }
-      const int of_wall = walls[face.wall].owner;
       Vec3 force, moment;
       for (size_t i = 2; i < ring.size(); ++i) {
         const Vec3 a = polytope.corners[ring[0]].at, b = polytope.corners[ring[i - 1]].at;
@@ -335,7 +359,7 @@ class Measuring {
 
   bool sure(const Totals& piece) const { return piece.error <= kSure * (totals.volume + piece.volume); }
 
-  bool add_cylinder(const Round& cylinder, const slicing::Enclosure& polytope, std::span<const Wall> walls) {
+  bool add_cylinder(const Round& cylinder, const slicing::Enclosure& polytope) {
     const Vec3 axis = rounded(cylinder.axis), across = any_orthogonal(axis);
     const Mat3 turn{across, cross(axis, across), axis};
     const Vec3 centre = rounded(slicing::foot(cylinder));
@@ -343,7 +367,7 @@ class Measuring {
     for (const slicing::Enclosure::Corner& corner : polytope.corners) rings_.add_corner(turn * (corner.at - centre));
     polytope.for_faces([&](const slicing::Enclosure::Face& face, std::span<const int> ring) {
       rings_.add_face({turn * face.normal, face.slack - dot(face.normal, centre)}, ring);
-      owners_.push_back(face.wall == slicing::kNoWall ? kNobody : walls[face.wall].owner);
+      owners_.push_back(owner_at(face.wall));
     });
     const auto part = quadric::measure_cylinder(rings_, cylinder.radius, true);
     if (!part || !(part->volume >= 0)) return false;
@@ -359,7 +383,7 @@ class Measuring {
   }
 
   /// The centre may be a corner of the polytope, where faces that go through it meet.
-  bool add_ball(const Round& ball, const slicing::Enclosure& polytope, std::span<const Wall> walls) {
+  bool add_ball(const Round& ball, const slicing::Enclosure& polytope) {
     if (patch) return false;
     const Vec3 centre = rounded(ball.centre);
     const double nothing = 16 * DBL_EPSILON * (polytope.extent() + norm(centre));
@@ -369,7 +393,7 @@ class Measuring {
       const slicing::Enclosure::Face& face = polytope.faces[f];
       const double offset = face.slack - dot(face.normal, centre);
       planes_.push_back({face.normal, std::abs(offset) <= nothing ? 0 : offset});
-      owners_.push_back(face.wall == slicing::kNoWall ? kNobody : walls[face.wall].owner);
+      owners_.push_back(owner_at(face.wall));
     }
     for (size_t i = 0; i < polytope.corners.size(); ++i) {
       const slicing::Enclosure::Corner& corner = polytope.corners[i];
@@ -383,13 +407,16 @@ class Measuring {
       const Vec3 at = corner.at - centre;
       corners_.push_back(through == 3 && norm(at) <= 1e3 * nothing ? Vec3{} : at);
     }
-    const auto part = quadric::measure_ball({corners_, planes_, edges_, planes_.size()}, {}, ball.radius, true);
+    const auto part =
+        quadric::measure_ball({corners_, planes_, edges_, planes_.size(), nothing}, {}, ball.radius, true);
     if (!part || part->sections.empty()) return true;  // nothing
     // What is convex has less surface than what is convex around it, but for a wrong turn.
     if (!(part->volume >= 0 && part->area <= (1 + 1e-9) * polytope.surface())) return false;
     Totals piece;
     piece.volume = part->volume, piece.error = part->error + nothing * part->area, piece.first = part->first;
     piece.squares = part->squares, piece.products = part->products;
+    // Of a small ball, a direction that is wrong matters to the area before it does to the volume.
+    if (!(piece.error <= kSure * ball.radius * (totals.area + part->area))) return false;
     return add_part(ball.owner, {-part->flat, {}}, part->area, planes_, part->sections, {}, centre, polytope, piece);
   }
 
@@ -653,11 +680,13 @@ class Measuring {
   }
 
   static constexpr int kSuperseded = -1;  ///< the owner of a wall that is to go
+  static constexpr int kItself = -1;      ///< for a wall that stays
   static constexpr int kNobody = -1;      ///< of a face that no wall makes
 
   std::vector<Round> rounds_;
   std::vector<Wall> walls_, with_radical_;
   std::vector<std::pair<double, int>> by_length_;  ///< walls, by what their normals are along a line
+  std::vector<int> instead_;                       ///< per wall, the one that supersedes it
   quadric::Rings rings_;
   std::vector<Vec3> corners_;
   std::vector<Plane> planes_;
@@ -848,16 +877,18 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
     if (!many) return false;
     const slicing::Enclosure& polytope = scratch->polytope;
     if (!culling.share(meeting, scratch->polytope)) return true;
-    // Where the surface of the whole is open, slices look at all of it.
+    if (!measuring.take(walls)) return true;
+    // Where the surface of the whole is open, slices look at all of it, until what is but a layer is nothing.
     const Round* round = rounds.empty() ? nullptr : &rounds[0];
-    const bool in_slices = round && measuring.closely;
-    if (rounds.size() < 2 && !in_slices && measuring.add_in_closed_form(round, polytope, walls)) return true;
+    const bool sliced = rounds.size() > 1 || (round && measuring.closely && measuring.layer == 0);
+    if (!sliced && measuring.add_in_closed_form(round, polytope)) return true;
     if (culling.outside(polytope, meeting)) return true;
     std::vector<char>& has_face = scratch->has_face;
     has_face.assign(walls.size(), false);
     for (const slicing::Enclosure::Corner& corner : polytope.corners)
       for (const int f : corner.face)
-        if (polytope.faces[f].wall != slicing::kNoWall) has_face[polytope.faces[f].wall] = true;
+        if (const int w = polytope.faces[f].wall; w != slicing::kNoWall)
+          has_face[w] = has_face[measuring.telling(w)] = true;
     size_t left = 0;
     for (size_t w = 0; w < walls.size(); ++w)
       if (has_face[w]) walls[left++] = walls[w];
