@@ -64,7 +64,8 @@ class PatchSums {
   Patch patch() const {
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
     Patch result{area_, {kNone, kNone, kNone}};
-    if (!(size_ > 0)) return result;
+    // What is nothing but rounding is another area each time that it is summed.
+    if (!(size_ > 0 && one_ > size_ / 2 && one_ < 2 * size_)) return result;
     const double u = u1_ / one_, v = v1_ / one_;
     result.centre = origin_ + (u * u_ + v * v_);
     const double uu = uu_ - u * u1_, uv = uv_ - u * v1_, vv = vv_ - v * v1_;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "distance/gjk.h"
 #include "distance/penetration.h"
@@ -307,7 +308,7 @@ counter-clockwise around a's part of the surface; for more bodies, around the pa
 `patch`, seen along it, and for small overlaps what the volume grows by per metre of depth. The same as gradient[1, :3],
 and opposite to gradient[0, :3]; zeros unless overlapping. None for three or more bodies, as are the next two.)");
   patch_property(
-      cls, "patch_centre", [](const Overlap& o) { return norm2(computed(o, &Overlap::patch).area) > 0; },
+      cls, "patch_centre", [](const Overlap& o) { return !std::isnan(computed(o, &Overlap::patch).centre.x); },
       [](const Patch& p) { return to_numpy(p.centre); },
       nb::sig("def patch_centre(self) -> numpy.typing.NDArray[numpy.float64] | None"),
       R"((3,) m, the centre of that area, in the plane through the centroid of the volume. None, too, without an area: unless

@@ -143,6 +143,23 @@ def test_the_patch_turns_with_the_bodies_and_knows_no_order(first, second):
     assert_allclose(overlap(*far).patch_centre - 64, answer.patch_centre, atol=1e-11)
 
 
+def test_a_round_body_inside_another_has_no_patch_but_rounding():
+    corners = [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    tetrahedron = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+    inner = [RoundedHull(np.array(c) * 0.2, 0.1) for c in (corners, tetrahedron)] + [Capsule(0.1, 0.3), Sphere(0.2)]
+    outer = [RoundedHull(np.array(corners) * 0.8, 0.3), Capsule(1, 1), Box([1, 1, 1])]
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        for a in inner:
+            for b in outer:
+                found = overlap(
+                    Placed(a, 0.05 * rng.normal(size=3), quaternion(rng)), Placed(b, (0, 0, 0), rng.normal(size=4))
+                )
+                assert found.volume == pytest.approx(a.volume, rel=1e-12)
+                assert_array_equal(found.patch_area, np.zeros(3))
+                assert found.patch_centre is None
+
+
 def test_where_there_is_no_patch():
     apart, inside = overlap(CUBE, Placed(CUBE, (3, 0, 0))), overlap(Placed(Sphere(0.1), (0.1, 0, 0)), CUBE)
     for answer in (apart, inside):

@@ -950,7 +950,9 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   const Vec3 centroid = totals.first / totals.volume;
   result.centroid = rounded(inside) + centroid;
   result.inertia = inertia_about(centroid, totals);
-  result.pull = about(Pull{totals.pull, totals.moment}, rounded(inside), {});
+  // Of a body inside the other, nothing but rounding is left of what sums to zero.
+  const Vec3 pull = norm(totals.pull) <= kSummation * totals.border ? Vec3{} : totals.pull;
+  result.pull = about(Pull{pull, totals.moment}, rounded(inside), {});
   for (const slicing::Pieces* pieces : {&of_a, &of_b})
     result.facets_touched += static_cast<int>(
         std::ranges::count_if(pieces->walls, [](const Wall& wall) { return wall.owner != slicing::kCut; }));
