@@ -79,14 +79,15 @@ void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side)
     if (part.empty) continue;
     around_.drop_faces();
     part.around = around_;
-    part.middle = around_.middle(), part.box = around_.bounds();
-    part.walls.clear(), part.uncut.clear();
+    part.middle = around_.middle(), part.reach = around_.reach(part.middle), part.box = around_.bounds();
+    part.walls.clear(), part.uncut.clear(), part.planes.clear();
     for (const Cut& cut : uncut_) part.uncut.push_back(cut.face.wall);
     std::ranges::sort(part.uncut);
     part.walls = part.uncut;
     for (const Enclosure::Face& face : around_.faces)
       if (face.wall != kNoWall) part.walls.push_back(face.wall);
     std::ranges::sort(part.walls);
+    for (const int w : part.walls) part.planes.push_back({rounded(pieces.walls[w].normal), pieces.walls[w].slack.head});
   }
 }
 
@@ -126,11 +127,14 @@ void Culling::near(std::vector<std::array<int, 2>>& pairs) {
 bool Culling::keep_walls(const Side& side, int piece, const Part& other, std::vector<int>& kept,
                          std::vector<Wall>& walls) const {
   kept.clear();
-  for (const int w : side.parts[piece].walls) {
-    const Wall& wall = side.pieces->walls[w];
-    const auto [least, most] = other.around.range(rounded(wall.normal));
-    if (least > wall.slack.head + margin_) return false;
-    if (most >= wall.slack.head - margin_) kept.push_back(w), walls.push_back(wall);
+  const Part& part = side.parts[piece];
+  cancellation_point(part.walls.size());
+  for (size_t i = 0; i < part.walls.size(); ++i) {
+    const auto& [normal, slack] = part.planes[i];
+    if (slack - dot(normal, other.middle) > other.reach + margin_) continue;
+    const auto [least, most] = other.around.range(normal);
+    if (least > slack + margin_) return false;
+    if (most >= slack - margin_) kept.push_back(part.walls[i]), walls.push_back(side.pieces->walls[part.walls[i]]);
   }
   return true;
 }
@@ -150,8 +154,11 @@ bool Culling::meet(int p, int q, Meeting& meeting) const {
 }
 
 bool Culling::share(const Meeting& meeting, Enclosure& polytope) const {
-  // The fewer cuts, the better.
-  const bool from_p = meeting.of_p.size() >= meeting.of_q.size();
+  // Every cut looks at all corners.
+  const auto work = [](const Part& part, const std::vector<int>& of_other) {
+    return part.around.corners.size() * (of_other.size() + part.uncut.size() + 1);
+  };
+  const bool from_p = work(a_.parts[meeting.p], meeting.of_q) <= work(b_.parts[meeting.q], meeting.of_p);
   polytope = (from_p ? a_.parts[meeting.p] : b_.parts[meeting.q]).around;
   const std::vector<int>& known = from_p ? meeting.of_p : meeting.of_q;
   const int size = static_cast<int>(meeting.walls.size()), of_p = static_cast<int>(meeting.of_p.size());

@@ -50,9 +50,11 @@ class Culling {
     Enclosure around;
     Solid round;
     Vec3 middle;
+    double reach = 0;  ///< no corner is farther from the middle
     Bounds box;
-    std::vector<int> walls;  ///< those of which something is left, and
-    std::vector<int> uncut;  ///< those that it has not been cut with, though they may matter; both sorted
+    std::vector<int> walls;     ///< those of which something is left, and
+    std::vector<int> uncut;     ///< those that it has not been cut with, though they may matter; both sorted
+    std::vector<Plane> planes;  ///< of the former
     bool empty = false;
   };
   struct Side {
