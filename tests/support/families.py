@@ -869,11 +869,12 @@ def posed_ellipsoids(rng):
 def rounded_slab(sides, r, h):
     """The volume of what a rounded box has below the height h <= r above its lowest plane: a slab of cuboid, and its
     rims, over quarters of a disc."""
-    x = mp.mpf(h) / r
-    half_segment = (mp.acos(1 - x) - (1 - x) * mp.sqrt(x * (2 - x))) / 2 * mp.mpf(r) ** 2
-    cap = mp.pi * mp.mpf(h) ** 2 * (3 * r - mp.mpf(h)) / 3
-    a, b = map(mp.mpf, sides[:2].tolist())
-    return float(a * b * h + 2 * (a + b) * half_segment + cap)
+    with mp.workdps(40):
+        x = mp.mpf(h) / r
+        half_segment = (mp.acos(1 - x) - (1 - x) * mp.sqrt(x * (2 - x))) / 2 * mp.mpf(r) ** 2
+        cap = mp.pi * mp.mpf(h) ** 2 * (3 * r - mp.mpf(h)) / 3
+        a, b = map(mp.mpf, sides[:2].tolist())
+        return float(a * b * h + 2 * (a + b) * half_segment + cap)
 
 
 def lens(r, s, d):

@@ -23,6 +23,7 @@ AFFORDABLE = {  # seeds whose exact truth takes less than half a second, and suc
     "lenses": range(SEED, SEED + 40),
     "slender_groups": (*range(SEED, SEED + 5), 400091),  # whose drawing is rough
     "special_poses": (*range(SEED, SEED + 5), 700001, 700003),  # a hull apart from a round body, and within one
+    "rounded_hulls": (*range(SEED, SEED + 5), 710251, 710528),  # slabs thinner than a closed form in doubles tells
     "dual_pairs": (*range(SEED, SEED + 5), 300221),  # among its planes the simplex method goes round in circles
 }
 
