@@ -1,6 +1,6 @@
 """Who is asked how deep two bodies are in each other or how far apart: each peer is one function, and its answer in m.
 
-A peer takes two bodies, each the vertices (n,3) of a hull or an upright ball, capsule or cylinder at its place, and
+A peer takes two bodies, each the vertices (n,3) of a hull or a shape at a pose, and
 returns the signed distance, which is minus the least translation that separates them where they overlap. A peer that
 gives none says so in words. It imports its package itself, so that one that is not installed is known by its
 ImportError. To add a peer, write its function and name it in DISTANCE_PEERS.
@@ -15,10 +15,12 @@ from collections.abc import Callable
 from math import isfinite
 
 import numpy as np
+from families import CORNERS
 from peers import coal_hull, fcl_hull, primitive
-from stability_results import NO_ANSWER, NO_DISTANCE
+from stability_results import NO_ANSWER, NO_DISTANCE, NOT_ASKED
+from strategies import rotation
 
-from overlapper import Cylinder, Hull, Placed, Sphere, overlap
+from overlapper import Box, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
 Body = np.ndarray | Placed
 Answer = float | str
@@ -42,8 +44,11 @@ def fcl(a: Body, b: Body) -> Answer:
     def placed(body: Body) -> fcl.CollisionObject:
         if isinstance(body, np.ndarray):
             return fcl.CollisionObject(fcl_hull(Hull(body)))
-        return fcl.CollisionObject(primitive(fcl, body.shape), fcl.Transform(body.position))
+        where = fcl.Transform(rotation(body.orientation), body.position)
+        return fcl.CollisionObject(primitive(fcl, body.shape), where)
 
+    if any(isinstance(body, Placed) and isinstance(body.shape, (HalfSpace, RoundedHull)) for body in (a, b)):
+        return NOT_ASKED
     return fcl.distance(placed(a), placed(b), fcl.DistanceRequest(enable_signed_distance=True))
 
 
@@ -62,7 +67,13 @@ def coal_distance(a: Body, b: Body, tolerance: float) -> Answer:
     def shape_and_pose(body: Body) -> tuple[coal.ShapeBase, coal.Transform3s]:
         if isinstance(body, np.ndarray):
             return coal_hull(body), coal.Transform3s.Identity()
-        return primitive(coal, body.shape), coal.Transform3s(np.eye(3), body.position)
+        shape = body.shape
+        if isinstance(shape, RoundedHull):
+            model = coal_hull(shape.core.vertices)
+            model.setSweptSphereRadius(shape.radius)
+        else:
+            model = primitive(coal, shape)
+        return model, coal.Transform3s(rotation(body.orientation), body.position)
 
     (one, at), (other, there) = shape_and_pose(a), shape_and_pose(b)
 
@@ -84,24 +95,28 @@ def pybullet(a: Body, b: Body) -> Answer:
     """The margin by which pybullet grows hulls, and nothing else, is taken off."""
     import pybullet
 
+    if any(isinstance(body, Placed) and isinstance(body.shape, (HalfSpace, RoundedHull)) for body in (a, b)):
+        return NOT_ASKED
     if not pybullet.isConnected():
         pybullet.connect(pybullet.DIRECT)
     pybullet.resetSimulation()
     margin, ids, corners = 0.0, [], []
     for body in (a, b):
         if isinstance(body, np.ndarray):
-            model = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=body.tolist())
-            ids.append(pybullet.createMultiBody(0, model))
-            margin += 0.001  # m
-            corners += [body.min(0), body.max(0)]
-            continue
+            body = Placed(Hull(body))
         shape = body.shape
-        if isinstance(shape, Sphere):
+        if isinstance(shape, (Hull, Box)):
+            # As a box, it would have round edges.
+            points = shape.vertices if isinstance(shape, Hull) else CORNERS * shape.half_extents
+            model = pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=points.tolist())
+            margin += 0.001  # m
+        elif isinstance(shape, Sphere):
             model = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=shape.radius)
         else:
             kind = pybullet.GEOM_CYLINDER if isinstance(shape, Cylinder) else pybullet.GEOM_CAPSULE
             model = pybullet.createCollisionShape(kind, radius=shape.radius, height=shape.length)
-        ids.append(pybullet.createMultiBody(0, model, basePosition=body.position.tolist()))
+        place = {"basePosition": body.position.tolist(), "baseOrientation": body.orientation.tolist()}
+        ids.append(pybullet.createMultiBody(0, model, **place))
         corners += list(body.bounds)
     farthest = float(np.ptp(corners, axis=0).sum())
     points = pybullet.getClosestPoints(*ids, farthest)

@@ -150,8 +150,8 @@ def described(question: Question) -> dict[str, str]:
     }
 
 
-def packages() -> str:
-    names = ["overlapper", "numpy", "scipy", "manifold3d", "trimesh", "python-fcl", "coal", "pybullet"]
+def packages(*more: str) -> str:
+    names = ["overlapper", "numpy", "scipy", "manifold3d", "trimesh", "python-fcl", "coal", "pybullet", *more]
     found = []
     for name in names:
         try:

@@ -311,6 +311,7 @@ def text(notes: list[str], rows: list[Row], shown: dict[str, Row]) -> str:
         "steps": steps(rows, solids, paper),
         "auto": about_auto(rows),
         "stress": stress_run(),
+        **shallow_rounds(),
         "paper_failures": str(sum(paper.values())),
         "shift_failures": str(paper["2 shifts"]),
     }
@@ -394,6 +395,36 @@ def stress_run() -> str:
     lines = [f"| {' | '.join(rows[0])} |", "|---|" + "--:|" * (len(rows[0]) - 1)]
     lines += [f"| {' | '.join(value.replace('_', ' ') for value in row.values())} |" for row in rows]
     return "\n".join([words, "", *lines])
+
+
+def shallow_rounds() -> dict[str, str]:
+    """What benchmarks/stability_round.py has recorded, the answers to each contact in one cell."""
+    notes, rows = read(STRESS.with_name("stability_round.csv"))
+    contacts = dict.fromkeys(row["contact"] for row in rows)
+    known = max(float(row["known to"]) for row in rows)
+    said = {
+        "shallow_cases": str(len(rows)),
+        "shallow_contacts": str(len(contacts)),
+        "shallow_known": f"{known:.0e}",
+        "shallow_notes": "\n".join(f"    {line}" for line in notes),
+    }
+    for word, key in ((": volume", "volumes"), (": stated error", "stated"), (": depth", "depths")):
+        peers = [column for column in rows[0] if column.endswith(word)]
+        said[f"shallow_{key}_auto"] = all_said([row[f"auto{word}"] for row in rows])
+        lines = [f"| | {' | '.join(peer.removesuffix(word) for peer in peers)} |", "|---|" + "--:|" * len(peers)]
+        for contact in contacts:
+            cells = [all_said([row[peer] for row in rows if row["contact"] == contact]) for peer in peers]
+            lines.append(f"| {contact} | {' | '.join(cells)} |")
+        said[f"shallow_{key}"] = "\n".join(lines)
+    return said
+
+
+def all_said(cells: list[str]) -> str:
+    """The largest error, and how many answers are none."""
+    errors = [error for cell in cells if not np.isnan(error := error_of(cell))]
+    words = Counter(cell for cell in cells if cell != NOT_ASKED and np.isnan(error_of(cell)))
+    worst = [f"{max(errors):.0e}"] if errors else []
+    return ", ".join([*worst, *(f"{count} {word}" for word, count in words.most_common())])
 
 
 def steps(rows: list[Row], solids: list[Row], paper: Counter[str]) -> str:

@@ -14,7 +14,7 @@ import families
 import numpy as np
 import pytest
 
-from overlapper import Capsule, Cylinder, Placed, Sphere
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Placed, RoundedHull, Sphere, overlap
 from overlapper.cli import bench
 
 ROOT = Path(__file__).parents[2]
@@ -24,6 +24,7 @@ import paper_steps  # noqa: E402
 import stability  # noqa: E402
 import stability_page  # noqa: E402
 import stability_results  # noqa: E402
+import stability_round  # noqa: E402
 from peers import clipping, paper, scipy_halfspaces  # noqa: E402
 from watched import Watched  # noqa: E402
 
@@ -199,6 +200,15 @@ def test_coal_is_asked_with_the_shapes_and_the_tolerance_that_are_meant(monkeypa
         assert [each for each in given if each[0] != "hull"] == kinds
 
 
+def test_coal_grows_the_core_of_a_rounded_hull(monkeypatch):
+    coal_that_answers(monkeypatch, lambda _: -0.5)
+    radii = []
+    grown = SimpleNamespace(setSweptSphereRadius=radii.append)
+    monkeypatch.setattr(sys.modules["coal"].ConvexBase, "convexHull", lambda *_: grown)
+    assert distance_peers.coal(CUBE, Placed(RoundedHull(CUBE, 0.125))) == -0.5
+    assert radii == [0.125]
+
+
 def test_an_answer_of_coal_that_more_iterations_change_is_none(monkeypatch):
     coal_that_answers(monkeypatch, lambda request: 1 / request.gjk_max_iterations)
     assert distance_peers.coal(*DEEP.bodies) == "out of iterations"
@@ -211,6 +221,69 @@ def test_pybullet_that_finds_no_points_has_no_answer(monkeypatch):
 
     monkeypatch.setattr(pybullet, "getClosestPoints", lambda *_: ())
     assert distance_peers.pybullet(*DEEP.bodies) == "no answer"
+
+
+TURNED = (0.5, 0.5, 0.5, 0.5)  # x to y, y to z, z to x
+POSED = [
+    (Placed(Capsule(0.5, 1), (1.75, 0, 0), TURNED), -0.25),
+    (Placed(Cylinder(0.5, 2), (1.75, 0, 0), TURNED), -0.25),
+]
+
+
+@pytest.mark.parametrize("name", [name for name in distance_peers.DISTANCE_PEERS if "coal" not in name])
+def test_each_library_is_asked_about_boxes_and_other_bodies_at_poses(name):
+    answer, box = distance_peers.DISTANCE_PEERS[name], Placed(Box([0.5, 1.0, 2.0]), (0, 0, 0), TURNED)
+    upright = Placed(Box([1, 1, 1]))
+    for body, distance in POSED:
+        assert answer(upright, body) == pytest.approx(distance, abs=ROUGH)
+    assert answer(box, Placed(Sphere(0.5), (0, 0.75, 0))) == pytest.approx(-0.25, abs=ROUGH)
+
+
+def test_libraries_that_lack_a_shape_are_not_asked():
+    ball, hull = Placed(Sphere(1.0)), Placed(RoundedHull(CUBE, 0.1))
+    for name in ("fcl", "pybullet"):
+        for other in (Placed(HalfSpace([0, 0, 1], 0)), hull):
+            assert distance_peers.DISTANCE_PEERS[name](ball, other) == stability_results.NOT_ASKED
+
+
+def test_contacts_of_round_bodies_are_as_deep_as_they_are_said_to_be():
+    for contact in stability_round.contacts(1):
+        volume, within = contact.volume
+        assert float(contact.depth) == pytest.approx(stability_round.DEPTH, rel=1e-6)
+        assert 0 < within < 1e-12 * volume
+        found = overlap(contact.a, contact.b)
+        assert abs(Fraction(found.volume) - volume) <= Fraction(found.volume_error) + within
+
+
+def test_a_depth_that_nobody_knows_is_none():
+    (contact,) = (each for each in stability_round.contacts(1) if each.kind == "cylinder's rim on a face")
+    beside = stability_round.Contact("", 0, contact.a, Placed(Cylinder(0.5, 1.0), contact.a.bounds[1]))
+    with pytest.raises(ValueError, match="meets an edge"):
+        _ = beside.depth
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [(-1.0, "1.0e-03"), (-1.5, "5.0e-01"), (0.0, "apart"), (1.0, "apart"), (float("nan"), "no answer"), ("-", "-")],
+)
+def test_what_is_told_of_a_contact(answer, words):
+    assert stability_round.told(Fraction(-1), Fraction(1, 1000), answer) == words
+
+
+def test_a_cell_of_the_page_has_the_largest_error_and_what_is_no_answer():
+    assert stability_page.all_said(["1.0e-03", "2.0e-01", "apart", "apart", "hang", "-"]) == "2e-01, 2 apart, 1 hang"
+    assert stability_page.all_said(["-", "-"]) == ""
+
+
+def test_round_contacts_are_put_to_all_who_are_installed(tmp_path):
+    path = tmp_path / "round.csv"
+    stability_round.run(1, path)
+    notes, rows = stability_results.read(path)
+    assert [row["contact"] for row in rows] == list(stability_round.CONTACTS)
+    missing = {note.removeprefix("missing: ").partition(" (")[0] for note in notes[1:]}
+    for column in (name for name in rows[0] if ": " in name):
+        assert any(row[column] != stability_results.NOT_ASKED for row in rows) is (column not in missing)
+    assert all(stability_results.error_of(row["auto: volume"]) < 1e-12 for row in rows)
 
 
 def test_kinds_of_failures_are_told_apart():
