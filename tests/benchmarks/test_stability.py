@@ -283,7 +283,7 @@ def test_round_contacts_are_put_to_all_who_are_installed(tmp_path):
     missing = {note.removeprefix("missing: ").partition(" (")[0] for note in notes[1:]}
     for column in (name for name in rows[0] if ": " in name):
         assert any(row[column] != stability_results.NOT_ASKED for row in rows) is (column not in missing)
-    assert all(stability_results.error_of(row["auto: volume"]) < 1e-12 for row in rows)
+    assert all(float(row["auto: volume"]) <= float(row[stability_round.STATED]) for row in rows)
 
 
 def test_kinds_of_failures_are_told_apart():
