@@ -16,7 +16,7 @@ constexpr double kPlacing = 16 * kUnit;  ///< of how far numbers reach: where an
 constexpr double kNearlyWhole = 1e-5;    ///< rad: an arc of less may be the rest of a turn
 constexpr double kUpright = 1e-12;       ///< of a plane's normal along the axis: its arcs are straight
 constexpr double kGrazing = 1e-6;        ///< the square of the sine between a face and the surface
-constexpr double kBeyond = 1e-12;        ///< of how far a plane is, for it to be out of reach
+constexpr double kBeyond = 1e-12;        ///< of how far numbers reach: a plane is out of reach
 constexpr double kOpen = 1e-9;           ///< of what sums to zero, without a wrong turn
 
 /// Functions of half an arc's angle x that closed forms leave to rounding where it is small.
@@ -155,7 +155,7 @@ class Measuring {
     const Vec3 n = plane.normal;
     // Of the cylinder between the heights, nothing reaches a plane that is farther away.
     const double reach = radius_ * std::sqrt(dot2(n, n)) + std::abs(n.z) * height_ / 2;
-    if (plane.offset > (1 + kBeyond) * reach) return true;
+    if (plane.offset > reach + kBeyond * (reach + radius_ + std::abs(level_))) return true;
     Sum section;
     find_chords(polyhedron_->ring(f));
     if (chords_.empty()) {
