@@ -618,3 +618,12 @@ def test_meshes_with_margins_deep_in_each_other_are_measured_of_their_round_shap
     b = Placed(meshes[1], rng.normal(size=3) * 0.3, rng.normal(size=4))
     found = overlap(a, b)
     assert not found or (found.way == "slicing" and found.volume_error <= 1e-11 * found.volume)
+
+
+def test_a_wedge_shorter_than_its_radius_by_millions_is_not_lost():
+    """Of the ends of its cylinder, heights are known to a rounding of the radius."""
+    plate = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * [2.5e-7, 0.025, 0.25]
+    found = overlap(Placed(RoundedHull(plate, 1 / 3), (0.1, 0.2, 0.3), (0, 0, 1, 1)), Placed(RoundedHull(CORNERS, 1.0)))
+    lower, upper = found.certificate().verify()
+    assert found.volume_error <= 1e-11 * found.volume
+    assert found.volume - found.volume_error <= lower <= upper <= found.volume + found.volume_error

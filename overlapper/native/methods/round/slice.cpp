@@ -163,13 +163,18 @@ void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
   }
 }
 
-/// Whether two lines that run against each other follow one another: by rounding, as they meet nowhere.
-bool is_flat(const Polygon& polygon, const Stack& stack) {
+/// Whether two lines follow one another that run against each other and meet beyond the square around everything: by
+/// rounding, as there is nothing between them.
+bool is_flat(const Polygon& polygon, const Slice& slice) {
   constexpr double kParallel = 1e-12;
+  const Stack& stack = slice.stack;
+  const double far = 2 * stack.line[stack.lines - 1].offset;
   for (int i = 0; i < polygon.size; ++i) {
-    const Line &a = stack.line[polygon.line[i]], &b = stack.line[polygon.line[i + 1 < polygon.size ? i + 1 : 0]];
-    if (std::abs(slicing::cross(a.normal, b.normal)) < kParallel * a.length * b.length && dot(a.normal, b.normal) < 0)
-      return true;
+    const int first = polygon.line[i], next = polygon.line[i + 1 < polygon.size ? i + 1 : 0];
+    const Line &a = stack.line[first], &b = stack.line[next];
+    if (std::abs(slicing::cross(a.normal, b.normal)) >= kParallel * a.length * b.length) continue;
+    const Point corner = slice.corner(first, next);
+    if (dot(a.normal, b.normal) < 0 && !(std::max(std::abs(corner.x), std::abs(corner.y)) <= far)) return true;
   }
   return false;
 }
@@ -185,7 +190,7 @@ Outline outline(const Slice& slice) {
   for (int i = 0; i < 4; ++i) polygon->append(square + i, slice.corner(square + i, square + (i + 1) % 4));
   for (int i = 0; i < square; ++i)
     if (!clip(polygon, spare, slice, i)) return result;
-  if (is_flat(*polygon, stack)) return result;
+  if (is_flat(*polygon, slice)) return result;
   if (stack.ball >= 0) {
     cut_by_disc(*polygon, slice, result);
     return result;
