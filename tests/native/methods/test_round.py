@@ -622,8 +622,10 @@ def test_meshes_with_margins_deep_in_each_other_are_measured_of_their_round_shap
 
 def test_a_wedge_shorter_than_its_radius_by_millions_is_not_lost():
     """Of the ends of its cylinder, heights are known to a rounding of the radius."""
-    plate = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * [2.5e-7, 0.025, 0.25]
-    found = overlap(Placed(RoundedHull(plate, 1 / 3), (0.1, 0.2, 0.3), (0, 0, 1, 1)), Placed(RoundedHull(CORNERS, 1.0)))
+    plate = RoundedHull(CORNERS * [2.5e-7, 0.025, 0.25], 1 / 3)
+    around = RoundedHull([[2, 0, 0], [0, 2, 0], [0, 0, 2], [0, 0, 0]], 0.5**0.5)
+    place = (0.7203718892643154, -0.29703967267297204, -0.6220036169108314)
+    found = overlap(Placed(plate), Placed(around, place, (1, -1, 1, 1)))
     lower, upper = found.certificate().verify()
     assert found.volume_error <= 1e-11 * found.volume
     assert found.volume - found.volume_error <= lower <= upper <= found.volume + found.volume_error
