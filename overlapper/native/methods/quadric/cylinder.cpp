@@ -7,6 +7,8 @@
 #include <numbers>
 #include <vector>
 
+#include "geometry/scratch.h"
+
 namespace overlapper::quadric {
 namespace {
 
@@ -424,8 +426,8 @@ class Measuring {
 // of how far their numbers reach: by that, times the area, is the volume between the surface as computed and as it
 // should be.
 std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius, bool with_second) {
-  thread_local Measuring measuring;
-  return measuring.measure(polyhedron, radius, with_second);
+  const Scratch<Measuring> measuring;
+  return measuring->measure(polyhedron, radius, with_second);
 }
 
 }  // namespace overlapper::quadric

@@ -34,19 +34,21 @@ void Enclosure::become(const Bounds& box) {
 
 bool Enclosure::cut(const Face& face) {
   thread_local std::pair<std::vector<double>, std::vector<int>> of_thread;
-  auto& [left, removed] = of_thread;  // every use of what is a thread's own looks for it
   const int before = static_cast<int>(corners.size());
-  left.resize(before), removed.clear();
+  of_thread.first.resize(before), of_thread.second.resize(before);
+  // By pointers: every use of what is a thread's own looks for it.
+  double* const left = of_thread.first.data();
+  int* const removed = of_thread.second.data();
+  int gone = 0;
   for (int i = 0; i < before; ++i) {
     left[i] = face.slack - dot(face.normal, corners[i].at);
-    if (!(left[i] >= 0)) removed.push_back(i);
+    if (!(left[i] >= 0)) removed[gone++] = i;
   }
-  if (removed.empty()) return true;
-  const int gone = static_cast<int>(removed.size());
+  if (gone == 0) return true;
   if (gone == before) return false;
   const int number = static_cast<int>(faces.size());
   faces.push_back(face);
-  for (const int outer : removed)
+  for (const int outer : std::span(removed, gone))
     for (int k = 0; k < 3; ++k) {
       const int inner = corners[outer].beside[k];
       if (!(left[inner] >= 0)) continue;

@@ -59,18 +59,20 @@ inline constexpr int kNoWall = -1;
 
 template <class Use>
 void Enclosure::for_faces(Use use) const {
-  thread_local std::vector<int> ring;
-  thread_local std::vector<std::array<bool, 3>> seen;
-  seen.assign(corners.size(), {});
+  thread_local std::pair<std::vector<int>, std::vector<std::array<bool, 3>>> of_thread;
+  of_thread.first.resize(corners.size()), of_thread.second.assign(corners.size(), {});
+  // By pointers: every use of what is a thread's own looks for it.
+  int* const ring = of_thread.first.data();
+  std::array<bool, 3>* const seen = of_thread.second.data();
   for (size_t first = 0; first < corners.size(); ++first)
     for (int k = 0; k < 3; ++k) {
       if (seen[first][k]) continue;
-      ring.clear();
+      size_t size = 0;
       for_ring(static_cast<int>(first), k, [&](int corner, int along) {
-        ring.push_back(corner);
+        ring[size++] = corner;
         seen[corner][along] = true;
       });
-      use(faces[corners[first].face[k]], std::span<const int>(ring));
+      use(faces[corners[first].face[k]], std::span<const int>(ring, size));
     }
 }
 

@@ -178,21 +178,24 @@ class Measuring {
   }
 
   /// Calls `use(i, j)` with every two different walls whose normals may be opposite, for `side` -1, or equal, for 1:
-  /// both ways round, and until it returns true. Of many walls, those next to each other along a line that no body
-  /// prefers.
+  /// both ways round, and until it returns true. Such are equally long along a line that no body prefers; of many
+  /// walls, by that, only those next to each other are looked at.
   template <class Use>
   bool any_two(double side, Use use) {
     constexpr Vec3 kAcross{0.3141, 0.5926, 0.7417};
     constexpr double kEqual = 1e-12;  // beyond the rounding of these lengths
+    constexpr size_t kMany = 24;
     by_length_.clear();
     for (int i = 0; i < static_cast<int>(walls_.size()); ++i)
       by_length_.push_back({dot(kAcross, rounded(walls_[i].normal)), i});
-    std::ranges::sort(by_length_);
+    const bool many = walls_.size() > kMany;
+    if (many) std::ranges::sort(by_length_);
     for (const auto& [length, i] : by_length_) {
-      const std::pair<double, int> least{side * length - kEqual, -1};
-      for (auto other = std::ranges::lower_bound(by_length_, least);
-           other != by_length_.end() && other->first <= side * length + kEqual; ++other)
-        if (other->second != i && use(walls_[i], walls_[other->second])) return true;
+      const double least = side * length - kEqual, most = side * length + kEqual;
+      auto other = many ? std::ranges::lower_bound(by_length_, std::pair{least, -1}) : by_length_.begin();
+      for (; other != by_length_.end() && !(many && other->first > most); ++other)
+        if (other->first >= least && other->first <= most && other->second != i && use(walls_[i], walls_[other->second]))
+          return true;
     }
     return false;
   }
