@@ -65,8 +65,8 @@ struct Integrals {
 
 }  // namespace
 
-Moments moments(const Polytope& polytope) {
-  Moments sum;
+PolytopeMoments moments(const Polytope& polytope) {
+  PolytopeMoments sum;
   SumInPairs<Integrals> integrals;
   sum.cone_volume.reserve(polytope.facets());
   sum.facet_centroid.reserve(polytope.facets());

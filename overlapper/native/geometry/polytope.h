@@ -34,8 +34,8 @@ inline Vec3 polar_dual(const Plane& plane, Vec3 origin) { return plane.normal / 
 /// strictly inside.
 Polytope polar_dual(const ExpandingHull& hull);
 
-/// Integrals over a solid that has the origin inside.
-struct Moments {
+/// Integrals over a polytope that has the origin inside.
+struct PolytopeMoments {
   double volume = 0;
   Vec3 first_moment;                                    ///< ∫ x dV
   Mat3 second_moment{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};  ///< ∫ x xᵀ dV
@@ -44,6 +44,6 @@ struct Moments {
 };
 
 /// Sums tetrahedra from the origin to the fans of the facets. All are positive, so nothing cancels.
-Moments moments(const Polytope& polytope);
+PolytopeMoments moments(const Polytope& polytope);
 
 }  // namespace overlapper

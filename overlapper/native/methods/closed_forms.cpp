@@ -478,33 +478,6 @@ class OwnPolyhedron {
   quadric::Polyhedron polyhedron_;
 };
 
-/// Integrals of a part over its volume: of x, and of squares and products of two coordinates.
-struct Moments {
-  double volume = 0;
-  Vec3 first, squares, products;
-
-  /// About a point of which the part's own is at `offset`.
-  void add(double part_volume, Vec3 f, Vec3 s, Vec3 p, Vec3 offset) {
-    const Vec3 o = offset, g = 2.0 * f + part_volume * o;
-    volume += part_volume, first += f + part_volume * o;
-    squares += s + scaled(o, g);
-    products +=
-        p + Vec3{f.y * o.z + f.z * o.y + part_volume * o.y * o.z, f.z * o.x + f.x * o.z + part_volume * o.z * o.x,
-                 f.x * o.y + f.y * o.x + part_volume * o.x * o.y};
-  }
-  Mat3 inertia_about_centroid() const {
-    const Vec3 c = first / volume, f = first;
-    const Vec3 s = squares - scaled(f, c);
-    const Vec3 p = products - Vec3{f.y * c.z, f.z * c.x, f.x * c.y};
-    return {{s.y + s.z, -p.z, -p.y}, {-p.z, s.z + s.x, -p.x}, {-p.y, -p.x, s.x + s.y}};
-  }
-  /// How many times as far from the point as it is wide, as squares: so many digits second moments lose.
-  double remoteness() const {
-    const Vec3 c = first / volume, q = squares / volume;
-    return norm2(c) / (q.x + q.y + q.z - norm2(c));
-  }
-};
-
 /// Where one plane at most reaches a ball, a cap has fewer terms.
 std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, const Placed& other, int self,
                                                       double rounding, Vec3 reference,
@@ -514,7 +487,7 @@ std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, cons
   const Vec3 centre = apply_transposed(other.pose.rotation, ball.centre - other.pose.translation);
   const auto reaches = [&](const Plane& plane) { return -signed_distance(plane, centre) < ball.radius + rounding; };
   if (std::ranges::count_if((*polyhedron).planes, reaches) < 2) return std::nullopt;
-  const auto part = quadric::measure_ball(*polyhedron, centre, ball.radius, true);
+  const auto part = quadric::measure_ball(*polyhedron, centre, ball.radius);
   if (!part || !(part->volume > 0)) return std::nullopt;
   Measures q = by_formula();
   q.facets_touched = part->faces;
@@ -527,7 +500,7 @@ std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, cons
   const Vec3 on_other = turned(part->flat);
   q.pulls = opposite_pulls(self == 0 ? -on_other : on_other, ball.centre, positions);
   const Mat3 rotation = other.pose.rotation;
-  const Mat3 inertia = Moments{part->volume, part->first, part->squares, part->products}.inertia_about_centroid();
+  const Mat3 inertia = part->inertia_about_centroid();
   return MeasuresAndInertia{std::move(q), rotation * inertia * transposed(rotation)};
 }
 
@@ -553,10 +526,10 @@ std::optional<MeasuresAndInertia> long_body_and_polyhedron(const Revolved& body,
   Moments moments;  // about its centre, along its axes
   Pull on_body{};   // likewise
   if (!part.empty()) {
-    const auto middle = quadric::measure_cylinder(part, r, true);
+    const auto middle = quadric::measure_cylinder(part, r);
     if (!middle) return std::nullopt;
     q.volume_error = middle->error, q.area = middle->area, q.facets_touched = middle->faces;
-    moments.add(middle->volume, middle->first, middle->squares, middle->products, {});
+    moments += *middle;
     on_body = body.round ? middle->curved : Pull{-middle->flat.force, -middle->flat.moment};
     if (!body.round) q.area = middle->whole_area;
   }
@@ -568,10 +541,10 @@ std::optional<MeasuresAndInertia> long_body_and_polyhedron(const Revolved& body,
     const quadric::Polyhedron rest = part.polyhedron();
     if (rest.edges.empty()) return std::nullopt;
     const Vec3 centre{0, 0, end};
-    const auto ball = quadric::measure_ball(rest, centre, r, true);
+    const auto ball = quadric::measure_ball(rest, centre, r);
     if (!ball) continue;
     q.volume_error += ball->error, q.area += ball->area, q.facets_touched += ball->faces;
-    moments.add(ball->volume, ball->first, ball->squares, ball->products, centre);
+    moments += ball->seen_from(centre);
     on_body.force += -ball->flat, on_body.moment += cross(centre, -ball->flat);
   }
   q.volume = moments.volume;

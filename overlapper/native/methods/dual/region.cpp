@@ -196,7 +196,7 @@ Mat3 inertia_tensor(const Mat3& s) {
 }  // namespace
 
 MeasuresAndInertia measure(const Region& region, std::span<const Placed> bodies) {
-  const Moments in_frame = moments(region.polytope);
+  const PolytopeMoments in_frame = moments(region.polytope);
   const Mat3& axes = region.frame.axes;
   const double scale = determinant(axes);
   Measures m;

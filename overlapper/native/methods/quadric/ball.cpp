@@ -65,14 +65,14 @@ struct Chord {
 
 /// Takes from a disc the sector from one unit vector to another, of which directions are to sum to the opposite of
 /// those of the edges.
-void add_sector(Vec3 out, bool with_second, Disc& disc) {
+void add_sector(Vec3 out, Disc& disc) {
   const double cube = disc.square * std::sqrt(disc.square);
   disc.first += cube / 3 * out;
-  if (with_second) disc.third -= 2.0 / 15 * disc.square * cube * out;
+  disc.third -= 2.0 / 15 * disc.square * cube * out;
 }
 
 /// Returns the size of the angle.
-double add(const Chord& chord, bool with_second, Disc& disc) {
+double add(const Chord& chord, Disc& disc) {
   const auto [out, along, h, from, to] = chord;
   const double length = to - from, h2 = h * h, cubes = length * (from * from + from * to + to * to);
   const double angle = std::atan2(length * h, h2 + from * to);
@@ -81,15 +81,13 @@ double add(const Chord& chord, bool with_second, Disc& disc) {
   disc.twice += h * length;
   disc.second += h * (h2 * length + cubes / 3);
   disc.first += h * length / 6 * (2 * h * out + (from + to) * along);
-  if (with_second) {
-    const double radius2 = disc.square, part = h2 / 5 - radius2 / 3;
-    const double squares = length * (from + to), fourths = squares * (from * from + to * to);
-    disc.third += h2 * (part * length + cubes / 15) * out + h * (part * squares / 2 + fourths / 20) * along;
-  }
+  const double part = h2 / 5 - disc.square / 3;
+  const double squares = length * (from + to), fourths = squares * (from * from + to * to);
+  disc.third += h2 * (part * length + cubes / 15) * out + h * (part * squares / 2 + fourths / 20) * along;
   // Seen from an end of itself, it takes up no angle.
   if (chord.distance2(from) > 0 && chord.distance2(to) > 0) {
     const double begin = 1 / std::sqrt(chord.distance2(from)), end = 1 / std::sqrt(chord.distance2(to));
-    add_sector((from * begin - to * end) * out + h * (end - begin) * along, with_second, disc);
+    add_sector((from * begin - to * end) * out + h * (end - begin) * along, disc);
   }
   return std::abs(angle);
 }
@@ -128,7 +126,7 @@ double turn_at(double t, double radius, double cosine, double sine, double heigh
 // with it a sector and what of the ball is above; without bound where a corner is in the middle of a disc, and edges
 // disagree upon where it is seen. Where it ends on the sphere, the turn there is of planes that it is parallel to, but
 // for what is measured.
-std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius, bool with_second) {
+std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, double radius) {
   thread_local std::vector<Disc> discs;
   thread_local std::vector<char> inside;
   thread_local std::vector<Section> sections;
@@ -188,8 +186,7 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     sizes += at_from + at_to;
     const Chord of_left{out, along, height, from, to};
     const Chord of_right{sine * n - cosine * out, along, other, from, to};
-    const double beside =
-        left.square * add(of_left, with_second, left) + right.square * add(of_right, with_second, right);
+    const double beside = left.square * add(of_left, left) + right.square * add(of_right, right);
     ++characteristic;
     const double far = std::abs(first) + std::abs(height) + std::abs(left.height);
     const double misplaced = kPlacing * far + polyhedron.misplaced;
@@ -208,7 +205,7 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     const double angle = std::atan2(dot(n, cross(disc.comes, disc.goes)), dot(disc.comes, disc.goes));
     disc.around = false;
     disc.angle += angle, disc.sizes += std::abs(angle);
-    add_sector(cross(disc.comes - disc.goes, n), with_second, disc);
+    add_sector(cross(disc.comes - disc.goes, n), disc);
   }
   Sum cones;
   double flats = 0;     // m², of all faces
@@ -237,7 +234,6 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
     sections[f].area = face, sections[f].first = face * h * n + disc.first;
     const double on_face = (disc.second - disc.square * disc.square * arcs) / 4 - disc.square * twice / 2;
     part.first += on_face / 2 * n;
-    if (!with_second) continue;
     pressure += h * on_face;
     const Vec3 w = h * on_face * n + disc.third;
     part.squares += scaled(n, w);
@@ -258,11 +254,9 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
   part.area += area;
   part.volume = (cones.value() + r * area) / 3;
   part.error += kUnit * 10 * (cone_sizes + r3 * sizes + r * std::abs(area)) / 3;
-  if (with_second) {
-    const double all = (3 * r2 * part.volume + pressure) / 5, each = r2 * part.volume - all;
-    part.squares = 0.5 * (part.squares + Vec3{each, each, each});
-    part.products = 0.5 * part.products;
-  }
+  const double all = (3 * r2 * part.volume + pressure) / 5, each = r2 * part.volume - all;
+  part.squares = 0.5 * (part.squares + Vec3{each, each, each});
+  part.products = 0.5 * part.products;
   part.sections = sections;
   return part;
 }

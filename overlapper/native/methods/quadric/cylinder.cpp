@@ -119,16 +119,16 @@ bool find_chord(Vec3 p, Vec3 q, bool p_inside, bool q_inside, double radius, Cho
 /// What is summed over a face's part inside.
 struct Sum : Section {
   double sizes = 0;  ///< m²: of the areas that are summed
-  /// If second moments are asked for, ∫ (ρ² − r²) x dA, of the distance ρ from the axis, and ∫ z³ dA.
+  /// ∫ (ρ² − r²) x dA, of the distance ρ from the axis, and ∫ z³ dA.
   Vec3 within;
   double cubes = 0;
 };
 
 class Measuring {
  public:
-  std::optional<CylinderPart> measure(const Rings& polyhedron, double radius, bool with_second) {
-    polyhedron_ = &polyhedron, radius_ = radius, with_second_ = with_second, part_ = {};
-    radial_ = 0, lengthwise_ = across_ = {}, sections_.assign(with_second ? polyhedron.planes().size() : 0, {});
+  std::optional<CylinderPart> measure(const Rings& polyhedron, double radius) {
+    polyhedron_ = &polyhedron, radius_ = radius, part_ = {};
+    radial_ = 0, lengthwise_ = across_ = {}, sections_.assign(polyhedron.planes().size(), {});
     terms_ = 0, cones_ = sizes_ = all_area_ = upward_ = far2_ = turned_ = levels_ = squares_ = 0, height_moments_ = {};
     return measure();
   }
@@ -182,13 +182,11 @@ class Measuring {
     all_area_ += area;
     upward_ += std::max(0.0, area * n.z);
     height_moments_ += plane.offset * section.first;
-    if (with_second_) {
-      radial_ += n.x * section.within.x + n.y * section.within.y;
-      lengthwise_ += scaled(n, {section.within.x, section.within.y, section.cubes});
-      across_ +=
-          Vec3{n.y * section.within.z, n.x * section.within.z, (n.x * section.within.y + n.y * section.within.x) / 2};
-      sections_[f] = section;
-    }
+    radial_ += n.x * section.within.x + n.y * section.within.y;
+    lengthwise_ += scaled(n, {section.within.x, section.within.y, section.cubes});
+    across_ +=
+        Vec3{n.y * section.within.z, n.x * section.within.z, (n.x * section.within.y + n.y * section.within.x) / 2};
+    sections_[f] = section;
     const Pull pull{area * n, cross(section.first, n)};
     part_.curved.force += -pull.force, part_.curved.moment += -pull.moment;
     if (!polyhedron_->face(f)) return true;
@@ -233,7 +231,6 @@ class Measuring {
     section.first = section.area * Vec3{0, 0, z};
     turned_ += turn, levels_ += turn * z, squares_ += turn * (z * z + wave2 / 2);
     sizes_ += radius_ * radius_ * std::abs(turn * z);
-    if (!with_second_) return;
     const double quarter = radius_ * radius_ / 4;
     const Vec3 slope{-n.x / n.z, -n.y / n.z, 0};
     const double rise2 = quarter * dot2(slope, slope);
@@ -250,7 +247,6 @@ class Measuring {
     section.area += area, section.sizes += std::abs(area);
     const Vec3 sum = a + b + c;
     section.first += area / 3 * sum;
-    if (!with_second_) return;
     // A rule for polynomials of the third degree.
     const auto at = [&](double weight, Vec3 p) {
       const double w = weight * area, inner = w * (dot2(p, p) - radius_ * radius_);
@@ -319,9 +315,8 @@ class Measuring {
     const Vec3 middle{(p.x + q.x) / 2, (p.y + q.y) / 2, mean};
     const Vec3 out{w.x, w.y, -dot2(n, w) / n.z};
     section.first += area * middle + beyond * out;
-    if (with_second_)
-      add_segment(middle, radius_ * out, {-radius_ * w.y, radius_ * w.x, -slope}, std::abs(x), std::abs(s), c,
-                  radius_ * radius_ / std::abs(n.z), section);
+    add_segment(middle, radius_ * out, {-radius_ * w.y, radius_ * w.x, -slope}, std::abs(x), std::abs(s), c,
+                radius_ * radius_ / std::abs(n.z), section);
     return true;
   }
 
@@ -363,11 +358,9 @@ class Measuring {
     part_.error = kUnit * (16 + terms_) * sizes_ / 3 + kPlacing * reach * (all_area_ + std::abs(curved));
     const Vec3 of_curved{r * part_.curved.force.x, r * part_.curved.force.y, r * squares_ / 2};
     part_.first = 0.25 * (height_moments_ + r * of_curved);
-    if (with_second_) {
-      const double v = part_.volume, both = radial_ / 4 + r * r * v / 2, rest = (r * r * v - both) / 2;
-      part_.squares = {lengthwise_.x / 2 + rest, lengthwise_.y / 2 + rest, lengthwise_.z / 3};
-      part_.products = 0.5 * across_;
-    }
+    const double v = part_.volume, both = radial_ / 4 + r * r * v / 2, rest = (r * r * v - both) / 2;
+    part_.squares = {lengthwise_.x / 2 + rest, lengthwise_.y / 2 + rest, lengthwise_.z / 3};
+    part_.products = 0.5 * across_;
     // About the origin again.
     const Vec3 up{0, 0, level_};
     const auto lift = [&](double size, Vec3& first, Vec3& squares, Vec3& products) {
@@ -395,7 +388,6 @@ class Measuring {
   double turned_ = 0;                ///< rad
   double levels_ = 0, squares_ = 0;  ///< ∫ z dθ and ∫ z² dθ along the arcs
   Vec3 height_moments_;              ///< Σ h ∫ x dA
-  bool with_second_ = false;
   std::vector<Section> sections_;
   double radial_ = 0;         ///< Σ ∫ (ρ² − r²) (n_x x + n_y y) dA
   Vec3 lengthwise_, across_;  ///< Σ of n_x and n_y times that ∫ of x and y, n_z ∫ z³ dA; of those of two coordinates
@@ -425,9 +417,9 @@ class Measuring {
 // The error. Every term has sixteen roundings or fewer, and every sum on the way one more. Points are off by kPlacing
 // of how far their numbers reach: by that, times the area, is the volume between the surface as computed and as it
 // should be.
-std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius, bool with_second) {
+std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius) {
   const Scratch<Measuring> measuring;
-  return measuring->measure(polyhedron, radius, with_second);
+  return measuring->measure(polyhedron, radius);
 }
 
 }  // namespace overlapper::quadric

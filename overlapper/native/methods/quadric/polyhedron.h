@@ -22,7 +22,7 @@ struct Polyhedron {
 struct Section {
   double area = 0;
   Vec3 first;              ///< ∫ x dA
-  Vec3 squares, products;  ///< of a cylinder ∫ x², y², z² dA and ∫ yz, zx, xy dA, if asked for
+  Vec3 squares, products;  ///< of a cylinder ∫ x², y², z² dA and ∫ yz, zx, xy dA
 };
 
 /// A convex polyhedron by the corners around each of its faces, counter-clockwise from outside, which planes cut.

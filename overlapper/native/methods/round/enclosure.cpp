@@ -6,15 +6,6 @@
 
 namespace overlapper::slicing {
 
-namespace {
-
-/// Which of a corner's edges leads to another.
-int edge_to(const Enclosure::Corner& corner, int other) {
-  return corner.beside[0] == other ? 0 : corner.beside[1] == other ? 1 : 2;
-}
-
-}  // namespace
-
 void Enclosure::become(const Bounds& box) {
   const auto& [lower, upper] = box;
   faces = {{{-1, 0, 0}, -lower.x, kNoWall}, {{1, 0, 0}, upper.x, kNoWall},   {{0, -1, 0}, -lower.y, kNoWall},
@@ -53,7 +44,7 @@ bool Enclosure::cut(const Face& face) {
       const int inner = corners[outer].beside[k];
       if (!(left[inner] >= 0)) continue;
       Corner& stays = corners[inner];
-      const int along = edge_to(stays, outer);
+      const int along = stays.edge_to(outer);
       const double share = left[inner] / (left[inner] - left[outer]);
       const Corner added{stays.at + share * (corners[outer].at - stays.at),
                          {inner, -1, -1},
@@ -66,7 +57,7 @@ bool Enclosure::cut(const Face& face) {
   for (int start = before; start < all; ++start) {
     int from = start, to = corners[start].beside[0];
     while (to < before) {
-      const int next = corners[to].beside[(edge_to(corners[to], from) + 1) % 3];
+      const int next = corners[to].beside[(corners[to].edge_to(from) + 1) % 3];
       from = to, to = next;
     }
     corners[start].beside[2] = to;
@@ -79,7 +70,7 @@ bool Enclosure::cut(const Face& face) {
     if (last < before && !(left[last] >= 0)) continue;
     const int to = removed[place++];
     corners[to] = corners[last];
-    for (const int other : corners[to].beside) corners[other].beside[edge_to(corners[other], last)] = to;
+    for (const int other : corners[to].beside) corners[other].beside[corners[other].edge_to(last)] = to;
   }
   corners.resize(kept);
   return true;

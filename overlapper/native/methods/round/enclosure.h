@@ -22,6 +22,9 @@ struct Enclosure {
     Vec3 at;
     std::array<int, 3> beside;  ///< the corners at the other ends of its edges, counter-clockwise from outside
     std::array<int, 3> face;    ///< between an edge and the next
+
+    /// Which of its edges leads to another corner.
+    int edge_to(int other) const { return beside[0] == other ? 0 : beside[1] == other ? 1 : 2; }
   };
   std::vector<Face> faces;  ///< all that have cut it; of some, further ones may have left nothing
   std::vector<Corner> corners;
@@ -82,8 +85,7 @@ void Enclosure::for_ring(int first, int edge, Use use) const {
   do {
     use(from, along);
     const int to = corners[from].beside[along];
-    const auto& back = corners[to].beside;
-    along = ((back[0] == from ? 0 : back[1] == from ? 1 : 2) + 2) % 3;
+    along = (corners[to].edge_to(from) + 2) % 3;
     from = to;
   } while (from != first || along != edge);
 }

@@ -33,46 +33,22 @@ constexpr double kTold = 1e-6;
 constexpr double kSummation = 16 * DBL_EPSILON;
 
 /// Integrals in the axes of the world, about the point inside.
-struct Totals {
-  double volume = 0, error = 0, area = 0, area_error = 0;
+struct Totals : Moments {
+  double error = 0, area = 0, area_error = 0;
   double border = 0;  ///< m²: the area of all that area vectors are the sums of
   double open = 0;    ///< m³: what may be missing of pieces whose area vectors do not sum to zero
-  Vec3 first, pull, moment;
-  Vec3 squares, products;  ///< as in slicing::Integrals
-  Vec3 unbalanced;         ///< the sum of both bodies' area vectors: zero if no piece is missing
+  Vec3 pull, moment;
+  Vec3 unbalanced;  ///< the sum of both bodies' area vectors: zero if no piece is missing
 
   void add(const Totals& piece) {
-    volume += piece.volume, error += piece.error, area += piece.area, border += piece.border, open += piece.open;
-    first += piece.first, pull += piece.pull, moment += piece.moment;
-    squares += piece.squares, products += piece.products, unbalanced += piece.unbalanced;
+    Moments::operator+=(piece);
+    error += piece.error, area += piece.area, border += piece.border, open += piece.open;
+    pull += piece.pull, moment += piece.moment, unbalanced += piece.unbalanced;
   }
 };
 
 /// Of coordinates (x, y, t).
 Vec3 in_world(const slicing::Stack& stack, Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.t; }
-
-/// Coordinates that second moments are taken along, in the world.
-using Axes = std::array<Vec3, 3>;
-
-/// ∫ X Xᵀ dV of coordinates along `axis`, as squares and products there, and the integral `first` of the same in the
-/// world, about a point `offset` before them.
-void add_second(const Axes& axis, double volume, Vec3 s, Vec3 p, Vec3 first, Vec3 offset, Totals& totals) {
-  const double second[3][3] = {{s.x, p.z, p.y}, {p.z, s.y, p.x}, {p.y, p.x, s.z}};
-  Vec3 squares, products;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      const double w = second[i][j];
-      const Vec3 a = axis[i], b = axis[j];
-      squares += w * scaled(a, b);
-      products += w * Vec3{a.y * b.z, a.z * b.x, a.x * b.y};
-    }
-  const Vec3 f = first, o = offset, g = 2.0 * f + volume * o;
-  squares += scaled(o, g);
-  products += {f.y * o.z + f.z * o.y + volume * o.y * o.z, f.z * o.x + f.x * o.z + volume * o.z * o.x,
-               f.x * o.y + f.y * o.x + volume * o.x * o.y};
-  totals.squares += squares;
-  totals.products += products;
-}
 
 /// What a patch is seen in, in the coordinates that are measured in: u and v there, and what an area vector adds.
 struct Seen {
@@ -194,7 +170,8 @@ class Measuring {
       const double least = side * length - kEqual, most = side * length + kEqual;
       auto other = many ? std::ranges::lower_bound(by_length_, std::pair{least, -1}) : by_length_.begin();
       for (; other != by_length_.end() && !(many && other->first > most); ++other)
-        if (other->first >= least && other->first <= most && other->second != i && use(walls_[i], walls_[other->second]))
+        if (other->first >= least && other->first <= most && other->second != i &&
+            use(walls_[i], walls_[other->second]))
           return true;
     }
     return false;
@@ -372,14 +349,12 @@ class Measuring {
       rings_.add_face({turn * face.normal, face.slack - dot(face.normal, centre)}, ring);
       owners_.push_back(owner_at(face.wall));
     });
-    const auto part = quadric::measure_cylinder(rings_, cylinder.radius, true);
+    const auto part = quadric::measure_cylinder(rings_, cylinder.radius);
     if (!part || !(part->volume >= 0)) return false;
     Totals piece;
-    piece.volume = part->volume, piece.error = part->error, piece.first = part->first;
-    piece.squares = part->squares, piece.products = part->products;
-    const Pull& curved = part->curved;
-    if (!add_part(cylinder.owner, curved, part->whole_area, rings_.planes(), part->sections, turn, centre, polytope,
-                  piece))
+    static_cast<Moments&>(piece) = *part, piece.error = part->error;
+    if (!add_part(cylinder.owner, part->curved, part->whole_area, rings_.planes(), part->sections, turn, centre,
+                  polytope, piece))
       return false;
     if (patch) add_to_patch(cylinder, *part, turn, centre);
     return true;
@@ -410,14 +385,12 @@ class Measuring {
       const Vec3 at = corner.at - centre;
       corners_.push_back(through == 3 && norm(at) <= 1e3 * nothing ? Vec3{} : at);
     }
-    const auto part =
-        quadric::measure_ball({corners_, planes_, edges_, planes_.size(), nothing}, {}, ball.radius, true);
+    const auto part = quadric::measure_ball({corners_, planes_, edges_, planes_.size(), nothing}, {}, ball.radius);
     if (!part || part->sections.empty()) return true;  // nothing
     // What is convex has less surface than what is convex around it, but for a wrong turn.
     if (!(part->volume >= 0 && part->area <= (1 + 1e-9) * polytope.surface())) return false;
     Totals piece;
-    piece.volume = part->volume, piece.error = part->error + nothing * part->area, piece.first = part->first;
-    piece.squares = part->squares, piece.products = part->products;
+    static_cast<Moments&>(piece) = *part, piece.error = part->error + nothing * part->area;
     // Of a small ball, a direction that is wrong matters to the area before it does to the volume.
     if (!(piece.error <= kSure * ball.radius * (totals.area + part->area))) return false;
     return add_part(ball.owner, {-part->flat, {}}, part->area, planes_, part->sections, {}, centre, polytope, piece);
@@ -446,18 +419,14 @@ class Measuring {
       if (owners_[f] == slicing::kCut) piece.area -= section.area;
     }
     piece.error += rounding_of(polytope, piece.border);
-    const Vec3 first = turned(piece.first), squares = piece.squares, products = piece.products;
+    const Moments about_centre = piece.along({turn.row0, turn.row1, turn.row2});
     const Vec3 mean = piece.first / piece.volume;
-    piece.first = first + piece.volume * centre;
+    static_cast<Moments&>(piece) = about_centre.seen_from(centre);
     // Second moments lose as much more as the part is farther from the centre than all, up to here, is wide.
-    const double volume = totals.volume + piece.volume, from_centre2 = squares.x + squares.y + squares.z;
-    const Vec3 s = totals.squares;
-    const double about_inside = s.x + s.y + s.z + from_centre2 + 2 * dot(first, centre) + piece.volume * norm2(centre);
-    const double about_mean = about_inside - norm2(totals.first + piece.first) / volume;
+    const Vec3 s = totals.squares + piece.squares, first = totals.first + piece.first;
+    const double about_mean = s.x + s.y + s.z - norm2(first) / (totals.volume + piece.volume);
     if (!(piece.error * norm2(mean) <= kSureOfMoments * about_mean)) return false;
     if (!sure(piece)) return false;
-    piece.squares = piece.products = {};
-    add_second({turn.row0, turn.row1, turn.row2}, piece.volume, squares, products, first, centre, piece);
     totals.add(piece);
     return true;
   }
@@ -669,17 +638,16 @@ class Measuring {
   void add_sum(const slicing::Stack& stack, const slicing::Sum& sum) {
     const slicing::Integrals& s = sum.integrals;
     const auto turned = [&](Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.n; };
-    totals.volume += s.volume + s.correction;
+    totals += s.along({stack.l, stack.m, stack.t}).seen_from(offset_);
+    totals.volume += s.correction;
     totals.error += sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
     totals.area += s.area, totals.area_error += sum.area_error;
     totals.border += s.border;
-    const Vec3 first = in_world(stack, s.first), pull = turned(s.pull[0]);
-    totals.first += first + s.volume * offset_;
+    const Vec3 pull = turned(s.pull[0]);
     totals.pull += pull;
     totals.moment += turned(s.moment[0]) + (stretch ? stretch->moment(offset_, pull) : cross(offset_, pull));
     totals.unbalanced += turned(s.pull[0] + s.pull[1]);
     if (patch) patch->add(s.seen[0], s.seen[1], s.seen[2], s.seen[3], s.seen[4], s.seen[5]);
-    add_second({stack.l, stack.m, stack.t}, s.volume, s.squares, s.products, first, offset_, totals);
   }
 
   static constexpr int kSuperseded = -1;  ///< the owner of a wall that is to go
@@ -696,7 +664,7 @@ class Measuring {
   std::vector<Edge> edges_;
   std::vector<std::array<int, 3>> number_;
   std::vector<int> left_;
-  std::vector<int> owners_;  ///< of the faces of that
+  std::vector<int> owners_;  ///< of the faces of what is measured
   std::vector<slicing::Interval> intervals_;
   slicing::Sum sum_, best_;
   slicing::View view_;
@@ -719,14 +687,6 @@ double missing(const Totals& totals) {
       u.x * u.x * s.x + u.y * u.y * s.y + u.z * u.z * s.z + 2 * (u.y * u.z * p.x + u.z * u.x * p.y + u.x * u.y * p.z);
   const double rounding = kSummation * totals.border * std::sqrt((s.x + s.y + s.z) / totals.volume);
   return std::max(0.0, std::sqrt(std::max(0.0, square / totals.volume)) - rounding);
-}
-
-Mat3 inertia_about(Vec3 centroid, const Totals& totals) {
-  const Vec3 c = centroid, s = totals.squares, p = totals.products;
-  const double v = totals.volume;
-  const double xx = s.x - v * c.x * c.x, yy = s.y - v * c.y * c.y, zz = s.z - v * c.z * c.z;
-  const double yz = p.x - v * c.y * c.z, zx = p.y - v * c.z * c.x, xy = p.z - v * c.x * c.y;
-  return {{yy + zz, -xy, -zx}, {-xy, xx + zz, -yz}, {-zx, -yz, xx + yy}};
 }
 
 struct Workspace {
@@ -826,15 +786,12 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
   result.area = totals.area;
   result.area_error = totals.area_error + stretch.open() * totals.area;
   result.volume_error = stretch.volume * (error + 4 * DBL_EPSILON * volume) + of_flat.flatness * totals.area;
-  const Vec3 c = totals.first / volume, s = totals.squares - volume * scaled(c, c);
-  const Vec3 p = totals.products - volume * Vec3{c.y * c.z, c.z * c.x, c.x * c.y};
   const Vec3 about_which = rounded(inside) + turn * scaled(h, moved);
-  result.centroid = about_which + turn * scaled(h, c);
-  Totals central;
-  central.volume = result.volume;
-  central.squares = stretch.volume * scaled(scaled(h, h), s);
-  central.products = stretch.volume * scaled(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, p);
-  result.inertia = turn * inertia_about({}, central) * transposed(turn);
+  result.centroid = about_which + turn * scaled(h, totals.first / volume);
+  const Moments whole{result.volume, stretch.volume * scaled(h, totals.first),
+                      stretch.volume * scaled(scaled(h, h), totals.squares),
+                      stretch.volume * scaled(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, totals.products)};
+  result.inertia = turn * whole.inertia_about_centroid() * transposed(turn);
   const double side = swapped ? -1 : 1;
   const Pull pull{side * (turn * stretch.normal(totals.pull)), side * (turn * totals.moment)};
   result.pull = about(pull, about_which, {});
@@ -950,9 +907,8 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
   result.volume_error += (of_a.flatness + of_b.flatness) * totals.area;
   result.area = totals.area;
-  const Vec3 centroid = totals.first / totals.volume;
-  result.centroid = rounded(inside) + centroid;
-  result.inertia = inertia_about(centroid, totals);
+  result.centroid = rounded(inside) + totals.first / totals.volume;
+  result.inertia = totals.inertia_about_centroid();
   // Of a body inside the other, nothing but rounding is left of what sums to zero.
   const Vec3 pull = norm(totals.pull) <= kSummation * totals.border ? Vec3{} : totals.pull;
   result.pull = about(Pull{pull, totals.moment}, rounded(inside), {});

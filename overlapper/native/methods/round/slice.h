@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "geometry/vec.h"
+#include "geometry/moments.h"
 #include "methods/round/stretch.h"
 
 namespace overlapper::slicing {
@@ -159,12 +159,9 @@ Outline outline(const Slice& slice);
 /// Whether a slice surely has that outline, which is found sooner than the outline itself.
 bool is_outline(const Slice& slice, const Outline& outline);
 
-/// Integrals over a slice, or over slices: the volume's, and those of the surfaces.
-struct Integrals {
-  double volume = 0;
-  Vec3 first;              ///< of x, y and t
-  Vec3 squares, products;  ///< of x², y², t² and of yt, tx, xy
-  double area = 0;         ///< of what the bodies own of the surface
+/// Integrals over a slice, or over slices, in coordinates x, y and t: the volume's, and those of the surfaces.
+struct Integrals : Moments {
+  double area = 0;  ///< of what the bodies own of the surface
   /// ∫ N dA and ∫ X × N dA along l, m and n: per body of its surface, and of the cuts through bodies.
   std::array<Vec3, 3> pull{}, moment{};
   double across = 0;             ///< ∫ t N dA along n, over all of the surface: the volume, by other integrals
