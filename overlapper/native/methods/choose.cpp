@@ -1,5 +1,6 @@
 #include "methods/choose.h"
 
+#include <algorithm>
 #include <cassert>
 #include <limits>
 #include <stdexcept>
@@ -194,6 +195,16 @@ bool cores_reach(const Placed& a, const Placed& b, const Distance& d, double rea
   return core_radius(a.shape) + core_radius(b.shape) > 0 && norm2(d.normal) > 0 && -d.distance > doubt(reach);
 }
 
+/// Between the nearest points of two cores that reach each other, one that the radii of both reach: about in the middle
+/// of what both reach of that way. Nothing where one of them is its own core.
+std::optional<Vec3> point_between(const Placed& a, const Placed& b, const Distance& d) {
+  const auto inward = [](const Shape& shape) { return bounded(shape) ? core_radius(shape) : kInfinity; };
+  const double depth = -d.distance, from_a = inward(a.shape), from_b = inward(b.shape);
+  if (!(from_a > 0 && from_b > 0)) return std::nullopt;
+  const double into_a = std::clamp(depth / 2, depth - std::min(depth, from_b), from_a);
+  return d.witness_a + into_a * d.normal;
+}
+
 Region owned_as_given(Region region, const Arrangement& at) {
   for (Region::Facet& facet : region.facets) facet.owner = at.order[facet.owner];
   return region;
@@ -219,6 +230,7 @@ Search search(const Arrangement& at) {
     search.hints = facing_planes(bodies, d);
     if (cores_reach(bodies[0], bodies[1], d, search.reach)) {
       search.status = Status::kOverlapping, search.way = Way::kDual;
+      search.between = point_between(bodies[0], bodies[1], d);
       return search;
     }
   }
@@ -301,6 +313,7 @@ std::optional<Region> grown_in_wide_arithmetic(const OverlappingBodies& overlapp
 double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 ? m.volume_error : kInfinity; }
 
 WideVector point_inside(const OverlappingBodies& overlapping) {
+  if (overlapping.search().between) return wide(*overlapping.search().between);
   const Inside& found = overlapping.inside();
   return found.wide_ball ? found.wide_ball->centre : wide(found.ball.centre);
 }

@@ -96,6 +96,7 @@ struct Search {
   std::vector<double> reaches;    ///< how large the numbers are that describe each body
   double reach = 0;               ///< the largest
   std::vector<OwnedPlane> hints;  ///< for whoever looks for a ball
+  std::optional<Vec3> between;    ///< a point inside both, beyond doubt, of a pair whose rounded cores are apart
   std::optional<Inside> inside;   ///< nothing where the status was known without
 };
 /// Throws std::invalid_argument if the common set is unbounded.
