@@ -740,6 +740,18 @@ def rounded_hulls(rng):
     return Case(where, depth, (Placed(body), lower), 2 * rounded_slab(sides, r, h / 2))
 
 
+def rounded_meshes(rng):
+    """A round body, or a rounded hull of few corners, deep in a mesh of `parameter` corners with a margin: most of its
+    core has more facets there than slices have lines."""
+    count, margin, r = int(rng.choice([30, 60])), float(rng.choice([1e-3, 0.05])), rng.uniform(0.25, 0.5)
+    shape = [
+        Sphere(r), Capsule(r, 1.5 * r), Cylinder(r, 2 * r), RoundedHull(directions(rng, 8) * r / 2, r / 2)
+    ][int(rng.integers(4))]  # fmt: skip
+    mesh = RoundedHull(directions(rng, count) * rng.uniform(0.3, 0.6, 3), margin)
+    bodies = Placed(shape, rng.normal(size=3) * 0.1, quaternion(rng)), Placed(mesh, (0, 0, 0), quaternion(rng))
+    return Case(f"{type(shape).__name__} and {margin:g}", count, bodies if rng.random() < 0.5 else bodies[::-1])
+
+
 def flush_round(rng):
     """Two bodies about one axis, one of them round, that share surfaces, or do but for rounding. What they have in
     common is the smaller, or the part of it up to a plane in which a capsule becomes a half ball."""
@@ -894,7 +906,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
-        round_contacts, rounded_hulls, flush_round, special_poses, ellipsoids, posed_ellipsoids,
+        round_contacts, rounded_hulls, rounded_meshes, flush_round, special_poses, ellipsoids, posed_ellipsoids,
     )
 }  # fmt: skip
 

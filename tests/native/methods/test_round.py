@@ -519,6 +519,13 @@ def test_meshes_of_many_facets_deep_in_each_other_are_sliced(points, margin):
     assert found.way == "slicing" and found.volume_error <= 1e-10 * found.volume
 
 
+@pytest.mark.parametrize("first_seed", range(0, 60, 20))
+def test_round_bodies_deep_in_meshes_with_margins_are_measured_of_their_round_shapes(first_seed):
+    for seed in range(first_seed, first_seed + 20):
+        found = assert_motion_changes_nothing(*make("rounded_meshes", seed).bodies, np.random.default_rng(seed))
+        assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume
+
+
 @pytest.mark.parametrize("which", range(len(SILENT)))
 def test_a_plane_or_a_piece_that_slices_have_missed_is_found(which):
     for seed in range(10):

@@ -23,14 +23,22 @@ using slicing::Wall;
 
 /// The fraction of a volume that may stay open before rules are made finer.
 constexpr double kClosed = 1e-12;
+/// Of what else is measured, the fraction beside which one of many pieces may be open: what they leave open adds up.
+constexpr double kShare = 0.02;
 /// The fraction of a volume up to which the rounding of a polytope's corners does not matter.
 constexpr double kSure = 5e-13;
-/// The same of second moments about the centroid.
+/// The same where there are more walls than slices may have, and of all that is measured in closed form: of many
+/// pieces, each would be sure enough.
+constexpr double kSureOfMany = 5e-12, kSureOfAll = 8e-12;
+/// The same as the first of second moments about the centroid.
 constexpr double kSureOfMoments = 5e-11;
 /// The fraction of a piece that may stay open where its centroid tells whether it lies outside.
 constexpr double kTold = 1e-6;
 /// Sums of area vectors are right to this fraction of the area.
 constexpr double kSummation = 16 * DBL_EPSILON;
+
+/// Whether slices may have so many walls.
+bool sliceable(size_t walls) { return walls <= static_cast<size_t>(slicing::kMostLines - 4); }
 
 /// Integrals in the axes of the world, about the point inside.
 struct Totals : Moments {
@@ -97,9 +105,9 @@ class Measuring {
     return true;
   }
 
-  /// The one of the walls taken that tells whose the surface in the plane of a wall is.
+  /// The one of the walls taken that tells whose the surface in the plane of a wall is; of any other, itself.
   int telling(int wall) const {
-    while (instead_[wall] != kItself) wall = instead_[wall];
+    while (wall < static_cast<int>(instead_.size()) && instead_[wall] != kItself) wall = instead_[wall];
     return wall;
   }
 
@@ -331,13 +339,18 @@ class Measuring {
       if (of_wall == 0) piece.pull += force, piece.moment += moment;
     });
     piece.error = rounding_of(polytope, piece.border);
-    if (!closed || !sure(piece)) return false;
+    if (!closed || !sure(piece, polytope.faces.size())) return false;
     totals.add(piece);
     if (patch) *patch = *with_piece;
     return true;
   }
 
-  bool sure(const Totals& piece) const { return piece.error <= kSure * (totals.volume + piece.volume); }
+  /// Of what so many faces bound, the fraction of a volume up to which rounding does not matter.
+  static double limit(size_t faces) { return sliceable(faces) ? kSure : kSureOfMany; }
+  bool sure(const Totals& piece, size_t faces) const {
+    const double volume = totals.volume + piece.volume;
+    return piece.error <= limit(faces) * volume && totals.error + piece.error <= kSureOfAll * volume;
+  }
 
   bool add_cylinder(const Round& cylinder, const slicing::Enclosure& polytope) {
     const Vec3 axis = rounded(cylinder.axis), across = any_orthogonal(axis);
@@ -373,6 +386,7 @@ class Measuring {
       planes_.push_back({face.normal, std::abs(offset) <= nothing ? 0 : offset});
       owners_.push_back(owner_at(face.wall));
     }
+    double misplaced = 0;  // by how much corners miss their planes: all edges of a corner end where that is
     for (size_t i = 0; i < polytope.corners.size(); ++i) {
       const slicing::Enclosure::Corner& corner = polytope.corners[i];
       int through = 0;
@@ -384,15 +398,20 @@ class Measuring {
       }
       const Vec3 at = corner.at - centre;
       corners_.push_back(through == 3 && norm(at) <= 1e3 * nothing ? Vec3{} : at);
+      for (const int left : number_[i]) {
+        const auto& [normal, offset] = planes_[left];
+        const DoubleDouble off = dot(wide(normal), wide(corners_.back())) - DoubleDouble{offset};
+        misplaced = std::max(misplaced, std::abs(off.head));
+      }
     }
-    const auto part = quadric::measure_ball({corners_, planes_, edges_, planes_.size(), nothing}, {}, ball.radius);
+    const auto part = quadric::measure_ball({corners_, planes_, edges_, planes_.size(), misplaced}, {}, ball.radius);
     if (!part || part->sections.empty()) return true;  // nothing
     // What is convex has less surface than what is convex around it, but for a wrong turn.
     if (!(part->volume >= 0 && part->area <= (1 + 1e-9) * polytope.surface())) return false;
     Totals piece;
     static_cast<Moments&>(piece) = *part, piece.error = part->error + nothing * part->area;
     // Of a small ball, a direction that is wrong matters to the area before it does to the volume.
-    if (!(piece.error <= kSure * ball.radius * (totals.area + part->area))) return false;
+    if (!(piece.error <= limit(planes_.size()) * ball.radius * (totals.area + part->area))) return false;
     return add_part(ball.owner, {-part->flat, {}}, part->area, planes_, part->sections, {}, centre, polytope, piece);
   }
 
@@ -426,7 +445,7 @@ class Measuring {
     const Vec3 s = totals.squares + piece.squares, first = totals.first + piece.first;
     const double about_mean = s.x + s.y + s.z - norm2(first) / (totals.volume + piece.volume);
     if (!(piece.error * norm2(mean) <= kSureOfMoments * about_mean)) return false;
-    if (!sure(piece)) return false;
+    if (!sure(piece, planes.size())) return false;
     totals.add(piece);
     return true;
   }
@@ -531,8 +550,10 @@ class Measuring {
   }
 
   bool closed(double open, double part = 1) const {
-    return open <= part * kClosed * (totals.volume + best_.integrals.volume);
+    return open <= part * kClosed * (share_of(totals.volume) + best_.integrals.volume);
   }
+  /// What counts of all else where a piece may be open or inexact beside that.
+  double share_of(double size) const { return around ? kShare * size : size; }
 
   /// Returns by what factor less is open than before.
   double keep_better(const slicing::Stack& stack, bool few, double strictness, double& open) {
@@ -579,7 +600,8 @@ class Measuring {
   double integrate(const slicing::Stack& stack, bool few, double strictness) {
     slicing::Sum& sum = sum_;
     sum.integrals = {}, sum.about = sum.error = sum.area_error = 0, sum.rules = 0, sum.samples.clear();
-    const bool sound = slicing::integrate(stack, intervals_, totals.volume, totals.area, few, strictness, sum);
+    const double volume = share_of(totals.volume), area = share_of(totals.area);
+    const bool sound = slicing::integrate(stack, intervals_, volume, area, few, strictness, sum);
     const slicing::Interval &lowest = intervals_.front(), &highest = intervals_.back();
     if (stack.low_plane && lowest.low == stack.low)
       slicing::add_face(*stack.low_plane, stack, lowest.outline, lowest.low, sum.integrals);
@@ -689,6 +711,59 @@ double missing(const Totals& totals) {
   return std::max(0.0, std::sqrt(std::max(0.0, square / totals.volume)) - rounding);
 }
 
+/// What slices measure at once.
+struct Part {
+  slicing::Enclosure polytope;
+  std::vector<Wall> walls;
+};
+
+/// Of a polytope whose faces tell which of the walls taken, or of cuts after these, they are: those that have a face
+/// there, and those that tell of them.
+void find_walls(const Measuring& measuring, std::span<const Wall> walls, Part& part) {
+  thread_local std::vector<char> of_thread;
+  std::vector<char>& has_face = of_thread;  // every use of what is a thread's own looks for it
+  has_face.assign(walls.size(), false);
+  for (const slicing::Enclosure::Corner& corner : part.polytope.corners)
+    for (const int f : corner.face)
+      if (const int w = part.polytope.faces[f].wall; w != slicing::kNoWall)
+        has_face[w] = has_face[measuring.telling(w)] = true;
+  part.walls.clear();
+  for (size_t w = 0; w < walls.size(); ++w)
+    if (has_face[w]) part.walls.push_back(walls[w]);
+}
+
+/// Cuts in two, until slices may have the walls of each part: through the middle, across the axis that leaves the
+/// fewest to either half. Cuts are added to the walls. False if none leaves fewer.
+bool cut_in_parts(const Measuring& measuring, std::vector<Wall>& walls, std::vector<Part>& parts) {
+  for (size_t i = 0; i < parts.size();) {
+    size_t fewest = parts[i].walls.size();
+    if (sliceable(fewest)) {
+      ++i;
+      continue;
+    }
+    const Vec3 middle = parts[i].polytope.middle();
+    std::array<Part, 2> best;
+    for (const Vec3 axis : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}) {
+      cancellation_point();
+      std::array<Part, 2> halves{parts[i], parts[i]};
+      size_t most = 0;
+      for (const int side : {0, 1}) {
+        const Vec3 normal = side == 0 ? axis : -axis;
+        const double slack = dot(normal, middle);
+        walls.push_back({wide(normal), {slack}, slicing::kCut});
+        halves[side].polytope.cut({normal, slack, static_cast<int>(walls.size()) - 1});
+        find_walls(measuring, walls, halves[side]);
+        most = std::max(most, halves[side].walls.size());
+      }
+      if (most < fewest) fewest = most, best = std::move(halves);
+    }
+    if (fewest == parts[i].walls.size()) return false;
+    parts[i] = std::move(best[0]);
+    parts.push_back(std::move(best[1]));
+  }
+  return true;
+}
+
 struct Workspace {
   slicing::Pieces of_a, of_b;
   Measuring measuring;
@@ -699,7 +774,7 @@ struct Workspace {
   std::vector<Round> rounds;
   std::vector<std::array<int, 2>> near;  ///< pairs of pieces that may share something
   std::vector<std::array<int, 2>> rest;  ///< such as are not measured in closed form
-  std::vector<char> has_face;            ///< of walls
+  std::vector<Part> parts;               ///< of one of them
 };
 
 /// Makes a ball of radius 1 of the ellipsoid that a body is, and of all else what that makes of it, turned to the axes
@@ -832,7 +907,7 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
     walls.insert(walls.end(), of_b.walls.begin() + q.first_wall, of_b.walls.begin() + q.first_wall + q.walls);
     return true;
   };
-  // True if that is nothing, or measured; else, of its walls those are left that have a face there.
+  // True if that is nothing, or measured.
   const auto in_closed_form = [&] {
     if (!many) return false;
     const slicing::Enclosure& polytope = scratch->polytope;
@@ -842,18 +917,21 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
     const Round* round = rounds.empty() ? nullptr : &rounds[0];
     const bool sliced = rounds.size() > 1 || (round && measuring.closely && measuring.layer == 0);
     if (!sliced && measuring.add_in_closed_form(round, polytope)) return true;
-    if (culling.outside(polytope, meeting)) return true;
-    std::vector<char>& has_face = scratch->has_face;
-    has_face.assign(walls.size(), false);
-    for (const slicing::Enclosure::Corner& corner : polytope.corners)
-      for (const int f : corner.face)
-        if (const int w = polytope.faces[f].wall; w != slicing::kNoWall)
-          has_face[w] = has_face[measuring.telling(w)] = true;
-    size_t left = 0;
-    for (size_t w = 0; w < walls.size(); ++w)
-      if (has_face[w]) walls[left++] = walls[w];
-    walls.resize(left);
-    return false;
+    return culling.outside(polytope, meeting);
+  };
+  // In parts of which slices may have the walls; false if that gives up.
+  const auto add_sliced = [&] {
+    if (!many) return measuring.add(rounds, walls);
+    std::vector<Part>& parts = scratch->parts;
+    parts.resize(1);
+    std::swap(parts[0].polytope, scratch->polytope);
+    find_walls(measuring, walls, parts[0]);
+    if (!cut_in_parts(measuring, walls, parts)) return false;
+    for (Part& part : parts) {
+      std::swap(scratch->polytope, part.polytope);
+      if (!measuring.add(rounds, part.walls)) return false;
+    }
+    return true;
   };
   std::vector<std::array<int, 2>>&near = scratch->near, &rest = scratch->rest;
   near.clear();
@@ -875,7 +953,7 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
       }
     // What was not sure to a fraction of the pieces before it may be to one of them all.
     for (const auto& [i, j] : rest)
-      if (meet(i, j) && !in_closed_form() && !measuring.add(rounds, walls)) return false;
+      if (meet(i, j) && !in_closed_form() && !add_sliced()) return false;
     return measuring.totals.volume > 0;
   };
   const Totals& totals = measuring.totals;
