@@ -636,3 +636,18 @@ def test_a_wedge_shorter_than_its_radius_by_millions_is_not_lost():
     lower, upper = found.certificate().verify()
     assert found.volume_error <= 1e-11 * found.volume
     assert found.volume - found.volume_error <= lower <= upper <= found.volume + found.volume_error
+
+
+@pytest.mark.parametrize("seed", [13, 16, 17, 26, 32, 44, 49, 57])
+def test_a_ball_on_a_ridge_that_is_all_but_flat(seed):
+    # Corners far from the origin lie off their facet's plane by their rounding, so that the facet is two, by an
+    # angle of 1e-14 ... 1e-10: where slices cross the ridge, both lines have to go through one point.
+    rng = np.random.default_rng(seed)
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    middle, radius = rng.normal(size=3) * 10.0 ** rng.uniform(3, 6), 1.125
+    slab = Hull(middle + CORNERS * [1, 1, 0.5] @ turn.T)
+    depth = 10.0 ** -rng.uniform(6, 8)
+    across = rng.uniform(-0.3, 0.3, 2) * (2 * radius * depth) ** 0.5
+    found = overlap(Placed(Sphere(radius), middle + turn @ [*across, 0.5 + radius - depth]), Placed(slab))
+    lower, upper = found.certificate().verify()
+    assert max(abs(found.volume - lower), abs(found.volume - upper)) <= found.volume_error <= 1e-11 * found.volume

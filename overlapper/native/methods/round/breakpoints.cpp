@@ -121,8 +121,7 @@ class Candidates {
 
   /// The corner of two lines at the samples.
   void find_corners(int i, int j) {
-    const Point a = stack_.line[i].normal, b = stack_.line[j].normal;
-    const double inverse = 1 / cross(a, b);
+    const LineCorner corner_of(stack_.line[i], stack_.line[j]);
     Samples p, q;
     for (const bool first : {true, false}) {
       const Line& line = stack_.line[first ? i : j];
@@ -137,8 +136,8 @@ class Candidates {
         }
     }
     for (int k = 0; k < kSamples; ++k) {
-      x_[k] = (p[k] * b.y - q[k] * a.y) * inverse;
-      y_[k] = (a.x * q[k] - b.x * p[k]) * inverse;
+      const Point at = corner_of(p[k], q[k]);
+      x_[k] = at.x, y_[k] = at.y;
     }
   }
 

@@ -45,13 +45,12 @@ class Bundle {
   }
 
   void corner(int first, int second, Points& result) const {
-    const Point a = stack_.line[first].normal, b = stack_.line[second].normal;
-    const double inverse = 1 / slicing::cross(a, b);
+    const LineCorner corner_of(stack_.line[first], stack_.line[second]);
     Row p, q;
     side(stack_.line[first], p), side(stack_.line[second], q);
     for (int k = 0; k < kRow; ++k) {
-      result.x[k] = (p[k] * b.y - q[k] * a.y) * inverse;
-      result.y[k] = (a.x * q[k] - b.x * p[k]) * inverse;
+      const Point at = corner_of(p[k], q[k]);
+      result.x[k] = at.x, result.y[k] = at.y;
     }
   }
 

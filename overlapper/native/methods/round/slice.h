@@ -72,6 +72,24 @@ struct Line {
   double offset_tail = 0, rate_tail = 0;
 };
 
+/// The points where two lines cross, from their sides: the first line's foot, and as far along that as the second says.
+/// However nearly parallel the two are, the point lies on both but for the rounding of their sides.
+struct LineCorner {
+  Point foot, way;
+  double share, inverse;
+
+  LineCorner(const Line& first, const Line& second) {
+    const Point a = first.normal, b = second.normal;
+    const double square = first.length * first.length;
+    foot = (1 / square) * a, way = {-a.y, a.x};
+    share = dot(a, b) / square, inverse = 1 / cross(a, b);
+  }
+  Point operator()(double first_side, double second_side) const {
+    const double along = (second_side - share * first_side) * inverse;
+    return {first_side * foot.x + along * way.x, first_side * foot.y + along * way.y};
+  }
+};
+
 /// What of a surface is seen along a direction, in coordinates u and v across it.
 struct View {
   int owner = 0;      ///< of the surface
@@ -124,9 +142,7 @@ struct Slice {
     return l.upper ? upper[l.quadric] : -lower[l.quadric];
   }
   Point corner(int first, int second) const {
-    const Point a = stack.line[first].normal, b = stack.line[second].normal;
-    const double p = side(first), q = side(second), inverse = 1 / slicing::cross(a, b);
-    return {(p * b.y - q * a.y) * inverse, (a.x * q - b.x * p) * inverse};
+    return LineCorner(stack.line[first], stack.line[second])(side(first), side(second));
   }
 };
 
