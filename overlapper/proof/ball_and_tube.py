@@ -247,14 +247,16 @@ class BallAndTube(Slices):
             found += (d1 * square * two + d0 * three - 2 * square * d0 * one) / 3
             ends.append(found - d0 * area - d1 * moment)
         total = ends[1] - ends[0]
-        for pole in (radius, -radius):
+        through_pole = offset[0] * offset[0] == offset[1] * offset[1] * self.tt * self.thick
+        for side, pole in ((-1, radius), (1, -radius)):
+            if through_pole and side * offset[0] * offset[1] >= 0:
+                continue  # the slack is zero, of which a ball may not see it, and with it the share of the pole
             slack = d0 + d1 * pole
             slope = -2 * pole - 2 * slack * d1
             turns = [
                 arb.atan2(slope * (t - pole) - 2 * slack * slack, 2 * abs(slack) * rest(t).sqrt()) for t in (low, high)
             ]
             sign = arb(1) if slack > 0 else arb(-1) if slack < 0 else arb(0, 1)
-            side = -1 if pole > 0 else 1
             total += side * sign * (turns[1] - turns[0]) * radius**3 / 3
         return total
 

@@ -225,6 +225,14 @@ def test_far_from_the_origin_and_of_any_size_nothing_is_lost():
             assert 0 < lower <= upper <= lower * (1 + NARROW)
 
 
+def test_the_plane_of_an_end_may_halve_a_ball():
+    long = Placed(Cylinder(1.0, 4.0))
+    for place, radius in [((0.5, 0, 0), 0.5**0.5), ((0.75, 0.25, 0), 0.5), ((-0.125, 0, 0), 1.0)]:
+        lower, upper = bounds(long, Placed(Sphere(radius), place))
+        low, high = bounds(Placed(Cylinder(1.0, 4.0), (0, 0, 2)), Placed(Sphere(radius), place))
+        assert 2 * low <= upper and lower <= 2 * high
+
+
 def test_a_proof_does_not_ask_for_the_order_of_bodies():
     rng = np.random.default_rng(6)
     for first, second in PAIRS:

@@ -328,7 +328,7 @@ def volume_off(case: Case, found: Overlap) -> Fraction:
 
 def the_certificate_is_proved(case: Case, found: Overlap) -> str:
     """Within what is stated; of three round bodies, and of a round one that touches, which it encloses by other planes,
-    beside that and as narrow."""
+    beside that and as narrow: where bodies touch, as what their distance may be off by all over their surface."""
     kinds = [type(body.shape) for body in found.shapes]
     if found and RoundedHull in kinds and (len(kinds) > 2 or Ellipsoid in kinds):
         return ""  # they have none
@@ -338,7 +338,8 @@ def the_certificate_is_proved(case: Case, found: Overlap) -> str:
     of_planes = len(kinds) > 2 or (Ellipsoid in kinds and found.way != "slicing") or found.status == "touching"
     other_planes = case.round and of_planes
     beside = other_planes and lower <= volume + error and volume - error <= upper
-    narrow = upper - lower <= 3 * max(2 * error, Fraction(TOLERANCE) * volume)
+    film = Fraction(found.errors.distance) * Fraction(found.errors.area) if found.status == "touching" else 0
+    narrow = upper - lower <= max(6 * error, 3 * Fraction(TOLERANCE) * volume, film)
     return "" if within or (beside and narrow) else "the proved bounds are not within the stated ones"
 
 
