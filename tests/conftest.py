@@ -6,8 +6,11 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-settings.register_profile("same", deadline=None, derandomize=True, database=None, max_examples=40)
-settings.register_profile("explore", deadline=None, max_examples=2000, suppress_health_check=[HealthCheck.too_slow])
+SLOW = [HealthCheck.too_slow]  # which a machine that is busy with something else may be
+settings.register_profile(
+    "same", deadline=None, derandomize=True, database=None, max_examples=40, suppress_health_check=SLOW
+)
+settings.register_profile("explore", deadline=None, max_examples=2000, suppress_health_check=SLOW)
 settings.load_profile("same")
 
 
