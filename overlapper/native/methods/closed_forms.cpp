@@ -10,6 +10,7 @@
 
 #include "methods/quadric/ball.h"
 #include "methods/quadric/cylinder.h"
+#include "methods/quadric/shallow_ball.h"
 #include "methods/round/stretch.h"
 #include "shapes/solid.h"
 
@@ -70,16 +71,48 @@ Part half_ball(double r) {
   return {volume, {3 * r / 8 * volume, 0, 0}, 0, {}, 2 * kPi * r * r, volume};
 }
 
-/// What is left of the half ball x >= 0 where sine * x + cosine * y <= t; `cosine` >= 0.
-Part half_ball_below(double r, double sine, double cosine, double t) {
+/// Sums over terms of that size are right to this fraction of it.
+constexpr double kSummation = 64 * DBL_EPSILON;
+
+/// Of the radius: parts of a half ball that deep at most are within 75° of where they are seen from.
+constexpr double kShallowHalf = 0.2;
+
+/// A shallow part of the half ball x >= 0, about the line where the plane that cuts it meets x = 0, `edge` deep in the
+/// ball.
+Part shallow_half_ball_below(double r, double sine, double cosine, double cut_radius, double edge) {
+  quadric::ShallowBall ball(r, edge);
+  // Along the line, then −x, then −y.
+  const double width = std::sqrt(edge * (2 * r - edge));
+  const Vec3 begin{-width, 0, 0}, end{width, 0, 0}, way{1, 0, 0};
+  ball.begin_face({0, 1, 0}, 0, r);
+  ball.add_chord(end, begin);
+  ball.add_arc(begin, end, way);
+  ball.end_face();
+  ball.begin_face({0, -sine, -cosine}, 0, cut_radius);
+  ball.add_chord(begin, end);
+  ball.add_arc(end, begin, -way);
+  Part part;
+  part.flat_area = ball.end_face();
+  part.volume = ball.volume();
+  const auto about_centre = [&](Vec3 first, double of) { return Vec3{-first.y, -first.z - of * (r - edge), 0}; };
+  part.moment = about_centre(ball.first(), part.volume);
+  part.flat_moment = about_centre(ball.face_first(), part.flat_area);
+  part.curved_area = ball.curved_area();
+  part.scale = ball.error() / kSummation;
+  return part;
+}
+
+/// What is left of the half ball x >= 0 where sine * x + cosine * y <= t; `cosine` >= 0. The plane is `height` = r + t
+/// into the ball, and `edge` = r cosine + t into its disc, times the cosine.
+Part half_ball_below(double r, double sine, double cosine, double t, double height, double edge) {
   if (t >= r) return half_ball(r);
-  if (t <= -r) return {};
+  if (height <= 0) return {};
   const Vec3 direction{sine, cosine, 0};
-  const double rho = std::sqrt((r - t) * (r + t));
-  if (std::abs(t * sine) >= rho * cosine) {
+  const double rho = std::sqrt((r - t) * height);
+  if (edge <= 0 || t >= r * cosine) {
     // The circle of the cut lies on one side of x = 0.
     if (t * sine < 0 || (t == 0 && sine < 0)) return t >= 0 ? half_ball(r) : Part{};
-    if (t < 0) return cap(r, r + t, direction);
+    if (t < 0) return cap(r, height, direction);
     Part rest = half_ball(r);
     const Part removed = cap(r, r - t, -direction);
     rest.volume -= removed.volume;
@@ -89,9 +122,10 @@ Part half_ball_below(double r, double sine, double cosine, double t) {
     rest.curved_area -= removed.curved_area;
     return rest;
   }
+  if (height <= kShallowHalf * r) return shallow_half_ball_below(r, sine, cosine, rho, edge / cosine);
   // Half the angle of the cut's arc, of the arc on x = 0, and the exterior angle of the spherical part where they meet.
   // All three from the same root, so that what rounding did to it cancels in the sum.
-  const double root = std::sqrt((r * cosine - t) * (r * cosine + t));
+  const double root = std::sqrt((r * cosine - t) * edge);
   const double arc = std::atan2(root, -t * sine), base_arc = std::atan2(root, -t);
   const double exterior = std::atan2(root, -sine * r);
   // The theorem of Gauss and Bonnet.
@@ -157,12 +191,11 @@ struct CylinderPart {
 
 /// What is left of the cylinder |x| <= h, y² + z² <= r², where sine * x + cosine * y <= t; both >= 0. Slices of
 /// constant y are rectangles, 2 √(r² − y²) wide, whose length falls from 2 h to nothing while y crosses the cut; with
-/// y = −r cos θ every integrand is a trigonometric polynomial.
-CylinderPart cylinder_below(double r, double h, double sine, double cosine, double t) {
+/// y = −r cos θ every integrand is a trigonometric polynomial. `enter` and `leave` say how far the cut has passed y =
+/// -r, times cosine: where it enters the upper end, and where it leaves the lower one.
+CylinderPart cylinder_below(double r, double h, double sine, double cosine, double enter, double leave) {
   CylinderPart result{{}, 0, 0};
   Part& part = result.part;
-  // How far the cut has passed y = -r, times cosine: where it enters the upper end, and where it leaves the lower one.
-  const double enter = t - sine * h + cosine * r, leave = t + sine * h + cosine * r;
   if (leave <= 0) return result;
   const double across = 2 * r * cosine;
   const double full = enter >= across ? kPi : enter <= 0 ? 0 : angle_at(r, enter / cosine);
@@ -234,22 +267,42 @@ std::optional<Revolved> revolved(const Placed& body) {
   return std::nullopt;
 }
 
-Part below(const Revolved& body, double sine, double cosine, double t) {
-  const double r = body.radius, h = body.half_length;
+/// A plane that cuts a body, in the plane through the axis that is across it, from numbers in double-doubles: in the
+/// shallowest of cuts, each has its digits.
+struct Cut {
+  double sine = 0, cosine = 0;  ///< of its normal, along the axis and across
+  double offset = 0;            ///< about the centre
+  double upper = 0, lower = 0;  ///< how far into the balls about the ends of the axis it is
+  double enter = 0, leave = 0;  ///< as in cylinder_below()
+};
+
+Cut cut_of(const Revolved& body, const WideVector& centre, const WideVector& axis, const WidePlane& plane) {
+  const DoubleDouble r{body.radius}, h{body.half_length}, t = -signed_distance(plane, centre);
+  if (body.round && body.half_length == 0) return {0, 1, t.head, (r + t).head, (r + t).head, 0, 0};
+  const DoubleDouble along = dot(axis, plane.normal), sine = abs(along);
+  const DoubleDouble cosine = norm(plane.normal - along * axis), beside = t + r * cosine, ahead = sine * h;
+  return {sine.head,
+          cosine.head,
+          t.head,
+          (r + t - ahead).head,
+          (r + t + ahead).head,
+          (beside - ahead).head,
+          (beside + ahead).head};
+}
+
+Part below(const Revolved& body, const Cut& cut) {
+  const double r = body.radius, h = body.half_length, t = cut.offset;
   if (!body.round) {
-    CylinderPart cylinder = cylinder_below(r, h, sine, cosine, t);
+    CylinderPart cylinder = cylinder_below(r, h, cut.sine, cut.cosine, cut.enter, cut.leave);
     cylinder.part.curved_area += cylinder.lower_end + cylinder.upper_end;
     return cylinder.part;
   }
-  if (h == 0) return t >= r ? cap(r, 2 * r, {1, 0, 0}) : t > -r ? cap(r, r + t, {sine, cosine, 0}) : Part{};
-  Part part = cylinder_below(r, h, sine, cosine, t).part;
-  part += half_ball_below(r, sine, cosine, t - sine * h).shifted(h);
-  part += half_ball_below(r, -sine, cosine, t + sine * h).mirrored().shifted(-h);
+  if (h == 0) return cap(r, std::clamp(cut.lower, 0.0, 2 * r), {cut.sine, cut.cosine, 0});
+  Part part = cylinder_below(r, h, cut.sine, cut.cosine, cut.enter, cut.leave).part;
+  part += half_ball_below(r, cut.sine, cut.cosine, t - cut.sine * h, cut.upper, cut.enter).shifted(h);
+  part += half_ball_below(r, -cut.sine, cut.cosine, t + cut.sine * h, cut.lower, cut.leave).mirrored().shifted(-h);
   return part;
 }
-
-/// Sums over terms of that size are right to this fraction of it.
-constexpr double kSummation = 64 * DBL_EPSILON;
 
 Measures by_formula() {
   Measures m;
@@ -264,17 +317,15 @@ std::array<Pull, 2> opposite_pulls(Vec3 force_on_first, Vec3 where, const std::a
   return {about({force_on_first, {}}, where, positions[0]), about({-force_on_first, {}}, where, positions[1])};
 }
 
-/// What the plane leaves of the body, which is number `self` of the pair; the plane belongs to the other. `rounding` as
-/// in closed_form().
-std::optional<Measures> cut_by_plane(const Revolved& body, const Plane& plane, int self, double rounding,
+/// What the plane leaves of the body, which is number `self` of the pair; the plane belongs to the other. `rounding` is
+/// how far it may be off.
+std::optional<Measures> cut_by_plane(const Revolved& body, const Cut& cut, Vec3 normal, int self, double rounding,
                                      Vec3 reference, const std::array<Vec3, 2>& positions) {
-  double sine = dot(body.axis, plane.normal);
-  const Vec3 axis = sine < 0 ? -body.axis : body.axis;
-  sine = std::abs(sine);
-  const Vec3 across = plane.normal - sine * axis;
-  const double cosine = norm(across);
-  const Vec3 sideways = cosine > 0 ? across / cosine : any_orthogonal(axis);
-  const Part part = below(body, sine, cosine, -signed_distance(plane, body.centre));
+  const bool ball = body.round && body.half_length == 0;
+  const Vec3 axis = ball ? any_orthogonal(normal) : dot(body.axis, normal) < 0 ? -body.axis : body.axis;
+  const Vec3 across = normal - dot(normal, axis) * axis;
+  const Vec3 sideways = ball ? normal : norm2(across) > 0 ? unit(across) : any_orthogonal(axis);
+  const Part part = below(body, cut);
   if (!(part.volume > 0)) return std::nullopt;
   const auto placed = [&](Vec3 p) { return body.centre + (p.x * axis + p.y * sideways); };
   Measures q = by_formula();
@@ -286,15 +337,25 @@ std::optional<Measures> cut_by_plane(const Revolved& body, const Plane& plane, i
   if (part.flat_area > 0) {
     const Vec3 where = placed(part.flat_moment / part.flat_area);
     // The area vectors of a closed surface sum to zero, and so do their moments.
-    const Vec3 on_other = part.flat_area * plane.normal;
+    const Vec3 on_other = part.flat_area * normal;
     q.pulls = opposite_pulls(self == 0 ? -on_other : on_other, where, positions);
   }
   return q;
 }
 
+/// What dot(direction, x) is at most over the part of a ball about the origin below a plane, for unit vectors; where
+/// planes may be off by `rounding`, no less than that. From -r to r the offset leaves something of the ball.
+double reach_of_cap(double r, Vec3 normal, double offset, Vec3 direction, double rounding) {
+  const double t = offset + rounding, along = dot(direction, normal);
+  if (r * along <= t) return r + rounding;
+  const double disc = std::sqrt(std::max(0.0, (r - t) * (r + t)));
+  return t * along + disc * norm(direction - along * normal) + 2 * rounding;
+}
+
 /// An upper bound, as low as it takes, of dot(direction, x) over the part of `body` below the plane, about its centre:
 /// by weak duality, reach(direction − λ normal) + λ offset for any λ >= 0, a convex function of λ.
 double reach_below(const Revolved& body, Vec3 normal, double offset, Vec3 direction, double rounding) {
+  if (body.round && body.half_length == 0) return reach_of_cap(body.radius, normal, offset, direction, rounding);
   const auto bound = [&](double lambda) {
     return body.reach(direction - lambda * normal) + lambda * offset + (1 + lambda) * rounding;
   };
@@ -318,7 +379,7 @@ double reach_below(const Revolved& body, Vec3 normal, double offset, Vec3 direct
 /// The only one of some planes that cuts off anything which the others leave of a body.
 struct OnlyCut {
   const Plane* plane = nullptr;
-  double layers = 1;  ///< of rounding that others may cut off
+  double layers = 0;  ///< of rounding that others may cut off
 };
 
 /// Nothing where there are two such planes.
@@ -331,7 +392,7 @@ std::optional<OnlyCut> only_cut(const Revolved& body, std::span<const Plane> pla
     if (beyond > most) most = beyond, deepest = &plane;
     if (beyond > 0) cutting.push_back(&plane);
   }
-  double layers = 1;
+  double layers = 0;
   for (const Plane* plane : cutting) {
     if (plane == deepest) continue;
     const double offset = -signed_distance(*plane, body.centre);
@@ -343,12 +404,59 @@ std::optional<OnlyCut> only_cut(const Revolved& body, std::span<const Plane> pla
   return OnlyCut{deepest, layers};
 }
 
+/// A plane of a body's, in its own coordinates; nothing where corners of a hull's facet miss it.
+std::optional<WidePlane> own_plane(const Shape& shape, int f) {
+  if (const HalfSpace* half = std::get_if<HalfSpace>(&shape)) {
+    const DoubleDouble length = norm(wide(half->given_normal));
+    const bool as_given = norm2(half->plane.normal - half->given_normal) == 0;
+    // A normal that is unit but for its last bits stands for its direction, and the offset is along that.
+    return WidePlane{unit(wide(half->given_normal)),
+                     DoubleDouble{as_given ? half->plane.offset : half->given_offset} / length};
+  }
+  if (const Box* box = std::get_if<Box>(&shape)) {
+    const Plane plane = side(*box, f);
+    return WidePlane{wide(plane.normal), {plane.offset}};
+  }
+  const HullData& hull = *std::get<Hull>(shape).data;
+  const auto [a, b, c] = hull.facet_corners[f];
+  if (a < 0) return std::nullopt;
+  const WideVector normal = unit(wide_normal(hull.corners[a], hull.corners[b], hull.corners[c]));
+  return WidePlane{normal, dot(normal, wide(hull.corners[a]))};
+}
+
+/// Where a body is in the own coordinates of another.
+struct WideSeen {
+  WideVector centre, axis;
+};
+WideSeen seen_from(const Placed& other, const Placed& body) {
+  const auto rotation = [](const Placed& p) {
+    return unturned(p.orientation) ? WideMatrix{{{1}, {}, {}}, {{}, {1}, {}}, {{}, {}, {1}}}
+                                   : wide_rotation(p.orientation);
+  };
+  const WideMatrix turn = rotation(other);
+  WideSeen seen{apply_transposed(turn, wide_difference(body.position, other.position)), {}};
+  if (const HullData* hull = polytope_of(other.shape)) seen.centre = seen.centre - wide(hull->origin);
+  if (std::holds_alternative<Capsule>(body.shape) || std::holds_alternative<Cylinder>(body.shape)) {
+    const WideMatrix own = rotation(body);
+    seen.axis = apply_transposed(turn, {own.row0.z, own.row1.z, own.row2.z});
+  }
+  return seen;
+}
+
 /// The body where at most one of the planes cuts off anything that the others leave.
-std::optional<Measures> cut_by_polytope(const Revolved& body, std::span<const Plane> planes, int self, double rounding,
-                                        Vec3 reference, const std::array<Vec3, 2>& positions) {
-  const auto cut = only_cut(body, planes, rounding);
-  if (!cut) return std::nullopt;
-  return cut_by_plane(body, *cut->plane, self, cut->layers * rounding, reference, positions);
+std::optional<Measures> cut_by_polytope(const Revolved& body, const Placed& placed, const Placed& other,
+                                        std::span<const Plane> planes, int self, double rounding, Vec3 reference,
+                                        const std::array<Vec3, 2>& positions) {
+  const auto found = only_cut(body, planes, rounding);
+  if (!found) return std::nullopt;
+  const Vec3 normal = found->plane->normal;
+  if (const auto plane = own_plane(other.shape, static_cast<int>(found->plane - planes.data()))) {
+    const WideSeen seen = seen_from(other, placed);
+    const Cut cut = cut_of(body, seen.centre, seen.axis, *plane);
+    return cut_by_plane(body, cut, normal, self, found->layers * rounding, reference, positions);
+  }
+  const Cut cut = cut_of(body, wide(body.centre), wide(body.axis), {wide(normal), {found->plane->offset}});
+  return cut_by_plane(body, cut, normal, self, (1 + found->layers) * rounding, reference, positions);
 }
 
 /// An ellipsoid likewise: a cap of the unit ball that it is made of, stretched.
@@ -380,7 +488,7 @@ std::optional<Measures> cut_by_polytope(const Placed& body, std::span<const Plan
   q.area = curved.area + norm(on_other);
   q.area_error = curved.error + stretch.open() * q.area;
   q.centroid = reference + (centre + turn * scaled(half_axes, part.moment / part.volume));
-  q.volume_error = cut->layers * rounding * q.area + 2 * kSummation * q.volume;
+  q.volume_error = (1 + cut->layers) * rounding * q.area + 2 * kSummation * q.volume;
   if (!whole) {
     const Vec3 force = turn * on_other, where = centre + turn * scaled(half_axes, offset * normal);
     q.pulls = opposite_pulls(self == 0 ? -force : force, where, positions);
@@ -401,20 +509,21 @@ double clearance(const End& end, Vec3 centre, double radius, Vec3 normal, double
   return dot(end.outward, centre - end.centre) - reach_below(ball, normal, offset, -end.outward, rounding);
 }
 
-/// The lens of two balls: cap of a towards b, cap of b towards a.
-std::optional<Measures> lens(Vec3 a, double ra, Vec3 b, double rb, double rounding, Vec3 reference,
-                             std::span<const End> ends, const std::array<Vec3, 2>& positions) {
-  const double distance = norm(b - a), depth = ra + rb - distance;
-  if (!(depth > 0)) return std::nullopt;
-  const Vec3 towards = distance > 0 ? (b - a) / distance : Vec3{1, 0, 0};
+/// The lens of two balls: cap of a towards b, cap of b towards a. `between` leads from a to b, and ends may be off by
+/// the rounding.
+std::optional<Measures> lens(Vec3 a, double ra, Vec3 b, double rb, const WideVector& between, double rounding,
+                             Vec3 reference, std::span<const End> ends, const std::array<Vec3, 2>& positions) {
+  const DoubleDouble distance = norm(between), wider = two_sum(ra, -rb), depth = two_sum(ra, rb) - distance;
+  if (!(depth.head > 0)) return std::nullopt;
+  const Vec3 towards = distance.head > 0 ? rounded(between / distance) : Vec3{1, 0, 0};
   double height_a = 0, height_b = 0;
-  if (distance <= std::abs(ra - rb)) {
+  if (!(distance > abs(wider))) {
     (ra <= rb ? height_a : height_b) = 2 * std::min(ra, rb);
   } else {
     // The smaller by the formula, the other as the rest: a circle misplaced by rounding then moves no volume.
-    height_a = depth * (rb - ra + distance) / (2 * distance);
-    height_b = depth * (ra - rb + distance) / (2 * distance);
-    (height_a <= height_b ? height_b : height_a) = depth - std::min(height_a, height_b);
+    const bool a_higher = wider.head < 0;
+    const DoubleDouble less = depth * (distance - abs(wider)) / (DoubleDouble{2} * distance);
+    height_a = (a_higher ? depth - less : less).head, height_b = (a_higher ? less : depth - less).head;
   }
   for (const End& end : ends) {
     const double by_a = height_a > 0 ? clearance(end, a, ra, -towards, height_a - ra, rounding) : kInfinity;
@@ -430,7 +539,7 @@ std::optional<Measures> lens(Vec3 a, double ra, Vec3 b, double rb, double roundi
                       (rb - height_b) * cap_b.volume * towards;
   const Vec3 circle = height_a > 0 ? a + (ra - height_a) * towards : b - (rb - height_b) * towards;
   q.centroid = reference + (circle + moment / q.volume);
-  q.volume_error = rounding * q.area + kSummation * q.volume;
+  q.volume_error = kSummation * q.volume;
   const double disc = std::max(cap_a.flat_area, cap_b.flat_area);
   if (disc > 0) q.pulls = opposite_pulls(disc * towards, circle, positions);
   return q;
@@ -438,21 +547,23 @@ std::optional<Measures> lens(Vec3 a, double ra, Vec3 b, double rb, double roundi
 
 /// Where every point of the common set lies beyond the ends of both bodies, the ends are all that matters: the set is
 /// connected, and around the lens there is nothing else of them.
-std::optional<Measures> lens_of_ends(const Revolved& a, const Revolved& b, double rounding, Vec3 reference,
+std::optional<Measures> lens_of_ends(const Revolved& a, const Placed& placed_a, const Revolved& b,
+                                     const Placed& placed_b, double rounding, Vec3 reference,
                                      const std::array<Vec3, 2>& positions) {
-  const double sign_a = dot(a.axis, b.centre - a.centre) < 0 ? -1 : 1;
-  const double sign_b = dot(b.axis, a.centre - b.centre) < 0 ? -1 : 1;
   std::vector<End> ends;
-  Vec3 centre_a = a.centre, centre_b = b.centre;
-  if (a.half_length > 0) {
-    centre_a += sign_a * a.half_length * a.axis;
-    ends.push_back({centre_a, sign_a * a.axis});
-  }
-  if (b.half_length > 0) {
-    centre_b += sign_b * b.half_length * b.axis;
-    ends.push_back({centre_b, sign_b * b.axis});
-  }
-  return lens(centre_a, a.radius, centre_b, b.radius, rounding, reference, ends, positions);
+  WideVector between = wide_difference(placed_b.position, placed_a.position);
+  // The end of a body that is nearer to the other, and how far it is from the body's centre.
+  const auto end = [&](const Revolved& body, const Placed& placed, Vec3 other, double side) {
+    if (body.half_length == 0) return body.centre;
+    const bool back = dot(body.axis, other - body.centre) < 0;
+    const WideMatrix turn = wide_rotation(placed.orientation);
+    const double along = back ? -body.half_length : body.half_length;
+    between = between + side * along * WideVector{turn.row0.z, turn.row1.z, turn.row2.z};
+    ends.push_back({body.centre + along * body.axis, back ? -body.axis : body.axis});
+    return ends.back().centre;
+  };
+  const Vec3 centre_a = end(a, placed_a, b.centre, -1), centre_b = end(b, placed_b, a.centre, 1);
+  return lens(centre_a, a.radius, centre_b, b.radius, between, rounding, reference, ends, positions);
 }
 
 // --------------------------------------------------------------------------------------------------------- polyhedra
@@ -478,30 +589,75 @@ class OwnPolyhedron {
   quadric::Polyhedron polyhedron_;
 };
 
-/// Where one plane at most reaches a ball, a cap has fewer terms.
-std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, const Placed& other, int self,
-                                                      double rounding, Vec3 reference,
+/// Of part of a ball about that centre, and its moments about any point, which is on the body number `self` of the
+/// pair; the rest of its surface is the other's.
+MeasuresAndInertia of_ball(const quadric::BallPart& part, const Moments& moments, Vec3 centre, const Placed& other,
+                           int self, double rounding, Vec3 reference, const std::array<Vec3, 2>& positions) {
+  const Mat3& rotation = other.pose.rotation;
+  Measures q = by_formula();
+  q.facets_touched = part.faces;
+  q.volume = part.volume, q.area = part.area;
+  q.volume_error = part.error + rounding * part.area;
+  q.centroid = reference + (centre + rotation * (part.first / part.volume));
+  // The forces on the ball act towards its centre.
+  const Vec3 on_other = rotation * part.flat;
+  q.pulls = opposite_pulls(self == 0 ? -on_other : on_other, centre, positions);
+  return {std::move(q), rotation * moments.inertia_about_centroid() * transposed(rotation)};
+}
+
+/// What a ball about that point, in the polyhedron's own coordinates, shares with it in a shallow contact.
+std::optional<quadric::ShallowPart> shallow_part(const OwnPolyhedron& polyhedron, const Placed& other,
+                                                 const WideVector& centre, double radius) {
+  const auto plane = [&](int f) { return own_plane(other.shape, f); };
+  auto part = quadric::measure_shallow_ball(*polyhedron, plane, centre, radius);
+  if (part && !(part->volume > 0)) part.reset();
+  return part;
+}
+
+/// Where one plane at most reaches a ball, or cuts off anything, a cap has fewer terms.
+std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, const Placed& placed, const Placed& other,
+                                                      int self, double rounding, Vec3 reference,
                                                       const std::array<Vec3, 2>& positions) {
   const OwnPolyhedron polyhedron(other.shape);
   if ((*polyhedron).edges.empty()) return std::nullopt;
   const Vec3 centre = apply_transposed(other.pose.rotation, ball.centre - other.pose.translation);
   const auto reaches = [&](const Plane& plane) { return -signed_distance(plane, centre) < ball.radius + rounding; };
   if (std::ranges::count_if((*polyhedron).planes, reaches) < 2) return std::nullopt;
+  if (const auto part = shallow_part(polyhedron, other, seen_from(other, placed).centre, ball.radius))
+    return of_ball(*part, part->about_apex, ball.centre, other, self, 0, reference, positions);
   const auto part = quadric::measure_ball(*polyhedron, centre, ball.radius);
   if (!part || !(part->volume > 0)) return std::nullopt;
-  Measures q = by_formula();
-  q.facets_touched = part->faces;
-  q.volume = part->volume, q.area = part->area;
-  q.volume_error = part->error + rounding * part->area;
-  if (!std::isfinite(q.volume_error)) return std::nullopt;
-  const auto turned = [&](Vec3 v) { return other.pose.rotation * v; };
-  q.centroid = reference + (ball.centre + turned(part->first / part->volume));
-  // The forces on the ball act towards its centre.
-  const Vec3 on_other = turned(part->flat);
-  q.pulls = opposite_pulls(self == 0 ? -on_other : on_other, ball.centre, positions);
-  const Mat3 rotation = other.pose.rotation;
-  const Mat3 inertia = part->inertia_about_centroid();
-  return MeasuresAndInertia{std::move(q), rotation * inertia * transposed(rotation)};
+  auto found = of_ball(*part, *part, ball.centre, other, self, rounding, reference, positions);
+  if (!std::isfinite(found.measures.volume_error)) return std::nullopt;
+  return found;
+}
+
+/// The end of a capsule in a shallow contact, where it shares nothing else with a polyhedron.
+std::optional<MeasuresAndInertia> end_and_polyhedron(const Revolved& capsule, const Placed& placed, const Placed& other,
+                                                     int self, Vec3 reference, const std::array<Vec3, 2>& positions) {
+  const OwnPolyhedron polyhedron(other.shape);
+  if ((*polyhedron).edges.empty()) return std::nullopt;
+  const Vec3 centre = apply_transposed(other.pose.rotation, capsule.centre - other.pose.translation);
+  const Vec3 axis = apply_transposed(other.pose.rotation, capsule.axis);
+  // Of the ends, the one that is nearer, by its distance from the farthest plane.
+  double side = 0, nearest = capsule.radius;
+  for (const double each : {1.0, -1.0}) {
+    const Vec3 end = centre + each * capsule.half_length * axis;
+    double over = -kInfinity;
+    for (const Plane& plane : (*polyhedron).planes) over = std::max(over, signed_distance(plane, end));
+    if (over < nearest) nearest = over, side = each;
+  }
+  if (side == 0) return std::nullopt;
+  const WideSeen seen = seen_from(other, placed);
+  const WideVector end = seen.centre + side * capsule.half_length * seen.axis;
+  const auto part = shallow_part(polyhedron, other, end, capsule.radius);
+  if (!part) return std::nullopt;
+  // All of it is farther along the way to the apex than that, but for how well doubles know the apex.
+  constexpr double kApex = 1e-7;
+  const double distance = norm(part->apex), r = capsule.radius;
+  if (!(reach_of_cap(r, part->apex / -distance, -distance, -side * axis, kApex * r) < 0)) return std::nullopt;
+  return of_ball(*part, part->about_apex, capsule.centre + side * capsule.half_length * capsule.axis, other, self, 0,
+                 reference, positions);
 }
 
 /// From parts more remote than that, slices know second moments better.
@@ -574,7 +730,7 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
   const std::array<Vec3, 2> positions{a.position - reference, b.position - reference};
   if (smooth_a && smooth_b) {
     if (!smooth_a->round || !smooth_b->round) return std::nullopt;
-    return without_inertia(lens_of_ends(*smooth_a, *smooth_b, rounding, reference, positions));
+    return without_inertia(lens_of_ends(*smooth_a, a, *smooth_b, b, rounding, reference, positions));
   }
   const bool first = smooth_a || stretched(a.shape);
   if (!first && !smooth_b && !stretched(b.shape)) return std::nullopt;
@@ -585,15 +741,17 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
   std::optional<MeasuresAndInertia> several;
   const auto error = [](const Measures& m) { return m.volume_error / m.volume; };
   if (revolved_body && revolved_body->round && revolved_body->half_length == 0)
-    several = ball_and_polyhedron(*revolved_body, other, self, rounding, reference, positions);
-  else if (revolved_body)
+    several = ball_and_polyhedron(*revolved_body, body, other, self, rounding, reference, positions);
+  else if (revolved_body && revolved_body->round)
+    several = end_and_polyhedron(*revolved_body, body, other, self, reference, positions);
+  if (revolved_body && revolved_body->half_length > 0 && !several)
     several = long_body_and_polyhedron(*revolved_body, body, other, self, rounding, reference, positions);
   if (several && error(several->measures) <= kEnough) return several;
   std::vector<Plane> planes;
   append_planes(other.shape, planes);
   for (Plane& plane : planes) plane = other.pose * plane;
   if (!revolved_body) return without_inertia(cut_by_polytope(body, planes, self, rounding, reference, positions));
-  const auto cut = cut_by_polytope(*revolved_body, planes, self, rounding, reference, positions);
+  const auto cut = cut_by_polytope(*revolved_body, body, other, planes, self, rounding, reference, positions);
   if (several && !(cut && error(*cut) <= error(several->measures))) return several;
   return without_inertia(cut);
 }

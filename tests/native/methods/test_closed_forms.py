@@ -1,5 +1,10 @@
 """Where a formula gives the measures, they are right to rounding, whatever the tolerance."""
 
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -137,3 +142,106 @@ def test_ends_in_the_plane_of_a_face_are_counted_once(shape, sides):
         cut = sum(np.arccos(side) - side * np.sqrt(1 - side**2) for side in sides if side < 1)
         truth = (np.pi - 2 * cut) * r**2 * h
         assert abs(answer.volume - truth) <= answer.volume_error + 1e-13 * truth
+
+
+# Shallow contacts, where the terms of most formulas cancel. The truth is in sixty digits, by integrals over discs or
+# rectangles. Numbers are such that doubles hold them: halves, quarters, and rotations whose quaternions are short.
+
+DEPTHS = [10.0**-k for k in range(1, 11)]
+mp: Any = mpmath.mp
+
+
+def exactly(x: float) -> Any:
+    return mpmath.mpf(x)
+
+
+def cap(r: Any, h: Any) -> Any:
+    return mp.pi * h * h * (3 * r - h) / 3
+
+
+def lens(r: Any, s: Any, distance: Any) -> Any:
+    return mp.pi * (r + s - distance) ** 2 * (distance**2 + 2 * distance * (r + s) - 3 * (r - s) ** 2) / (12 * distance)
+
+
+def quadrant_of_disc(rho2: Any, p: Any, q: Any) -> Any:
+    """The area of x >= p >= 0, y >= q >= 0 within a disc about the origin."""
+    if p * p + q * q >= rho2:
+        return mpmath.mpf(0)
+    end = mp.sqrt(rho2 - q * q)
+    rise = (end * q - p * mp.sqrt(rho2 - p * p)) / 2
+    return rise + rho2 * (mp.asin(end / mp.sqrt(rho2)) - mp.asin(p / mp.sqrt(rho2))) / 2 - q * (end - p)
+
+
+def over_edge(r: Any, p: Any, q: Any, low: Any = None) -> Any:
+    """A ball whose centre is p and q away from two planes across each other, and `low` from a third, if any."""
+    high = mp.sqrt(r * r - p * p - q * q)
+    return mp.quad(lambda z: quadrant_of_disc(r * r - z * z, p, q), [-high if low is None else low, high])
+
+
+def tilted_solid(r: Any, h: Any, sine: Any, cosine: Any, depth: Any, flat: bool) -> Any:
+    """So much of a cylinder or a capsule is below a plane, its axis rising by `sine`, by slices along the axis."""
+    lowest = (r * cosine if flat else r) + h * sine - depth  # of the centre over the plane
+
+    def slice_at(x: Any) -> Any:
+        across2 = r * r if abs(x) <= h else r * r - (abs(x) - h) ** 2
+        rho, line = mp.sqrt(max(across2, mpmath.mpf(0))), (lowest + x * sine) / cosine
+        if line >= rho:
+            return mpmath.mpf(0)
+        return rho * rho * mp.acos(line / rho) - line * mp.sqrt(rho * rho - line * line)
+
+    if flat:
+        last = min(h, (r * cosine - lowest) / sine) if sine else h
+        return mp.quad(slice_at, [-h, last])
+    # Beyond an end, slices are met between where the plane passes the ball's section by the plane of the axis.
+    stops = {-h, h}
+    for end in (-h, h):
+        over = lowest + end * sine  # of the ball's centre
+        if over < r:
+            half = mp.sqrt(r * r - over * over)
+            stops |= {end + side * half * cosine - over * sine for side in (-1, 1)}
+    if sine and abs((r * cosine - lowest) / sine) < h:
+        stops.add((r * cosine - lowest) / sine)
+    return mp.quad(slice_at, [-h - r, *sorted(stops), h + r])
+
+
+def shallow_pairs(depth: float) -> Iterator[tuple[str, Placed, Placed, Callable[[], Any]]]:
+    box, half, ball = Placed(Box([1, 1, 1])), exactly(0.5), Sphere(0.5)
+    place = 1.5 - depth
+    deep = exactly(1.5) - exactly(place)
+    yield "ball on ground", Placed(ball, (4, 2, place - 1)), HalfSpace([0, 0, 1], 0), lambda: cap(half, deep)
+    yield "ball on face", Placed(ball, (0.25, place, 0.125)), box, lambda: cap(half, deep)
+    yield "two balls", Placed(ball, (place, 0, 0)), Placed(Sphere(1)), lambda: lens(half, exactly(1), exactly(place))
+    beside, edge, corner = 1 + depth / 4, 1 + (0.5 - depth) / 2**0.5, 1 + (0.5 - depth) / 3**0.5
+    for name, (x, y) in {"on": (edge, edge), "beside": (beside, place)}.items():
+        truth = partial(over_edge, half, exactly(x) - 1, exactly(y) - 1)
+        yield f"ball {name} edge", Placed(ball, (x, 0.0625, y)), box, truth
+    truth = partial(over_edge, half, *[exactly(corner) - 1] * 3)
+    yield "ball on corner", Placed(ball, (corner, corner, corner)), box, truth
+    for name, solid in {"capsule": Capsule(0.5, 2), "cylinder": Cylinder(0.5, 2)}.items():
+        for tilt in (0.0, 2.0**-40, 2.0**-20, 2.0**-10, 2.0**-4, 0.5):
+            yield f"{name} tilted by {tilt}", *tilted(solid, tilt, depth)
+
+
+def tilted(solid: Any, tilt: float, depth: float) -> tuple[Placed, HalfSpace, Callable[[], Any]]:
+    """On the ground, its axis along x but for a tilt: of a quarter turn, the tangent of its half is 1."""
+    half, t = exactly(0.5), exactly(tilt / 2)
+    sine, cosine = 2 * t / (1 + t * t), (1 - t * t) / (1 + t * t)
+    down = sine + (half * cosine if isinstance(solid, Cylinder) else half)
+    height = float(down - exactly(depth))
+    placed = Placed(solid, (0, 0, height), (0, 1 - tilt / 2, 0, 1 + tilt / 2))
+    truth = partial(tilted_solid, half, exactly(1), sine, cosine, down - exactly(height), isinstance(solid, Cylinder))
+    return placed, HalfSpace([0, 0, 1], 0), truth
+
+
+@pytest.mark.parametrize("depth", DEPTHS)
+def test_shallow_contacts_keep_every_digit_of_a_closed_form(depth):
+    wrong = []
+    with mpmath.workdps(60):
+        for name, a, b, truth_of in shallow_pairs(depth):
+            answer, truth = overlap(a, b), truth_of()
+            off = abs(exactly(answer.volume) - truth)
+            if not (answer.way == "closed form" and off <= min(answer.volume_error, 1e-13 * truth)):
+                wrong.append(f"{name}: {answer.way}, off by {float(off / truth):.1e}")
+            if not answer.volume_error <= 1e-12 * truth:
+                wrong.append(f"{name}: said {float(answer.volume_error / truth):.1e}")
+    assert not wrong, wrong
