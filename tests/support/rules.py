@@ -11,8 +11,8 @@ from math import isqrt
 import exact
 import exact_distance
 import numpy as np
-from families import CORNERS, Below, Case, mapped, points_of, solid
-from strategies import quaternion, rotation
+from families import CORNERS, Below, Case, coarse, mapped, points_of, solid
+from strategies import product, quaternion, rotation
 
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Overlap, Placed, RoundedHull, Sphere, overlap
 from overlapper.proof.certificate import certificate
@@ -405,6 +405,75 @@ def the_volume_moves_no_faster_than_the_bodies(case: Case, found: Overlap) -> st
     )
 
 
+def a_turn_keeps_the_measures_of_round_bodies(case: Case, found: Overlap) -> str:
+    """Within the sum of both errors. Bodies are moved a little first, so that they can be turned to the last bit, and
+    are given in the other order; slices then lie across other axes, and what they miss is elsewhere."""
+    if not case.round or len(case.bodies) != 2:
+        return ""
+    (one, other), (one_again, other_again), turn = turned_pairs(found.shapes, TURNS[case.seed % len(TURNS)])
+    before, after = answer([one, other]), answer([other_again, one_again])
+    if not before or not after:
+        return ""  # the least that is moved may part them
+    inertia = turn.T @ after.inertia @ turn
+    centroid = after.centroid @ turn
+    size = float(np.linalg.norm(np.ptp(before.bounds, axis=0)))
+    last_bits = 16 * HALF_ULP * (size + float(np.linalg.norm(other.position)))
+    share = last_bits / size
+    errors, again = before.errors, after.errors
+    off = {
+        "volume": (abs(before.volume - after.volume), errors.volume + again.volume + share * before.volume),
+        "area": (abs(before.area - after.area), errors.area + again.area + share * before.area),
+        "centroid": (np.linalg.norm(before.centroid - centroid), errors.centroid + again.centroid + last_bits),
+        "inertia": (
+            np.linalg.norm(before.inertia - inertia, 2),
+            3 * (errors.inertia + again.inertia) + share * np.trace(before.inertia),
+        ),
+    }
+    for body in (0, 1):
+        for name, at in (("force", slice(0, 3)), ("moment", slice(3, 6))):
+            apart = before.gradient[body, at] - after.gradient[1 - body, at] @ turn
+            allowed = errors.gradient[body, at.start] + again.gradient[1 - body, at.start]
+            lever = 1.0 if name == "force" else size + float(np.linalg.norm(other.position))
+            off[f"{name} on body {body}"] = np.linalg.norm(apart), allowed + share * before.area * lever
+    beyond = (f"{name} is off by {by:.3g}, not {most:.3g}" for name, (by, most) in off.items() if not by <= most)
+    return "; ".join(beyond)
+
+
+def turned_pairs(shapes: tuple[Placed, ...], turn: tuple[int, ...]) -> tuple[list[Placed], list[Placed], np.ndarray]:
+    """A pair about the first body's position, the same turned by a quaternion of whole numbers, and the rotation. So
+    that no number is rounded, orientations are to 46 bits, and the second position is a multiple of the square of the
+    quaternion's length by which the matrix of the rotation is divided."""
+    square = sum(x * x for x in turn)
+    matrix = np.rint(square * rotation(turn))
+    at = np.subtract(shapes[1].position, shapes[0].position)
+    step = to_46_bits(at / square)
+    orientations = [to_46_bits(shape.given_orientation) for shape in shapes]
+    places = [np.zeros(3), step * square], [np.zeros(3), matrix @ step]
+    turns = orientations, [product(turn, q) for q in orientations]
+    one, other = (
+        [Placed(shape.shape, *pose) for shape, *pose in zip(shapes, where, how, strict=True)]
+        for where, how in zip(places, turns, strict=True)
+    )
+    return one, other, matrix / square
+
+
+def to_46_bits(values: np.ndarray) -> np.ndarray:
+    """Of the largest."""
+    return coarse(values, 46 - int(np.frexp(np.abs(values).max())[1]))
+
+
+TURNS = (
+    (1, 2, 2, 0),
+    (2, -1, 0, 2),
+    (0, 1, 2, -2),
+    (2, 1, -1, 1),
+    (1, -2, 1, 1),
+    (3, 1, 1, 0),
+    (1, 1, 0, -3),
+    (-1, 3, 2, 1),
+)
+
+
 def same_status(one: Overlap, other: Overlap) -> str:
     return "" if one.status == other.status else f"{one.status} becomes {other.status}"
 
@@ -445,6 +514,7 @@ UNPROVED: tuple[Rule, ...] = (
     a_power_of_two_scales_every_bit,
     mirror_image_and_turns_of_the_axes_keep_the_status,
     rigid_motion_keeps_the_status,
+    a_turn_keeps_the_measures_of_round_bodies,
     the_volume_moves_no_faster_than_the_bodies,
 )
 RULES: tuple[Rule, ...] = (*UNPROVED, the_certificate_is_proved)

@@ -77,6 +77,7 @@ struct Measures {
   double volume = 0, area = 0;  ///< m³, m²
   double volume_error = 0;      ///< m³: the true volume is within volume ± volume_error
   double area_error = 0;        ///< m²: where it is more than what the error of the volume makes of the area
+  double rounding = 0;          ///< m: of slices, how far it may have moved surfaces
   Vec3 centroid;
   std::array<Pull, 2> pulls{};       ///< on the bodies of a pair, each about its body's position
   std::vector<Pull> pulls_of_group;  ///< likewise, on more than two

@@ -332,7 +332,7 @@ std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping) {
   m.way = Way::kSlicing;
   m.facets_touched = round->facets_touched;
   m.volume = round->volume, m.volume_error = round->volume_error, m.area = round->area;
-  m.area_error = round->area_error;
+  m.area_error = round->area_error, m.rounding = round->rounding;
   m.centroid = at.reference + round->centroid;
   for (int i = 0; i < 2; ++i) {
     const double side = i == 0 ? 1 : -1;
@@ -342,6 +342,22 @@ std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping) {
   }
   answer.inertia = round->inertia;
   return answer;
+}
+
+std::optional<Spread> spread(const OverlappingBodies& overlapping, const Measures& sliced, const Measures& stated) {
+  const Arrangement& at = overlapping.at;
+  const WideVector inside = point_inside(overlapping);
+  const auto with_moved = [&](double outwards) {
+    return measure_round(at.relative[0], at.relative[1], at.reference, inside, outwards);
+  };
+  const double moved = sliced.rounding + std::max(sliced.volume_error, stated.volume_error) / sliced.area;
+  const auto large = with_moved(moved), small = with_moved(-moved);
+  if (!large || !small) return std::nullopt;
+  const double of_rules = large->area_error + sliced.area_error + small->area_error;
+  const double first = std::abs(large->first_area - small->first_area);
+  const double second = std::abs((large->area - large->first_area) - (small->area - small->first_area));
+  return Spread{std::max(0.0, large->volume - small->volume), std::max(0.0, large->area - small->area) + of_rules,
+                std::max(first, second) + of_rules};
 }
 
 std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, const Measures& measures) {

@@ -138,6 +138,19 @@ Region finest_region(const OverlappingBodies& overlapping);
 /// slicing gives up.
 std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping);
 
+/// How much the measures of slices change while the surface of one body moves from as far in as surfaces may have been
+/// moved to as far out: by rounding, and by what changes the volume by its error if it moves all of them. The common
+/// set grows with it, and of convex sets so do volume and area; and that body lays bare more and more of the other
+/// one's surface, and covers more of its own. The truth, and what is stated, lie between. Where surfaces are tangent
+/// but for that, the strip that changes hands is as wide as the root of how far they move, and where they coincide it
+/// is all of a facet: no slope tells that.
+struct Spread {
+  double volume, area;  ///< m³, m²
+  double owned;         ///< m²: what changes hands
+};
+/// Nothing where slicing gives up.
+std::optional<Spread> spread(const OverlappingBodies& overlapping, const Measures& sliced, const Measures& stated);
+
 /// The patch of a pair with such measures, by slices. Nothing where sliced() has nothing.
 std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, const Measures& measures);
 

@@ -111,7 +111,8 @@ Part half_ball_below(double r, double sine, double cosine, double t, double heig
   const double rho = std::sqrt((r - t) * height);
   if (edge <= 0 || t >= r * cosine) {
     // The circle of the cut lies on one side of x = 0.
-    if (t * sine < 0 || (t == 0 && sine < 0)) return t >= 0 ? half_ball(r) : Part{};
+    if (t == 0 && sine < 0) return cap(r, r, direction);
+    if (t * sine < 0) return t >= 0 ? half_ball(r) : Part{};
     if (t < 0) return cap(r, height, direction);
     Part rest = half_ball(r);
     const Part removed = cap(r, r - t, -direction);

@@ -118,9 +118,6 @@ class OthersNear {
   double most_moved_ = 0, largest_ = 0;
 };
 
-/// Relative to their distance from within, surfaces nearer to each other than that are taken for one.
-constexpr double kShared = 1e-10;
-
 /// How far the surface of a polytope may be from that between its planes, as a fraction of the way from the origin.
 ///
 /// Corners lie on their planes, and inside the planes next to those, but for so much; then the closed surface that they
@@ -181,22 +178,6 @@ class Sandwich {
     return sum;
   }
 
-  /// m²: how much of the surface two bodies share: there, rays from the origin leave both at once.
-  double shared_area() const {
-    double sum = 0;
-    for (size_t f = 0; f < facets_.size(); ++f) {
-      cancellation_point();
-      const Vec3 direction = region_.frame.axes * middle(polygon(f));
-      const double own = way_out(facets_[f].owner, direction);
-      for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
-        if (i == facets_[f].owner || std::abs(way_out(i, direction) - own) > kShared * own) continue;
-        sum += area(f);
-        break;
-      }
-    }
-    return sum;
-  }
-
  private:
   std::vector<Vec3> polygon(size_t facet) const {
     std::vector<Vec3> corners;
@@ -217,12 +198,6 @@ class Sandwich {
     for (size_t i = 1; i + 1 < ring.size(); ++i)
       sum += norm(cross(corners_[ring[i]] - from, corners_[ring[i + 1]] - from)) / 2;
     return sum;
-  }
-
-  /// How many times `direction` the way from the origin out of a body is.
-  double way_out(int body, Vec3 direction) const {
-    const Plane plane = relative_[body].ray_exit(region_.frame.origin, direction);
-    return -signed_distance(plane, region_.frame.origin) / dot(plane.normal, direction);
   }
 
   /// m², per facet: where a plane of another body, in the surface or just behind it, may be the outer one. No more is
@@ -445,23 +420,34 @@ Errors errors_beside(const StatedWithErrors& other, const Stated& stated) {
   return errors;
 }
 
-Errors errors_of_formula(const Measures& stated, const Region& drawn, std::span<const Placed> bodies) {
-  const double relative = 4 * stated.volume_error / stated.volume;
-  const double diameter = room(bodies).diameter;
+Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, const Stated& stated,
+                        const Region& drawn, std::span<const Placed> bodies) {
+  const Measures& m = sliced.measures;
+  const double relative = 4 * m.volume_error / m.volume;
+  const double radius = Sandwich(drawn, bodies).radius(m.centroid - drawn.reference - drawn.frame.origin);
+  const Stated of_slices = stated_of(sliced, bodies.size());
   Errors errors;
-  errors.volume = stated.volume_error;
-  errors.area = relative * stated.area;
-  errors.centroid = relative * diameter + 4 * DBL_EPSILON * norm(stated.centroid);
-  const double force = errors.area + Sandwich(drawn, bodies).shared_area();
-  for (const Placed& body : bodies)
-    errors.gradient.push_back({force, force * (norm(stated.centroid - body.position) + diameter)});
+  errors.area = relative * m.area + spread.area + std::abs(stated.area - of_slices.area);
+  errors.centroid = (relative + spread.volume / m.volume) * 2 * radius + 4 * DBL_EPSILON * norm(m.centroid) +
+                    norm(stated.centroid - of_slices.centroid);
+  errors.inertia = error_of_integrated_inertia(sliced, spread) + apart(stated.inertia, of_slices.inertia);
+  const double owned = relative * m.area + spread.owned;
+  // Moments are found about the position of one of the bodies.
+  double farthest = 0;
+  for (const Placed& body : bodies) farthest = std::max(farthest, norm(m.centroid - body.position));
+  const double last_bits = 8 * DBL_EPSILON * m.area * (farthest + radius);
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    const auto [force, moment] = apart(stated.gradient[i], of_slices.gradient[i]);
+    const double lever = norm(m.centroid - bodies[i].position) + radius;
+    errors.gradient.push_back({std::max(owned, force), std::max(owned * lever + last_bits, moment)});
+  }
   return errors;
 }
 
-double error_of_integrated_inertia(const MeasuresAndInertia& values) {
+double error_of_integrated_inertia(const MeasuresAndInertia& values, const Spread& spread) {
   const Mat3& i = *values.inertia;
   const double trace = i.row0.x + i.row1.y + i.row2.z;
-  return 4 * values.measures.volume_error / values.measures.volume * 45 / 4 * trace;
+  return (4 * values.measures.volume_error + spread.volume) / values.measures.volume * 45 / 4 * trace;
 }
 
 double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b) {

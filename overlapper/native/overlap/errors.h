@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "methods/choose.h"
 #include "methods/dual/region.h"
 #include "overlap/boundary.h"
 #include "shapes/shape.h"
@@ -53,10 +54,13 @@ double error_of_vertices(const Region& region, const Boundary& boundary, std::sp
 /// Those of the volume and of the vertices stay.
 Errors errors_beside(const StatedWithErrors& other, const Stated& stated);
 
-/// The errors of measures by a formula: its arguments, off by rounding, are what its volume is off by, and no measure
-/// is of a higher degree in them than four more. Of the gradient, as much more as the bodies' surfaces have in common,
-/// which the facets of the region tell. That of the inertia stays zero.
-Errors errors_of_formula(const Measures& stated, const Region& drawn, std::span<const Placed> bodies);
+/// The errors of measures by slices, or by a formula, from those of slices. Arguments that are off by rounding are what
+/// the volume is off by, and no measure is of a higher degree in them than four more. Areas, and who owns them, change
+/// with where surfaces are as `spread` tells: where these are tangent, or nearly, by far more than they are moved. What
+/// is owned according to slices and to a formula lies between the same bounds; all else is off by as much more as the
+/// two are apart. Beyond the region, nothing is common.
+Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, const Stated& stated,
+                        const Region& drawn, std::span<const Placed> bodies);
 
 /// m⁵, of each entry.
 ///
@@ -66,7 +70,7 @@ Errors errors_of_formula(const Measures& stated, const Region& drawn, std::span<
 /// 4 R / 3 wide along the line there, as the centroid of a solid is at least a quarter of the width from either side;
 /// and ∫ x² dV along a line is least, for a width w, of a double cone: w² / 40 of the volume. So V R² is no more than
 /// 45 / 2 of ∫ |x|² dV, which is half of the trace.
-double error_of_integrated_inertia(const MeasuresAndInertia& values);
+double error_of_integrated_inertia(const MeasuresAndInertia& values, const Spread& spread);
 
 /// m: how far any of the points of one cloud is from the nearest of the other; infinite where they are too many to be
 /// compared, each with each.

@@ -199,20 +199,10 @@ Stated Overlap::stated() const {
 Errors Overlap::errors_of_measures() const {
   if (!(volume_error() < volume())) return errors_of_anything(volume_error(), bodies());
   const bool integrated = way() == Way::kClosedForm || way() == Way::kSlicing;
-  Errors errors;
-  if (integrated) {
-    errors = errors_of_formula(measures(), drawn(), bodies());
-    errors.area = std::max(errors.area, measures().area_error);
-  }
-  const MeasuresAndInertia* with_inertia = nullptr;
-  if (integrated && in_full().inertia) with_inertia = &in_full();
-  else if (integrated && sliced()) with_inertia = &*sliced();
-  if (with_inertia) errors.inertia = error_of_integrated_inertia(*with_inertia);
-  else {
-    const Errors of_polytope = errors_beside(measured_with_errors(finest_region(), bodies()), stated());
-    if (integrated) errors.inertia = of_polytope.inertia;
-    else errors = of_polytope;
-  }
+  const auto spread =
+      integrated && sliced() ? overlapper::spread(overlapping_bodies(), sliced()->measures, measures()) : std::nullopt;
+  Errors errors = spread ? errors_of_slices(*sliced(), *spread, stated(), drawn(), bodies())
+                         : errors_beside(measured_with_errors(finest_region(), bodies()), stated());
   errors.volume = volume_error();
   errors.vertices = error_of_vertices(drawn(), boundary(), bodies());
   return no_more_than_all(std::move(errors), bodies());

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from families import make
+from families import CORNERS, make
 from numpy.testing import assert_allclose
 from rules import the_errors_hold_the_measures
 from strategies import quaternion
 
-from overlapper import Box, Capsule, Cylinder, Ellipsoid, Hull, Placed, RoundedHull, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
 CUBE = Box([1, 1, 1])
 
@@ -80,6 +80,34 @@ def test_who_owns_a_facet_that_two_bodies_share_is_in_the_error_of_the_gradient(
     assert_allclose(twins.errors.gradient[:, 0], 4 * np.pi, rtol=1e-2)
     beyond = overlap(CUBE, Placed(Box([2, 2, 2]), (2, 0, 0)))
     assert (beyond.errors.gradient < 1e-10).all()
+
+
+def test_the_strip_in_which_surfaces_are_tangent_but_for_rounding_is_in_the_error_of_the_gradient():
+    lying = overlap(Capsule(0.5, 2), Box([0.5, 1, 2]))
+    slopes = lying.errors.gradient[:, 0]
+    assert (slopes > 1e-8).all() and (slopes < 1e-5).all()  # as wide as the root of 1e-16, on either side
+    assert lying.errors.area < 1e-8
+    rounded = overlap(RoundedHull(CORNERS, 0.3), Box([1.3, 2, 2]))
+    assert_allclose(rounded.errors.gradient[:, 0], 8, rtol=1e-6)  # two facets
+
+
+def test_errors_are_small_where_surfaces_meet_at_an_angle():
+    for seed in range(0, 60, 2):
+        found = overlap(*overlapping_bodies(seed))
+        if found.way not in ("slicing", "closed form"):
+            continue
+        size = float(np.linalg.norm(np.ptp(found.bounds, axis=0)))
+        errors = found.errors
+        assert errors.area <= 1e-10 * found.area
+        assert errors.centroid <= 1e-10 * size
+        assert errors.inertia <= 1e-10 * found.volume * size**2
+        assert (errors.gradient[:, 0] <= 1e-10 * found.area).all()
+
+
+def test_half_of_a_ball_at_the_end_of_a_capsule_has_a_face():
+    half = overlap(Capsule(1, 2), Placed(HalfSpace([0, 0, 1], -1)))
+    assert_allclose(half.area, 3 * np.pi, rtol=1e-14)
+    assert_allclose(half.gradient[:, :3], [[0, 0, -np.pi], [0, 0, np.pi]], rtol=1e-14, atol=1e-14)
 
 
 def test_errors_are_finite_at_any_size():

@@ -15,14 +15,18 @@ from overlapper import Hull
 SEED = 2026
 AFFORDABLE = {  # seeds whose exact truth takes less than half a second, and such as were hard
     "combined": (*range(SEED, SEED + 5), 300168, 400034),  # witnesses of needles, and needles that touch
-    "flush_round": (*range(SEED, SEED + 5), 500354),  # a cylinder in a box that it fills
+    "flush_round": (*range(SEED, SEED + 5), 41, 44, 500354),  # a half ball, lids, a cylinder in a box that it fills
     "round_contacts": (*range(SEED, SEED + 5), 300076, 400019, 500146),  # over the diagonal that is no edge
     "fine_round_hulls": (2026, 2027),
     "finest_round_hulls": (2027,),
     "prisms": (2026, 2029, 2031, 2033, 2034, 2036, 2037),
     "lenses": range(SEED, SEED + 40),
     "slender_groups": (*range(SEED, SEED + 5), 400091),  # whose drawing is rough
-    "special_poses": (*range(SEED, SEED + 5), 700001, 700003),  # a hull apart from a round body, and within one
+    "special_poses": (
+        *range(SEED, SEED + 5),
+        *(56, 100, 794, 1098, 1305),  # tangent cylinders and planes
+        *(700001, 700003),  # a hull apart from a round body, and within one
+    ),
     "rounded_hulls": (*range(SEED, SEED + 5), 710251, 710528),  # slabs thinner than a closed form in doubles tells
     "dual_pairs": (*range(SEED, SEED + 5), 300221),  # among its planes the simplex method goes round in circles
 }
@@ -92,6 +96,21 @@ def test_an_answer_with_a_fault_breaks_the_rule_about_it():
         true = rules.answer(case.placed)
         assert rule not in dict(rules.complaints(case, true))
         assert rule in dict(rules.complaints(case, Planted(true, **fault))), rule
+
+
+@pytest.mark.parametrize("figure", ["volume", "area", "centroid", "inertia", "gradient"])
+def test_a_measure_that_a_turn_changes_breaks_the_rule_about_it(figure, monkeypatch):
+    case = make("special_poses", SEED)
+    true, answer = rules.answer(case.placed), rules.answer
+    assert true and not rules.a_turn_keeps_the_measures_of_round_bodies(case, true)
+    off = iter([0, 1e-8])
+
+    def planted(bodies):
+        found = answer(bodies)
+        return Planted(found, **{figure: getattr(found, figure) + next(off)})
+
+    monkeypatch.setattr(rules, "answer", planted)
+    assert " is off by " in rules.a_turn_keeps_the_measures_of_round_bodies(case, true)
 
 
 # The generator

@@ -437,7 +437,8 @@ class Errors:
         (m, 6) m² and m³: of the length of the three numbers that they stand for, and so of each.
 
         Where facets of two bodies lie in one plane the volume has a slope to one side and another to the other, and what is
-        stated may be either: the error is then as large as the facet.
+        stated may be either: the error is then as large as the facet. Where surfaces are tangent, or nearly, rounding moves the
+        border between them by far more than itself.
         """
 
     @property

@@ -118,6 +118,11 @@ class Bundle {
     }
   }
 
+  void add_area(int owner, double area) {
+    sum_.area += area;
+    if (owner == 0) sum_.first_area += area;
+  }
+
   /// What planes have of the slices' borders.
   void add_edge(const Line& line, const Points& from, const Points& to) {
     const Point d = (1 / line.length) * Point{-line.normal.y, line.normal.x};
@@ -147,7 +152,7 @@ class Bundle {
     sum_.across += mt * normal.z;
     sum_.terms += sum(size) * (rate + std::abs(s.x) * nx + std::abs(s.y) * ny);
     sum_.border += all * std::sqrt(norm2(normal));
-    sum_.area += owned * all;
+    add_area(line.owner, owned * all);
     if (stack_.view && stack_.view->sees(line.owner)) {
       const double facing = dot(normal, stack_.view->normal);
       for (int k = 0; k < kRow; ++k) weight[k] *= facing;
@@ -188,7 +193,7 @@ class Bundle {
     sum_.terms += sum(size);
     // A cylinder's normal has length radius / half chord, as its area has.
     sum_.border += of_side;
-    sum_.area += of_side;
+    add_area(line.owner, of_side);
     if (stack_.view && stack_.view->sees(line.owner)) {
       const Vec3 facing = stack_.view->normal;
       for (int k = 0; k < kRow; ++k) weight[k] = weight[k] * (n.x * facing.x + n.y * facing.y) + up[k] * facing.z;
@@ -346,7 +351,7 @@ class Bundle {
 
   /// What the ball has of the surface. Its forces act along lines through its centre.
   void add_zone(const Quadric& ball, Vec3 pull, double turned, double t_up, double size, double surface) {
-    sum_.area += surface;
+    add_area(ball.owner, surface);
     sum_.border += turned * ball.radius;
     sum_.pull[ball.owner] += pull;
     sum_.moment[ball.owner] += cross(Vec3{ball.centre.x, ball.centre.y, ball.level}, pull);
@@ -453,7 +458,9 @@ void add_face(const Line& plane, const Stack& stack, const Outline& outline, dou
       (plane.offset_tail * area - plane.rate_tail * t * area - tilt.x * face.first.x - tilt.y * face.first.y) /
       std::abs(plane.rate);
   sum.blur += area * (std::abs(plane.offset) + std::abs(plane.rate * t)) / std::abs(plane.rate);
-  if (plane.owner != kCut) sum.area += stack.stretch ? stack.area({0, 0, area}) : area;
+  const double owned = plane.owner == kCut ? 0 : stack.stretch ? stack.area({0, 0, area}) : area;
+  sum.area += owned;
+  if (plane.owner == 0) sum.first_area += owned;
   const double side = plane.rate > 0 ? 1 : -1;
   if (stack.view && stack.view->sees(plane.owner)) {
     const View& view = *stack.view;

@@ -192,7 +192,8 @@ class Integrating {
     sum_.samples.insert(sum_.samples.end(), part.samples.begin(), part.samples.begin() + 2 * part.rule.size());
     // Terms of a stretched area may go on more slowly than they have begun.
     const bool ended = stack_.stretch && sum_.rules > kMostRulesForStretch;
-    sum_.area_error += 10 * (ended ? 30 * part.area.tail() : part.area.error());
+    const double area_error = ended ? 30 * part.area.tail() : part.area.error();
+    sum_.area_error += stack_.stretch ? 10 * area_error : area_error;
     const double ratio = volume_ > 0 ? part.volume.tail() / volume_ : 0;
     sum_.error += strictness_ > 0 ? volume_ * std::min(ratio, 30 * ratio * std::sqrt(ratio)) : part.volume.error();
     return true;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cfloat>
+#include <cstdio>
+#include <cstdlib>
 #include <limits>
 #include <numbers>
 #include <vector>
@@ -43,14 +45,16 @@ bool sliceable(size_t walls) { return walls <= static_cast<size_t>(slicing::kMos
 /// Integrals in the axes of the world, about the point inside.
 struct Totals : Moments {
   double error = 0, area = 0, area_error = 0;
-  double border = 0;  ///< m²: the area of all that area vectors are the sums of
-  double open = 0;    ///< m³: what may be missing of pieces whose area vectors do not sum to zero
+  double first_area = 0;  ///< m²: of the first body's surface
+  double border = 0;      ///< m²: the area of all that area vectors are the sums of
+  double open = 0;        ///< m³: what may be missing of pieces whose area vectors do not sum to zero
   Vec3 pull, moment;
   Vec3 unbalanced;  ///< the sum of both bodies' area vectors: zero if no piece is missing
 
   void add(const Totals& piece) {
     Moments::operator+=(piece);
     error += piece.error, area += piece.area, border += piece.border, open += piece.open;
+    first_area += piece.first_area;
     pull += piece.pull, moment += piece.moment, unbalanced += piece.unbalanced;
   }
 };
@@ -252,12 +256,17 @@ class Measuring {
     const double disc = wall ? pi * height * (2 * r - height) : 0;
     totals.volume += volume;
     totals.error += 32 * DBL_EPSILON * volume;
+    const auto own = [&](int body, double area) {
+      if (body != slicing::kCut) totals.area += area;
+      if (body == 0) totals.first_area += area;
+    };
     if (stretch) {
       const slicing::Stretch::Cap cap = stretch->cap(n, height);
-      totals.area += cap.area + (wall ? stretch->area(disc * n) : 0), totals.area_error += cap.error;
+      own(ball.owner, cap.area), totals.area_error += cap.error;
     } else {
-      totals.area += 2 * pi * r * height + (wall && wall->owner != slicing::kCut ? disc : 0);
+      own(ball.owner, 2 * pi * r * height);
     }
+    if (wall) own(wall->owner, stretch ? stretch->area(disc * n) : disc);
     totals.border += 2 * pi * r * height + disc;
     totals.first += volume * tip + first * n;
     const auto second = [&](double p, double q, double u, double v) {
@@ -336,7 +345,7 @@ class Measuring {
       const double area = std::sqrt(norm2(force));
       piece.border += area;
       if (of_wall != slicing::kCut) piece.area += area, piece.unbalanced += force;
-      if (of_wall == 0) piece.pull += force, piece.moment += moment;
+      if (of_wall == 0) piece.pull += force, piece.moment += moment, piece.first_area += area;
     });
     piece.error = rounding_of(polytope, piece.border);
     if (!closed || !sure(piece, polytope.faces.size())) return false;
@@ -430,13 +439,17 @@ class Measuring {
     const bool nothing = std::ranges::none_of(sections, [](const quadric::Section& s) { return s.area != 0; });
     if (!(piece.volume > 0)) return piece.volume == 0 && nothing;
     act(round_owner, curved);
+    double of_planes = 0, of_first = 0;
     for (size_t f = 0; f < owners_.size(); ++f) {
       const quadric::Section& section = sections[f];
       if (section.area == 0) continue;
       if (owners_[f] == kNobody) return false;
       act(owners_[f], {section.area * planes[f].normal, cross(section.first, planes[f].normal)});
       if (owners_[f] == slicing::kCut) piece.area -= section.area;
+      if (owners_[f] == 0) of_first += section.area;
+      of_planes += section.area;
     }
+    piece.first_area = of_first + (round_owner == 0 ? whole_area - of_planes : 0);
     piece.error += rounding_of(polytope, piece.border);
     const Moments about_centre = piece.along({turn.row0, turn.row1, turn.row2});
     const Vec3 mean = piece.first / piece.volume;
@@ -663,7 +676,7 @@ class Measuring {
     totals += s.along({stack.l, stack.m, stack.t}).seen_from(offset_);
     totals.volume += s.correction;
     totals.error += sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
-    totals.area += s.area, totals.area_error += sum.area_error;
+    totals.area += s.area, totals.first_area += s.first_area, totals.area_error += sum.area_error;
     totals.border += s.border;
     const Vec3 pull = turned(s.pull[0]);
     totals.pull += pull;
@@ -794,6 +807,27 @@ void into_ball(const Placed& body, slicing::Pieces& pieces) {
   }
 }
 
+/// Moves the surface of a body out, but not the cuts through it; false if that leaves nothing of something round.
+bool grow(slicing::Pieces& pieces, double outwards) {
+  for (Wall& wall : pieces.walls)
+    if (wall.owner != slicing::kCut) wall.slack = wall.slack + DoubleDouble{outwards};
+  for (Round& r : pieces.rounds) r.radius += outwards;
+  return std::ranges::all_of(pieces.rounds, [](const Round& r) { return r.radius > 0; });
+}
+
+double least_radius(const slicing::Pieces& pieces) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Round& r : pieces.rounds) least = std::min(least, r.radius);
+  return least;
+}
+
+/// How far rounding may move surfaces whose coordinates, about the point inside, reach as far as the common set. Of a
+/// convex set of which that is the mean square of the distance from the point, no point is farther than five times its
+/// root: of ∫ |x|² dV about the centroid, V R² is no more than 45 / 2.
+double rounding_of_surfaces(double mean_square) { return 8 * DBL_EPSILON * 5 * std::sqrt(mean_square); }
+
+double sum(Vec3 v) { return v.x + v.y + v.z; }
+
 /// The same in a ball that is turned and stretched to the ellipsoid, and whose coordinates count from `origin` there.
 Seen stretched(const Seen& seen, const Mat3& turn, const slicing::Stretch& stretch, Vec3 origin) {
   Seen result;
@@ -812,7 +846,7 @@ struct StretchedWorkspace {
 /// Of an ellipsoid and a body that planes bound: the ball that into_ball() makes is measured, and what is found is
 /// stretched. Volumes grow by the determinant, area vectors are images by the matrix of cofactors.
 std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b, Vec3 reference,
-                                               const WideVector& inside, int owner, PatchSums* patch) {
+                                               const WideVector& inside, double outwards, int owner, PatchSums* patch) {
   const bool swapped = stretched(b.shape) == nullptr;
   const Placed &flat = swapped ? b : a, &ellipsoid = swapped ? a : b;
   if (smooth(flat.shape)) return std::nullopt;
@@ -821,6 +855,7 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
   of_flat.clear(), of_ellipsoid.clear();
   slicing::cut(flat, ellipsoid, nullptr, 0, reference, inside, of_flat);
   slicing::cut(ellipsoid, flat, nullptr, 1, reference, inside, of_ellipsoid);
+  if (outwards != 0) grow(of_flat, outwards);
   into_ball(ellipsoid, of_flat);
   into_ball(ellipsoid, of_ellipsoid);
   const Vec3 h = stretched(ellipsoid.shape)->half_axes;
@@ -859,6 +894,7 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
   RoundMeasures result;
   result.volume = stretch.volume * volume;
   result.area = totals.area;
+  result.first_area = swapped ? totals.area - totals.first_area : totals.first_area;
   result.area_error = totals.area_error + stretch.open() * totals.area;
   result.volume_error = stretch.volume * (error + 4 * DBL_EPSILON * volume) + of_flat.flatness * totals.area;
   const Vec3 about_which = rounded(inside) + turn * scaled(h, moved);
@@ -867,6 +903,7 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
                       stretch.volume * scaled(scaled(h, h), totals.squares),
                       stretch.volume * scaled(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, totals.products)};
   result.inertia = turn * whole.inertia_about_centroid() * transposed(turn);
+  result.rounding = rounding_of_surfaces(sum(whole.squares) / result.volume + norm2(scaled(h, moved)));
   const double side = swapped ? -1 : 1;
   const Pull pull{side * (turn * stretch.normal(totals.pull)), side * (turn * totals.moment)};
   result.pull = about(pull, about_which, {});
@@ -875,7 +912,7 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
 }
 
 std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside,
-                                      int owner, PatchSums* patch) {
+                                      double outwards, int owner, PatchSums* patch) {
   const Scratch<Workspace> scratch;
   slicing::Pieces &of_a = scratch->of_a, &of_b = scratch->of_b;
   Measuring& measuring = scratch->measuring;
@@ -895,6 +932,7 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   measuring.around = many ? &scratch->polytope : nullptr;
   slicing::cut(a, b, measuring.common, 0, reference, inside, of_a);
   slicing::cut(b, a, measuring.common, 1, reference, inside, of_b);
+  if (outwards != 0 && !grow(least_radius(of_a) > least_radius(of_b) ? of_a : of_b, outwards)) return std::nullopt;
   if (many) culling.look_at(of_a, of_b, around);
   // Fills in what pieces i of a and j of b may share; false if that is nothing.
   const auto meet = [&](int i, int j) {
@@ -984,7 +1022,9 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   result.volume_error = totals.error + open();
   if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
   result.volume_error += (of_a.flatness + of_b.flatness) * totals.area;
-  result.area = totals.area;
+  result.area = totals.area, result.first_area = totals.first_area;
+  result.area_error = totals.area_error;
+  result.rounding = rounding_of_surfaces(sum(totals.squares) / totals.volume);
   result.centroid = rounded(inside) + totals.first / totals.volume;
   result.inertia = totals.inertia_about_centroid();
   // Of a body inside the other, nothing but rounding is left of what sums to zero.
@@ -998,16 +1038,17 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
 
 }  // namespace
 
-std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside) {
-  if (stretched(a.shape) || stretched(b.shape)) return measure_stretched(a, b, reference, inside, 0, nullptr);
-  return measured(a, b, reference, inside, 0, nullptr);
+std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside,
+                                           double outwards) {
+  if (stretched(a.shape) || stretched(b.shape)) return measure_stretched(a, b, reference, inside, outwards, 0, nullptr);
+  return measured(a, b, reference, inside, outwards, 0, nullptr);
 }
 
 bool measure_round_patch(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside, int owner,
                          PatchSums& patch) {
   if (stretched(a.shape) || stretched(b.shape))
-    return measure_stretched(a, b, reference, inside, owner, &patch).has_value();
-  return measured(a, b, reference, inside, owner, &patch).has_value();
+    return measure_stretched(a, b, reference, inside, 0, owner, &patch).has_value();
+  return measured(a, b, reference, inside, 0, owner, &patch).has_value();
 }
 
 }  // namespace overlapper

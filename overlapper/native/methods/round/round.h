@@ -13,7 +13,9 @@ namespace overlapper {
 /// The measures of the common set of two bodies of which at least one is round, of the round shapes themselves.
 struct RoundMeasures {
   double volume = 0, volume_error = 0, area = 0;
-  double area_error = 0;   ///< where it is more than what the volume's error makes of the area
+  double first_area = 0;   ///< m²: of the surface, what is the first body's
+  double area_error = 0;   ///< what rules leave open of the area
+  double rounding = 0;     ///< m: how far it may have moved surfaces
   Vec3 centroid;           ///< about the reference
   Mat3 inertia;            ///< about the centroid, unit density
   Pull pull;               ///< on the first body, about the reference; that on the second is the opposite
@@ -30,7 +32,10 @@ struct RoundMeasures {
 /// values at which their outline changes. No term is negative, so that nothing cancels, and all numbers are distances
 /// from the point inside, found in double-double, so that a contact of any depth is measured to the same digits.
 /// Compare Strobl, Formella and Pöschel (2016), who integrate a ball over a tetrahedron in closed form.
-std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside);
+///
+/// `outwards` moves the surface of one of the bodies; nothing where that leaves nothing of something round.
+std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside,
+                                           double outwards = 0);
 
 /// Adds to `patch`, which counts from `inside`, what of the surface is `owner`'s of a pair that measure_round()
 /// measures, to the same digits. False if that does not.

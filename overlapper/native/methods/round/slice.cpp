@@ -269,6 +269,7 @@ void Integrals::add(double weight, const Integrals& other) {
   squares += weight * other.squares;
   products += weight * other.products;
   area += weight * other.area;
+  first_area += weight * other.first_area;
   for (int i = 0; i < 3; ++i) {
     pull[i] += weight * other.pull[i];
     moment[i] += weight * other.moment[i];

@@ -177,7 +177,8 @@ bool is_outline(const Slice& slice, const Outline& outline);
 
 /// Integrals over a slice, or over slices, in coordinates x, y and t: the volume's, and those of the surfaces.
 struct Integrals : Moments {
-  double area = 0;  ///< of what the bodies own of the surface
+  double area = 0;        ///< of what the bodies own of the surface
+  double first_area = 0;  ///< of that, the first body's
   /// ∫ N dA and ∫ X × N dA along l, m and n: per body of its surface, and of the cuts through bodies.
   std::array<Vec3, 3> pull{}, moment{};
   double across = 0;             ///< ∫ t N dA along n, over all of the surface: the volume, by other integrals
