@@ -752,6 +752,16 @@ def rounded_meshes(rng):
     return Case(f"{type(shape).__name__} and {margin:g}", count, bodies if rng.random() < 0.5 else bodies[::-1])
 
 
+def folded_hulls(rng):
+    """A round body, or a box, and a rounded hull of which two facets are within `parameter` of one plane, so that the
+    wedge between them is as narrow."""
+    fold, margin, r = power(rng, -12, -2), float(rng.choice([1e-3, 0.1])), rng.uniform(0.2, 0.4)
+    shape = [Sphere(r), Capsule(r, 1.5 * r), Cylinder(r, 2 * r), Box([r, r, r])][int(rng.integers(4))]
+    folded = RoundedHull([[-0.5, 0, 0], [0.5, 0, 0], [0, 0.5, -fold], [0, -0.5, -fold], [0, 0, -0.5]], margin)
+    bodies = Placed(shape, rng.normal(size=3) * 0.2, quaternion(rng)), Placed(folded, (0, 0, 0), quaternion(rng))
+    return Case(f"{type(shape).__name__} and {margin:g}", fold, bodies if rng.random() < 0.5 else bodies[::-1])
+
+
 def flush_round(rng):
     """Two bodies about one axis, one of them round, that share surfaces, or do but for rounding. What they have in
     common is the smaller, or the part of it up to a plane in which a capsule becomes a half ball."""
@@ -906,7 +916,8 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
-        round_contacts, rounded_hulls, rounded_meshes, flush_round, special_poses, ellipsoids, posed_ellipsoids,
+        round_contacts, rounded_hulls, rounded_meshes, folded_hulls, flush_round, special_poses, ellipsoids,
+        posed_ellipsoids,
     )
 }  # fmt: skip
 

@@ -526,6 +526,25 @@ def test_round_bodies_deep_in_meshes_with_margins_are_measured_of_their_round_sh
         assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume
 
 
+@pytest.mark.parametrize("first_seed", range(0, 300, 100))
+def test_rounded_hulls_with_facets_nearly_in_one_plane_are_measured_of_their_round_shapes(first_seed):
+    for seed in range(first_seed, first_seed + 100):
+        found = assert_motion_changes_nothing(*make("folded_hulls", seed).bodies, np.random.default_rng(seed))
+        assert not found or ("dual" not in found.way and found.volume_error <= 1e-11 * found.volume)
+
+
+@pytest.mark.parametrize("shape", [Sphere(0.3), Capsule(0.2, 0.5), Cylinder(0.2, 0.5), Box([0.2, 0.3, 0.4])], ids=repr)
+def test_the_tip_of_a_rounded_cone_of_many_slivers_is_measured_truly(shape):
+    """No plane cuts the fan of facets, nor that of the tip's seams, into smaller ones."""
+    turns = 2 * np.pi * np.arange(60) / 60
+    cone = RoundedHull(np.vstack([np.c_[np.cos(turns), np.sin(turns), 0 * turns] / 2, [[0, 0, 1]]]), 0.1)
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        at = [0, 0, 0.9] + 0.1 * rng.normal(size=3)
+        found = assert_motion_changes_nothing(Placed(cone), Placed(shape, at, quaternion(rng)), rng)
+        assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume
+
+
 @pytest.mark.parametrize("which", range(len(SILENT)))
 def test_a_plane_or_a_piece_that_slices_have_missed_is_found(which):
     for seed in range(10):
@@ -593,7 +612,12 @@ def test_a_pair_that_a_plane_splits_beside_another_by_rounding_is_sliced():
         (0.09999999450049986, -0.4499500009999998, -0.4499499999890011),
         (-1, 5e-9, 1, 5e-9),
     )
-    for a, b in ((capsule, box), (flat, wide)):
+    # Two cylinders end in the plane of a wall, one rounding beyond where the last outline begins.
+    rounded = Placed(RoundedHull(CORNERS * [0.7, 1, 0.7], 0.5**0.5))
+    across = Placed(
+        Cylinder(0.999999999999, 2), (-0.007106781185840516, -1.0000000000000002, -0.007106781185840294), (1, 0, 0, 1)
+    )
+    for a, b in ((capsule, box), (flat, wide), (rounded, across)):
         found = assert_motion_changes_nothing(a, b, np.random.default_rng(0))
         assert "dual" not in found.way
         assert found.volume_error <= 1e-11 * found.volume

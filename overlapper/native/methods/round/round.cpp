@@ -39,8 +39,8 @@ constexpr double kTold = 1e-6;
 /// Sums of area vectors are right to this fraction of the area.
 constexpr double kSummation = 16 * DBL_EPSILON;
 
-/// Whether slices may have so many walls.
-bool sliceable(size_t walls) { return walls <= static_cast<size_t>(slicing::kMostLines - 4); }
+/// Whether slices are to have so many walls: of more, they take long, by the cube of their number.
+bool sliceable(size_t walls) { return walls <= 28; }
 
 /// Integrals in the axes of the world, about the point inside.
 struct Totals : Moments {
@@ -628,20 +628,24 @@ class Measuring {
     return open_part(stack, sum.integrals);
   }
 
-  /// Finds the intervals of a stack, and draws them out to where a quadric ends that they end before by no more than
-  /// rounding: what is left there is as wide as the root of how thin it is.
+  /// Finds the intervals of a stack, and draws them out to where a plane or a quadric ends the stack, before which they
+  /// end by no more than rounding: the face there, or what is as wide as the root of how thin it is, belongs to them.
   bool find_intervals(const slicing::Stack& stack, bool all) {
     drawn_low_ = drawn_high_ = -1;
     if (!slicing::find_intervals(stack, all, intervals_)) return false;
     if (intervals_.empty()) return true;
     double &low = intervals_.front().low, &high = intervals_.back().high;
     const double thin = 1e-13 * (stack.high - stack.low);
+    const auto reaches = [&](double t, double end) { return std::abs(end - t) <= thin && holds_to(stack, t, end); };
+    const auto ended_by = [](const std::optional<slicing::Line>& plane, double t) {
+      return plane && plane->offset / plane->rate == t;
+    };
+    if (ended_by(stack.low_plane, stack.low) && reaches(low, stack.low)) low = stack.low;
+    if (ended_by(stack.high_plane, stack.high) && reaches(high, stack.high)) high = stack.high;
     for (int i = 0; i < stack.quadrics; ++i) {
       const slicing::Quadric& q = stack.quadric[i];
-      if (low - stack.low <= thin && stack.low == q.low && holds_to(stack, low, stack.low))
-        low = stack.low, drawn_low_ = q.owner;
-      if (stack.high - high <= thin && stack.high == q.high && holds_to(stack, high, stack.high))
-        high = stack.high, drawn_high_ = q.owner;
+      if (stack.low == q.low && reaches(low, stack.low)) low = stack.low, drawn_low_ = q.owner;
+      if (stack.high == q.high && reaches(high, stack.high)) high = stack.high, drawn_high_ = q.owner;
     }
     return true;
   }
@@ -745,18 +749,16 @@ void find_walls(const Measuring& measuring, std::span<const Wall> walls, Part& p
     if (has_face[w]) part.walls.push_back(walls[w]);
 }
 
-/// Cuts in two, until slices may have the walls of each part: through the middle, across the axis that leaves the
-/// fewest to either half. Cuts are added to the walls. False if none leaves fewer.
-bool cut_in_parts(const Measuring& measuring, std::vector<Wall>& walls, std::vector<Part>& parts) {
+/// Cuts parts in two, through the middle and across the axis that leaves the fewest walls to either half, until slices
+/// are to have those of each, or no cut leaves fewer. Cuts are added to the walls.
+void cut_in_parts(const Measuring& measuring, std::vector<Wall>& walls, std::vector<Part>& parts) {
   for (size_t i = 0; i < parts.size();) {
     size_t fewest = parts[i].walls.size();
-    if (sliceable(fewest)) {
-      ++i;
-      continue;
-    }
-    const Vec3 middle = parts[i].polytope.middle();
     std::array<Part, 2> best;
+    const auto [lower, upper] = parts[i].polytope.bounds();
+    const Vec3 middle = 0.5 * (lower + upper);
     for (const Vec3 axis : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}) {
+      if (sliceable(parts[i].walls.size())) break;
       cancellation_point();
       std::array<Part, 2> halves{parts[i], parts[i]};
       size_t most = 0;
@@ -770,11 +772,13 @@ bool cut_in_parts(const Measuring& measuring, std::vector<Wall>& walls, std::vec
       }
       if (most < fewest) fewest = most, best = std::move(halves);
     }
-    if (fewest == parts[i].walls.size()) return false;
+    if (fewest == parts[i].walls.size()) {
+      ++i;
+      continue;
+    }
     parts[i] = std::move(best[0]);
     parts.push_back(std::move(best[1]));
   }
-  return true;
 }
 
 struct Workspace {
@@ -957,14 +961,14 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
     if (!sliced && measuring.add_in_closed_form(round, polytope)) return true;
     return culling.outside(polytope, meeting);
   };
-  // In parts of which slices may have the walls; false if that gives up.
+  // In parts of which slices are to have the walls; false if that gives up.
   const auto add_sliced = [&] {
     if (!many) return measuring.add(rounds, walls);
     std::vector<Part>& parts = scratch->parts;
     parts.resize(1);
     std::swap(parts[0].polytope, scratch->polytope);
     find_walls(measuring, walls, parts[0]);
-    if (!cut_in_parts(measuring, walls, parts)) return false;
+    if (!sliceable(parts[0].walls.size())) cut_in_parts(measuring, walls, parts);
     for (Part& part : parts) {
       std::swap(scratch->polytope, part.polytope);
       if (!measuring.add(rounds, part.walls)) return false;

@@ -21,8 +21,8 @@ inline double dot(Point a, Point b) { return a.x * b.x + a.y * b.y; }
 inline double norm(Point a) { return std::sqrt(dot(a, a)); }
 inline double cross(Point a, Point b) { return a.x * b.y - a.y * b.x; }
 
-/// How many lines may bound a slice; pieces with more planes than that near what they share are cut in parts.
-inline constexpr int kMostLines = 32;
+/// How many lines may bound a slice; bodies with more planes than that where no cut leaves fewer have another way.
+inline constexpr int kMostLines = 72;
 
 /// The owner of planes that cut a body in two.
 inline constexpr int kCut = 2;

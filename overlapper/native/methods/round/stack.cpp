@@ -145,8 +145,15 @@ std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall>
   return way == 0 ? std::optional(first) : std::nullopt;
 }
 
+/// The component of a unit vector along another, without what is nothing but the rounding of double-doubles: of lines
+/// of one direction, that would make lines that cross.
+DoubleDouble along(const WideVector& unit, const WideVector& axis) {
+  const DoubleDouble component = dot(unit, axis);
+  return std::abs(component.head) > 1e-30 ? component : DoubleDouble{};
+}
+
 Line line_of(const Wall& wall, const Axes& axes) {
-  const DoubleDouble x = dot(wall.normal, axes.l), y = dot(wall.normal, axes.m), rate = dot(wall.normal, axes.t);
+  const DoubleDouble x = along(wall.normal, axes.l), y = along(wall.normal, axes.m), rate = dot(wall.normal, axes.t);
   Line line;
   line.normal = {x.head, y.head};
   line.normal_tail = {x.tail, y.tail};
@@ -183,7 +190,7 @@ void add_round(Stack& stack, const Round& r, const Axes& axes) {
     return;
   }
   const WideVector side = unit(cross(r.axis, axes.n));
-  const DoubleDouble x = dot(side, axes.l), y = dot(side, axes.m), centre = dot(side, r.centre),
+  const DoubleDouble x = along(side, axes.l), y = along(side, axes.m), centre = dot(side, r.centre),
                      shear = axes.x * x + axes.y * y;
   q.across = {x.head, y.head};
   q.shear = {shear.head, 0};
