@@ -12,6 +12,11 @@ namespace {
 /// and every piece of a body is cut out of it.
 constexpr size_t kMostFaces = 64;
 
+/// Of a hull whose facets hold their corners but for rounding, the triangles whose planes are looked at instead, and how
+/// many of these may matter: slices have so many lines, and some for the other body.
+constexpr size_t kMostTriangles = 256;
+constexpr size_t kMostOfTriangles = 20;
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// How far a shape reaches from its own origin; of a half-space, how far its plane is.
@@ -102,9 +107,13 @@ class Cutter {
   }
 
   void operator()(const Hull& hull) {
+    const HullData& data = *hull.data;
+    const double flatness = unexact(data);
     begin();
-    for (int f = 0; f < facets(*hull.data); ++f) facet_wall(*hull.data, f, 0, owner_);
-    result_.flatness = std::max(result_.flatness, unexact(*hull.data));
+    if (flatness == 0 || !triangle_walls(data)) {
+      for (int f = 0; f < facets(data); ++f) facet_wall(data, f, 0, owner_);
+      result_.flatness = std::max(result_.flatness, flatness);
+    }
     end();
   }
 
@@ -246,6 +255,18 @@ class Cutter {
     if (side_of(hull.planes[f].normal, hull.planes[f].offset + radius) == Side::kInside) return;
     const auto [normal, offset] = plane_of(hull, f);
     wall(normal, offset + DoubleDouble{radius}, owner);
+  }
+  /// The planes of all triangles, of which those that make a facet are one but for rounding. False, and there are none,
+  /// if they are too many.
+  bool triangle_walls(const HullData& hull) {
+    if (hull.triangles.size() > kMostTriangles) return false;
+    for (const auto& [a, b, c] : hull.triangles) {
+      const WideVector normal = unit(wide_normal(hull.corners[a], hull.corners[b], hull.corners[c]));
+      wall(normal, dot(normal, wide(hull.corners[a])), owner_);
+    }
+    if (result_.walls.size() <= piece_.first_wall + kMostOfTriangles) return true;
+    result_.walls.resize(piece_.first_wall);
+    return false;
   }
   static Mat3 rounded(const WideMatrix& m) {
     return {overlapper::rounded(m.row0), overlapper::rounded(m.row1), overlapper::rounded(m.row2)};

@@ -23,6 +23,7 @@ namespace {
 using slicing::Round;
 using slicing::Wall;
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// The fraction of a volume that may stay open before rules are made finer.
 constexpr double kClosed = 1e-12;
 /// Of what else is measured, the fraction beside which one of many pieces may be open: what they leave open adds up.
@@ -86,7 +87,7 @@ class Measuring {
     for (const Wall& wall : walls) {
       const int cuts = side_of(wall);
       if (cuts > 0) return true;
-      if (cuts == 0) walls_.push_back(wall);
+      if (cuts == 0 && !nicks(wall)) walls_.push_back(wall);
     }
     if (flat()) return true;
     drop_repeated();
@@ -98,7 +99,7 @@ class Measuring {
     if (!around) return add_stack();
     // Axes of slices are chosen by what is near the point that coordinates count from.
     const Vec3 middle = around->middle();
-    return add_about(norm(middle) > around->reach(middle) ? middle : Vec3{});
+    return add_about(around->excludes({}) ? middle : Vec3{});
   }
 
   /// Takes the walls of a polytope and finds out which of them are one; false if there is nothing between them.
@@ -153,6 +154,24 @@ class Measuring {
       if (at + reach < -margin) side = -1;
     }
     return side;
+  }
+
+  /// Whether a wall touches a ball, but for a disc that is nothing beside the whole: slices would see it come and go
+  /// by rounding. What it cuts off counts as an error.
+  bool nicks(const Wall& wall) {
+    const auto cut_off = [&](const Round& r) {
+      const Vec3 n = rounded(wall.normal), c = rounded(r.centre);
+      const double rounding = 4 * DBL_EPSILON * (std::abs(wall.slack.head) + norm(c) + r.radius);
+      const double height = std::max(0.0, dot(n, c) - wall.slack.head + r.radius) + rounding;
+      const double disc = 2 * std::numbers::pi * r.radius * height;
+      return disc * extent <= kSure * totals.volume ? disc * height : kInfinity;
+    };
+    double least = kInfinity;
+    for (const Round& r : rounds_)
+      if (r.ball) least = std::min(least, cut_off(r));
+    if (!(least < kInfinity)) return false;
+    totals.error += least;
+    return true;
   }
 
   /// Whether two planes are one within what is enclosed, their slacks that far from each other and the difference of
@@ -513,7 +532,7 @@ class Measuring {
     std::optional<slicing::Stack> stack = slicing::stack_of(rounds_, walls_, extent, 0);
     if (!stack) return false;
     best_.integrals = {};
-    double open = std::numeric_limits<double>::infinity();
+    double open = kInfinity;
     // Where, closely, more changes than can be told, the middle of every interval says more.
     bool told = look_at(*stack, closely) || (closely && look_at(*stack, false));
     if (told && intervals_.empty()) return true;
@@ -583,13 +602,14 @@ class Measuring {
       if (!(keep_better(stack, false, strictness, open) < 0.5) && strictness > 1e3) break;
   }
 
-  /// Coordinates count from a point inside of both bodies. A piece that is small beside its way from there is measured
-  /// again from a point of its own; true if so.
+  /// Coordinates count from a point inside of both bodies. A piece that is small beside its way from there, or as
+  /// thin along one of the axes, is measured again from a point of its own; true if so.
   bool move_near(const slicing::Stack& stack) {
     const slicing::Integrals& s = best_.integrals;
     const Vec3 mean = s.first / s.volume, offset = in_world(stack, mean);
-    const double spread = (s.squares.x + s.squares.y + s.squares.z) / s.volume - norm2(mean);
-    if (moved_ || !(norm2(mean) > 25 * spread) || !(norm(offset) <= extent)) return false;
+    const Vec3 away = scaled(mean, mean), spread = s.squares / s.volume - away;
+    const bool far = away.x > 25 * spread.x || away.y > 25 * spread.y || away.z > 25 * spread.z;
+    if (moved_ || !far || !(norm(offset) <= extent)) return false;
     moved_ = true;
     const bool done = add_about(offset);
     moved_ = false;
@@ -870,7 +890,7 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
   std::span<Round> rounds = of_ellipsoid.rounds;
   Vec3 moved;  // in the ball
   Totals totals;
-  double error = std::numeric_limits<double>::infinity();
+  double error = kInfinity;
   const std::optional<PatchSums> patch_before = patch ? std::optional(*patch) : std::nullopt;
   // About the centroid, other slices are taken, which may do where the first do not.
   for (int attempt = 0; attempt < 2 && !(error <= kMostOpen * totals.volume); ++attempt) {
