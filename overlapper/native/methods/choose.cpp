@@ -394,7 +394,7 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
   if (exact && !enough())
     if (auto wide = widened(at.relative, overlapping.region())) keep_better(owned_as_given(std::move(*wide), at));
   const auto reach = [&] { return overlapping.search().reach; };
-  if (exact ? !enough() : rounding(reach()) * kept.measures.area > finest * kept.measures.volume) {
+  if (!enough() && (exact || rounding(reach()) * kept.measures.area > finest * kept.measures.volume)) {
     if (const auto wide = grown_in_wide_arithmetic(overlapping)) keep_better(*wide);
     else if (exact)
       kept.measures.volume_error +=

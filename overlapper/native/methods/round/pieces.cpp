@@ -12,8 +12,8 @@ namespace {
 /// and every piece of a body is cut out of it.
 constexpr size_t kMostFaces = 64;
 
-/// Of a hull whose facets hold their corners but for rounding, the triangles whose planes are looked at instead, and how
-/// many of these may matter: slices have so many lines, and some for the other body.
+/// Of a hull whose facets hold their corners but for rounding, the triangles whose planes are looked at instead, and
+/// how many of these may matter: slices have so many lines, and some for the other body.
 constexpr size_t kMostTriangles = 256;
 constexpr size_t kMostOfTriangles = 20;
 
