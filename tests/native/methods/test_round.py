@@ -675,3 +675,19 @@ def test_a_ball_on_a_ridge_that_is_all_but_flat(seed):
     found = overlap(Placed(Sphere(radius), middle + turn @ [*across, 0.5 + radius - depth]), Placed(slab))
     lower, upper = found.certificate().verify()
     assert max(abs(found.volume - lower), abs(found.volume - upper)) <= found.volume_error <= 1e-11 * found.volume
+
+
+@pytest.mark.parametrize("margin", [2.0**-10, 2.0**-16, 2.0**-22])
+@pytest.mark.parametrize("turn", [(1, 2, 2, 0), (2, -1, 0, 2), (0, 1, 2, -2)])
+def test_needles_between_a_thin_plate_and_a_thin_margin_have_all_their_digits(margin, turn):
+    """The plate leaves a slice of the cube's edge: the prisms on two facets are needles, turned to no axis."""
+    plate, ninth = margin / 4, np.round(np.array([0, 0.75, 0.5]) / 9 * 2.0**40) / 2.0**40
+    low = 9 * ninth[1:] - 1
+    found = overlap(
+        Placed(RoundedHull(CORNERS / 2, margin), (0, 0, 0), turn),
+        Placed(Box([plate, 1, 1]), np.rint(9 * rotation(turn)) @ ninth, turn),
+    )
+    wide, high = 0.5 - low
+    exact = 2 * plate * (wide * high + margin * (wide + high) + np.pi / 4 * margin**2)
+    assert abs(found.volume - exact) <= found.volume_error + 1e-15 * exact
+    assert found.volume_error <= 1e-12 * exact

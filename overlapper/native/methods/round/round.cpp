@@ -339,6 +339,7 @@ class Measuring {
     std::optional<PatchSums> with_piece;
     if (patch) with_piece = *patch;
     const Vec3 apex = polytope.corners[0].at;
+    double cancelled = 0;  // of products that areas are the differences of, times heights
     bool closed = true;
     polytope.for_faces([&](const slicing::Enclosure::Face& face, std::span<const int> ring) {
       const int of_wall = owner_at(face.wall);
@@ -346,13 +347,17 @@ class Measuring {
         closed = false;
         return;
       }
-      Vec3 force, moment;
+      // Across a needle, the height is small, while its triangles are as long as it: along it, the other way round.
+      const double height = face.slack - dot(face.normal, apex);
+      double area = 0;
+      Vec3 first;
       for (size_t i = 2; i < ring.size(); ++i) {
         const Vec3 a = polytope.corners[ring[0]].at, b = polytope.corners[ring[i - 1]].at;
-        const Vec3 c = polytope.corners[ring[i]].at, triangle = 0.5 * cross(b - a, c - a);
-        force += triangle, moment += cross((a + b + c) / 3, triangle);
-        if (with_piece && of_wall == owner) with_piece->add_triangle(a, b, c, triangle);
-        const double tetrahedron = dot(a - apex, triangle) / 3;
+        const Vec3 c = polytope.corners[ring[i]].at;
+        const double triangle = 0.5 * dot(face.normal, cross(b - a, c - a)), tetrahedron = height / 3 * triangle;
+        area += triangle, first += triangle / 3 * (a + b + c);
+        cancelled += std::abs(height) * std::sqrt(norm2(b - a) * norm2(c - a));
+        if (with_piece && of_wall == owner) with_piece->add_triangle(a, b, c, triangle * face.normal);
         const Vec3 sum = apex + a + b + c;
         piece.volume += tetrahedron;
         piece.first += tetrahedron / 4 * sum;
@@ -361,12 +366,12 @@ class Measuring {
           piece.products += tetrahedron / 20 * Vec3{p.y * p.z, p.z * p.x, p.x * p.y};
         }
       }
-      const double area = std::sqrt(norm2(force));
+      const Vec3 force = area * face.normal;
       piece.border += area;
       if (of_wall != slicing::kCut) piece.area += area, piece.unbalanced += force;
-      if (of_wall == 0) piece.pull += force, piece.moment += moment, piece.first_area += area;
+      if (of_wall == 0) piece.pull += force, piece.moment += cross(first, face.normal), piece.first_area += area;
     });
-    piece.error = rounding_of(polytope, piece.border);
+    piece.error = rounding_of(polytope, piece.border) + DBL_EPSILON * cancelled;
     if (!closed || !sure(piece, polytope.faces.size())) return false;
     totals.add(piece);
     if (patch) *patch = *with_piece;
