@@ -338,7 +338,8 @@ def the_certificate_is_proved(case: Case, found: Overlap) -> str:
     of_planes = len(kinds) > 2 or (Ellipsoid in kinds and found.way != "slicing") or found.status == "touching"
     other_planes = case.round and of_planes
     beside = other_planes and lower <= volume + error and volume - error <= upper
-    film = Fraction(found.errors.distance) * Fraction(found.errors.area) if found.status == "touching" else 0
+    apart = found.errors.distance if found.status == "touching" else None
+    film = Fraction(apart) * Fraction(found.errors.area) if apart is not None else 0
     narrow = upper - lower <= max(6 * error, 3 * Fraction(TOLERANCE) * volume, film)
     return "" if within or (beside and narrow) else "the proved bounds are not within the stated ones"
 
