@@ -12,6 +12,7 @@
 #include "methods/quadric/cylinder.h"
 #include "methods/quadric/shallow_ball.h"
 #include "methods/round/stretch.h"
+#include "methods/sides.h"
 #include "shapes/solid.h"
 
 namespace overlapper {
@@ -353,9 +354,9 @@ double reach_of_cap(double r, Vec3 normal, double offset, Vec3 direction, double
   return t * along + disc * norm(direction - along * normal) + 2 * rounding;
 }
 
-/// An upper bound, as low as it takes, of dot(direction, x) over the part of `body` below the plane, about its centre:
-/// by weak duality, reach(direction − λ normal) + λ offset for any λ >= 0, a convex function of λ.
-double reach_below(const Revolved& body, Vec3 normal, double offset, Vec3 direction, double rounding) {
+/// An upper bound, no lower than it takes to be `enough`, of dot(direction, x) over the part of `body` below the plane,
+/// about its centre: by weak duality, reach(direction − λ normal) + λ offset for any λ >= 0, a convex function of λ.
+double reach_below(const Revolved& body, Vec3 normal, double offset, Vec3 direction, double rounding, double enough) {
   if (body.round && body.half_length == 0) return reach_of_cap(body.radius, normal, offset, direction, rounding);
   const auto bound = [&](double lambda) {
     return body.reach(direction - lambda * normal) + lambda * offset + (1 + lambda) * rounding;
@@ -365,7 +366,7 @@ double reach_below(const Revolved& body, Vec3 normal, double offset, Vec3 direct
   while (high < 1e6 && bound(high) < bound(high / 2)) high *= 2;
   double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
   double at_left = bound(left), at_right = bound(right);
-  for (int i = 0; i < 48; ++i) {
+  for (int i = 0; i < 48 && std::min(at_left, at_right) > enough; ++i) {
     if (at_left < at_right) {
       high = right, right = left, at_right = at_left;
       left = high - kGolden * (high - low), at_left = bound(left);
@@ -398,7 +399,7 @@ std::optional<OnlyCut> only_cut(const Revolved& body, std::span<const Plane> pla
     if (plane == deepest) continue;
     const double offset = -signed_distance(*plane, body.centre);
     const double deepest_offset = -signed_distance(*deepest, body.centre);
-    const double reach = reach_below(body, deepest->normal, deepest_offset, plane->normal, rounding);
+    const double reach = reach_below(body, deepest->normal, deepest_offset, plane->normal, rounding, offset);
     if (reach > offset + 2 * rounding) return std::nullopt;
     if (reach > offset) layers += 4;  // it may cut off a layer of rounding
   }
@@ -425,21 +426,27 @@ std::optional<WidePlane> own_plane(const Shape& shape, int f) {
   return WidePlane{normal, dot(normal, wide(hull.corners[a]))};
 }
 
+WideMatrix rotation_of(const Placed& body) {
+  if (unturned(body.orientation)) return {{{1}, {}, {}}, {{}, {1}, {}}, {{}, {}, {1}}};
+  return wide_rotation(body.orientation);
+}
+
+/// The direction of a capsule's or a cylinder's axis in the world.
+WideVector axis_of(const Placed& body) {
+  const WideMatrix turn = rotation_of(body);
+  return {turn.row0.z, turn.row1.z, turn.row2.z};
+}
+
 /// Where a body is in the own coordinates of another.
 struct WideSeen {
   WideVector centre, axis;
 };
 WideSeen seen_from(const Placed& other, const Placed& body) {
-  const auto rotation = [](const Placed& p) {
-    return unturned(p.orientation) ? WideMatrix{{{1}, {}, {}}, {{}, {1}, {}}, {{}, {}, {1}}}
-                                   : wide_rotation(p.orientation);
-  };
-  const WideMatrix turn = rotation(other);
+  const WideMatrix turn = rotation_of(other);
   WideSeen seen{apply_transposed(turn, wide_difference(body.position, other.position)), {}};
   if (const HullData* hull = polytope_of(other.shape)) seen.centre = seen.centre - wide(hull->origin);
   if (std::holds_alternative<Capsule>(body.shape) || std::holds_alternative<Cylinder>(body.shape)) {
-    const WideMatrix own = rotation(body);
-    seen.axis = apply_transposed(turn, {own.row0.z, own.row1.z, own.row2.z});
+    seen.axis = apply_transposed(turn, axis_of(body));
   }
   return seen;
 }
@@ -506,8 +513,7 @@ struct End {
 
 /// How far the cap dot(normal, x − centre) <= offset of a ball keeps to the outer side of an end, at least.
 double clearance(const End& end, Vec3 centre, double radius, Vec3 normal, double offset, double rounding) {
-  const Revolved ball{centre, {0, 0, 1}, radius, 0, true};
-  return dot(end.outward, centre - end.centre) - reach_below(ball, normal, offset, -end.outward, rounding);
+  return dot(end.outward, centre - end.centre) - reach_of_cap(radius, normal, offset, -end.outward, rounding);
 }
 
 /// The lens of two balls: cap of a towards b, cap of b towards a. `between` leads from a to b, and ends may be off by
@@ -557,14 +563,91 @@ std::optional<Measures> lens_of_ends(const Revolved& a, const Placed& placed_a, 
   const auto end = [&](const Revolved& body, const Placed& placed, Vec3 other, double side) {
     if (body.half_length == 0) return body.centre;
     const bool back = dot(body.axis, other - body.centre) < 0;
-    const WideMatrix turn = wide_rotation(placed.orientation);
     const double along = back ? -body.half_length : body.half_length;
-    between = between + side * along * WideVector{turn.row0.z, turn.row1.z, turn.row2.z};
+    between = between + side * along * axis_of(placed);
     ends.push_back({body.centre + along * body.axis, back ? -body.axis : body.axis});
     return ends.back().centre;
   };
   const Vec3 centre_a = end(a, placed_a, b.centre, -1), centre_b = end(b, placed_b, a.centre, 1);
   return lens(centre_a, a.radius, centre_b, b.radius, between, rounding, reference, ends, positions);
+}
+
+// ---------------------------------------------------------------------------------------------------------------- sides
+
+/// Of what is shared, along `normal` from the first body's axis, a point of which is `foot`, to the second.
+Measures of_sides(const SideContact& contact, Vec3 foot, Vec3 normal, double twist, Vec3 reference,
+                  const std::array<Vec3, 2>& positions) {
+  Measures q = by_formula();
+  q.way = Way::kSlicing;
+  q.volume = contact.volume, q.area = contact.area;
+  q.volume_error = kSummation * q.volume;
+  q.centroid = reference + (foot + contact.height * normal);
+  q.pulls = opposite_pulls(contact.force * normal, foot, positions);
+  q.pulls[0].moment += twist * normal, q.pulls[1].moment += -twist * normal;
+  return q;
+}
+
+/// Less of a length than that from an end, a contact is not at the side.
+constexpr double kEndMargin = 1e-9;
+
+bool shallow_at_sides(double r, double s, DoubleDouble depth) {
+  return depth.head > 0 && depth.head <= kShallowSides * std::min(r, s);
+}
+
+/// A ball at the side of a capsule or a cylinder, far from the ends of that.
+std::optional<Measures> ball_beside(const Revolved& ball, const Placed& placed_ball, const Revolved& body,
+                                    const Placed& placed_body, Vec3 reference, const std::array<Vec3, 2>& positions) {
+  const double r = body.radius, s = ball.radius, h = body.half_length;
+  const Vec3 plain = ball.centre - body.centre;
+  const double along = dot(plain, body.axis);
+  if (!(std::abs(along) < h)) return std::nullopt;
+  const WideVector between = wide_difference(placed_ball.position, placed_body.position), axis = axis_of(placed_body);
+  const WideVector out = between - dot(between, axis) * axis;
+  const DoubleDouble distance = norm(out), depth = two_sum(r, s) - distance;
+  if (!shallow_at_sides(r, s, depth)) return std::nullopt;
+  const double reach = reach_of_ball(s, depth.head);
+  if (!(std::abs(along) + reach < h - kEndMargin * (h + r))) return std::nullopt;
+  const SideContact contact = ball_at_side(r, s, distance.head, depth.head);
+  const Vec3 foot = body.centre + along * body.axis;
+  return of_sides(contact, foot, rounded(out / distance), 0, reference, positions);
+}
+
+/// The sides of two capsules or cylinders that cross far from all ends.
+std::optional<Measures> sides_of_two(const Revolved& a, const Placed& placed_a, const Revolved& b,
+                                     const Placed& placed_b, Vec3 reference, const std::array<Vec3, 2>& positions) {
+  const double r = a.radius, s = b.radius;
+  // Where the axes are nearest to each other, along each, as far as doubles know.
+  const Vec3 plain = b.centre - a.centre, across = cross(a.axis, b.axis);
+  const double cosine = dot(a.axis, b.axis), sine2 = norm2(across);
+  const double on_a = dot(plain, a.axis), on_b = dot(plain, b.axis);
+  if (!(sine2 > 0)) return std::nullopt;
+  const double along_a = (on_a - cosine * on_b) / sine2, along_b = (cosine * on_a - on_b) / sine2;
+  if (!(std::abs(along_a) < a.half_length && std::abs(along_b) < b.half_length)) return std::nullopt;
+  const WideVector between = wide_difference(placed_b.position, placed_a.position);
+  const WideVector common = cross(axis_of(placed_a), axis_of(placed_b));
+  const DoubleDouble wide_sine = norm(common), signed_distance_of_axes = dot(between, common) / wide_sine;
+  const DoubleDouble distance = abs(signed_distance_of_axes), depth = two_sum(r, s) - distance;
+  if (!shallow_at_sides(r, s, depth)) return std::nullopt;
+  const double sine = wide_sine.head, turn = std::abs(cosine);
+  const double reach_a = reach_of_crossing(r, s, depth.head, sine, turn);
+  const double reach_b = reach_of_crossing(s, r, depth.head, sine, turn);
+  if (!(std::abs(along_a) + reach_a < a.half_length - kEndMargin * (a.half_length + r) / sine2)) return std::nullopt;
+  if (!(std::abs(along_b) + reach_b < b.half_length - kEndMargin * (b.half_length + s) / sine2)) return std::nullopt;
+  const SideContact contact = sides_crossing(r, s, depth.head, sine);
+  const bool turned = signed_distance_of_axes.head < 0;
+  const Vec3 normal = rounded(common / wide_sine) * (turned ? -1.0 : 1.0);
+  // The volume is inversely as the sine of the angle between the axes, which the first turns towards the second.
+  const double twist = (turned ? -1 : 1) * contact.volume * cosine / sine;
+  return of_sides(contact, a.centre + along_a * a.axis, normal, twist, reference, positions);
+}
+
+std::optional<Measures> sides(const Revolved& a, const Placed& placed_a, const Revolved& b, const Placed& placed_b,
+                              Vec3 reference, const std::array<Vec3, 2>& positions) {
+  if (a.half_length > 0 && b.half_length > 0) return sides_of_two(a, placed_a, b, placed_b, reference, positions);
+  if (a.half_length > 0) return ball_beside(b, placed_b, a, placed_a, reference, positions);
+  auto found = ball_beside(a, placed_a, b, placed_b, reference, {positions[1], positions[0]});
+  if (found) std::swap(found->pulls[0], found->pulls[1]);
+  return found;
 }
 
 // --------------------------------------------------------------------------------------------------------- polyhedra
@@ -615,17 +698,25 @@ std::optional<quadric::ShallowPart> shallow_part(const OwnPolyhedron& polyhedron
   return part;
 }
 
-/// Where one plane at most reaches a ball, or cuts off anything, a cap has fewer terms.
-std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, const Placed& placed, const Placed& other,
-                                                      int self, double rounding, Vec3 reference,
+std::optional<MeasuresAndInertia> shallow_ball_and_polyhedron(const Revolved& ball, const Placed& placed,
+                                                              const Placed& other, int self, Vec3 reference,
+                                                              const std::array<Vec3, 2>& positions) {
+  const OwnPolyhedron polyhedron(other.shape);
+  if ((*polyhedron).edges.empty()) return std::nullopt;
+  const auto part = shallow_part(polyhedron, other, seen_from(other, placed).centre, ball.radius);
+  if (!part) return std::nullopt;
+  return of_ball(*part, part->about_apex, ball.centre, other, self, 0, reference, positions);
+}
+
+/// Where one plane at most reaches a ball, a cap has fewer terms.
+std::optional<MeasuresAndInertia> ball_and_polyhedron(const Revolved& ball, const Placed& other, int self,
+                                                      double rounding, Vec3 reference,
                                                       const std::array<Vec3, 2>& positions) {
   const OwnPolyhedron polyhedron(other.shape);
   if ((*polyhedron).edges.empty()) return std::nullopt;
   const Vec3 centre = apply_transposed(other.pose.rotation, ball.centre - other.pose.translation);
   const auto reaches = [&](const Plane& plane) { return -signed_distance(plane, centre) < ball.radius + rounding; };
   if (std::ranges::count_if((*polyhedron).planes, reaches) < 2) return std::nullopt;
-  if (const auto part = shallow_part(polyhedron, other, seen_from(other, placed).centre, ball.radius))
-    return of_ball(*part, part->about_apex, ball.centre, other, self, 0, reference, positions);
   const auto part = quadric::measure_ball(*polyhedron, centre, ball.radius);
   if (!part || !(part->volume > 0)) return std::nullopt;
   auto found = of_ball(*part, *part, ball.centre, other, self, rounding, reference, positions);
@@ -730,7 +821,9 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
   const std::optional<Revolved> smooth_a = revolved(a), smooth_b = revolved(b);
   const std::array<Vec3, 2> positions{a.position - reference, b.position - reference};
   if (smooth_a && smooth_b) {
-    if (!smooth_a->round || !smooth_b->round) return std::nullopt;
+    const bool balls = smooth_a->half_length == 0 && smooth_b->half_length == 0;
+    auto at_sides = balls ? std::nullopt : sides(*smooth_a, a, *smooth_b, b, reference, positions);
+    if (at_sides || !smooth_a->round || !smooth_b->round) return without_inertia(at_sides);
     return without_inertia(lens_of_ends(*smooth_a, a, *smooth_b, b, rounding, reference, positions));
   }
   const bool first = smooth_a || stretched(a.shape);
@@ -739,22 +832,36 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
   if (smooth(other.shape)) return std::nullopt;
   const int self = first ? 0 : 1;
   const std::optional<Revolved>& revolved_body = first ? smooth_a : smooth_b;
-  std::optional<MeasuresAndInertia> several;
-  const auto error = [](const Measures& m) { return m.volume_error / m.volume; };
-  if (revolved_body && revolved_body->round && revolved_body->half_length == 0)
-    several = ball_and_polyhedron(*revolved_body, body, other, self, rounding, reference, positions);
-  else if (revolved_body && revolved_body->round)
-    several = end_and_polyhedron(*revolved_body, body, other, self, reference, positions);
-  if (revolved_body && revolved_body->half_length > 0 && !several)
-    several = long_body_and_polyhedron(*revolved_body, body, other, self, rounding, reference, positions);
-  if (several && error(several->measures) <= kEnough) return several;
   std::vector<Plane> planes;
   append_planes(other.shape, planes);
-  for (Plane& plane : planes) plane = other.pose * plane;
+  double over = -kInfinity;  // how far the body's centre is outside
+  for (Plane& plane : planes) {
+    plane = other.pose * plane;
+    over = std::max(over, signed_distance(plane, body.pose.translation));
+  }
   if (!revolved_body) return without_inertia(cut_by_polytope(body, planes, self, rounding, reference, positions));
-  const auto cut = cut_by_polytope(*revolved_body, body, other, planes, self, rounding, reference, positions);
-  if (several && !(cut && error(*cut) <= error(several->measures))) return several;
-  return without_inertia(cut);
+  std::optional<MeasuresAndInertia> best;
+  const auto error = [](const MeasuresAndInertia& m) { return m.measures.volume_error / m.measures.volume; };
+  const auto enough = [&](std::optional<MeasuresAndInertia> found) {
+    if (found && !(best && error(*best) <= error(*found))) best = std::move(found);
+    return best && error(*best) <= kEnough;
+  };
+  const Revolved& whole = *revolved_body;
+  const bool ball = whole.half_length == 0, outside = over > 0;
+  const auto cut_by_one = [&] {
+    return without_inertia(cut_by_polytope(whole, body, other, planes, self, rounding, reference, positions));
+  };
+  if (outside && ball && enough(shallow_ball_and_polyhedron(whole, body, other, self, reference, positions)))
+    return best;
+  if (outside && !ball && whole.round && enough(end_and_polyhedron(whole, body, other, self, reference, positions)))
+    return best;
+  // In a shallow contact, one plane is the rule.
+  if (outside && enough(cut_by_one())) return best;
+  if (enough(ball ? ball_and_polyhedron(whole, other, self, rounding, reference, positions)
+                  : long_body_and_polyhedron(whole, body, other, self, rounding, reference, positions)))
+    return best;
+  if (!outside) enough(cut_by_one());
+  return best;
 }
 
 }  // namespace overlapper

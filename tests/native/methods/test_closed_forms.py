@@ -245,3 +245,57 @@ def test_shallow_contacts_keep_every_digit_of_a_closed_form(depth):
             if not answer.volume_error <= 1e-12 * truth:
                 wrong.append(f"{name}: said {float(answer.volume_error / truth):.1e}")
     assert not wrong, wrong
+
+
+def ball_at_side(r: Any, s: Any, distance: Any) -> Any:
+    """Of a ball of radius s and a cylinder about z, by lenses of discs."""
+
+    def slice_at(z: Any) -> Any:
+        q = mp.sqrt(s * s - z * z)
+        x = (distance**2 + r * r - q * q) / (2 * distance)
+        half = mp.sqrt(max(r * r - x * x, mpmath.mpf(0)))
+        return r * r * mp.atan2(half, x) + q * q * mp.atan2(half, distance - x) - distance * half
+
+    reach = mp.sqrt(s * s - (distance - r) ** 2)
+    return 2 * mp.quad(slice_at, [0, reach])
+
+
+def cylinders_crossing(r: Any, s: Any, distance: Any, sine: Any) -> Any:
+    def slice_at(t: Any) -> Any:
+        return 4 * mp.sqrt(max((r * r - t * t) * (s * s - (distance - t) ** 2), mpmath.mpf(0))) / sine
+
+    return mp.quad(slice_at, [distance - s, r])
+
+
+@pytest.mark.parametrize("depth", DEPTHS)
+def test_shallow_contacts_at_sides_keep_every_digit(depth):
+    radii, place = (0.5, 0.75), 1.25 - depth
+    with mpmath.workdps(60):
+        r, s, distance = exactly(0.5), exactly(0.75), exactly(place)
+        ball = ball_at_side(r, s, distance), Placed(Sphere(0.75), (place, 0, 0.25))
+        # About x by a turn of twice the angle of which 3 / 4 is the cotangent: a sine of 24 / 25.
+        other = [Placed(solid, (place, 0.125, 0.25), (3, 0, 0, 4)) for solid in (Capsule(0.75, 6), Cylinder(0.75, 6))]
+        crossing = cylinders_crossing(r, s, distance, exactly(24) / 25)
+        for solid in (Capsule(radii[0], 8), Cylinder(radii[0], 8)):
+            for truth, placed in (ball, *((crossing, each) for each in other)):
+                for answer in (overlap(solid, placed), overlap(placed, solid)):
+                    off = abs(exactly(answer.volume) - truth)
+                    assert off <= min(answer.volume_error, 1e-13 * truth), (solid, placed)
+                    assert answer.volume_error <= 1e-12 * truth
+                    # Towards each other they share more, as fast in either direction; across, nothing changes at first.
+                    assert_allclose(answer.gradient[:, 1:3], 0, atol=1e-13)
+                    assert_allclose(answer.gradient[0, :3] + answer.gradient[1, :3], 0, atol=1e-15)
+
+
+@pytest.mark.parametrize("solid", [Sphere(0.75), Capsule(0.75, 6), Cylinder(0.75, 6)])
+def test_gradients_at_sides_are_differences(solid):
+    fixed, step = Cylinder(0.5, 8), 1e-5
+
+    def at(out: float, angle: float = 0.7) -> Any:
+        return overlap(fixed, Placed(solid, (out, 0.1, 0.2), (np.sin(angle / 2), 0, 0, np.cos(angle / 2))))
+
+    here = at(1.2)
+    slope = (at(1.2 + step).volume - at(1.2 - step).volume) / (2 * step)
+    assert here.gradient[1, 0] == pytest.approx(slope, rel=1e-6)
+    turned = (at(1.2, 0.7 + step).volume - at(1.2, 0.7 - step).volume) / (2 * step)
+    assert here.gradient[1, 3] == pytest.approx(turned, rel=1e-6, abs=1e-12)

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "methods/round/segment.h"
+#include "methods/quadric/segment.h"
 
 namespace overlapper::quadric {
 namespace {
@@ -22,25 +22,6 @@ constexpr std::array<double, 8> kNode{0.0950125098376374, 0.2816035507792589, 0.
                                       0.7554044083550030, 0.8656312023878318, 0.9445750230732326, 0.9894009349916499};
 constexpr std::array<double, 8> kWeight{0.1894506104550685, 0.1826034150449236, 0.1691565193950025, 0.1495959888165767,
                                         0.1246289712555339, 0.0951585116824928, 0.0622535239386479, 0.0271524594117541};
-
-constexpr slicing::SegmentSeries kSeries;
-
-/// Of a unit disc's segment, from half its arc's angle x, the sine and the cosine of that.
-slicing::Segment segment(double x, double s, double c) {
-  if (x >= slicing::kNarrow) {
-    const double area = x - s * c, cube = s * s * s, from_disc = 2.0 / 3 * cube;
-    const double across = area / 4 + cube * c / 2 - 2 * c * from_disc + c * c * area;
-    return {area, from_disc - c * area, across, area / 4 - cube * c / 6};
-  }
-  const double square = x * x, cube = square * x;
-  slicing::Segment sum{};
-  for (int k = slicing::SegmentSeries::kTerms - 1; k >= 0; --k) {
-    const slicing::Segment& term = kSeries.term[k];
-    sum = {sum.area * square + term.area, sum.first_across * square + term.first_across,
-           sum.second_across * square + term.second_across, sum.second_along * square + term.second_along};
-  }
-  return {cube * sum.area, cube * sum.first_across, cube * sum.second_across, cube * sum.second_along};
-}
 
 /// y z, z x and x y of two points, of one each.
 Vec3 products(Vec3 a, Vec3 b) { return {a.y * b.z, a.z * b.x, a.x * b.y}; }
