@@ -90,4 +90,4 @@ class Still:
         keys = np.array(self.keys, dtype=np.int64).reshape(-1, 3)
         bodies, pairs = keys[:, 0], batch.candidate_pairs(*where)
         among = pairs[bodies[pairs[:, 0]] != bodies[pairs[:, 1]]]
-        return Contacts(keys, batch.overlaps(*where, among, tolerance, separated=False))
+        return Contacts(keys, batch.overlaps(*where, among, tolerance, separated=False), self.names)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper.columns import MEASURES
+
 if TYPE_CHECKING:
     from overlapper.reference import Comparison
     from overlapper.simulation.contacts import Contact
@@ -17,15 +19,6 @@ Value = int | float | str | None
 Row = dict[str, Value]
 
 POSE = [f"position{{}}_{axis}_m" for axis in "xyz"] + [f"orientation{{}}_{part}" for part in "xyzw"]
-MEASURES = [
-    "volume_m3",
-    "volume_error_m3",
-    *[f"centroid_{axis}_m" for axis in "xyz"],
-    "area_m2",
-    "depth_m",
-    *[f"normal_{axis}" for axis in "xyz"],
-]
-
 # Every column of a run, in order, with its type; the unit is in the name. `link` is -1 for the base, `shape` counts the
 # shapes of that link, the poses are those of the two shapes in the world, `normal` points from B to A. The columns of
 # the centroid are empty for a pair that only touches.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from overlapper.simulation.bodies import Bodies, SelfCollisionWarning, SkippedShapeWarning
     from overlapper.simulation.contacts import Contact, Contacts
     from overlapper.simulation.extraction.model import Concave, Decomposed, Skipped, Surface
-    from overlapper.simulation.links import LinkContact, link_contacts
+    from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
     from overlapper.simulation.recorder import Recorder
     from overlapper.simulation.report import Report
 
@@ -27,6 +27,7 @@ __all__ = [
     "Contacts",
     "Decomposed",
     "LinkContact",
+    "LinkContacts",
     "Recorder",
     "Report",
     "SelfCollisionWarning",
@@ -44,7 +45,7 @@ __getattr__ = lazily(
         "bodies": ("Bodies", "SelfCollisionWarning", "SkippedShapeWarning"),
         "contacts": ("Contact", "Contacts"),
         "extraction.model": ("Concave", "Decomposed", "Skipped", "Surface"),
-        "links": ("LinkContact", "link_contacts"),
+        "links": ("LinkContact", "LinkContacts", "link_contacts"),
         "recorder": ("Recorder",),
         "report": ("Report",),
     },

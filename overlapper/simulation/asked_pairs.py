@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,18 @@ Key = tuple[int, int, int]  # body, link, shape
 Who = int | tuple[int, int] | Key  # a body, a link or a shape
 Codes = NDArray[np.int64]
 
-Among = Literal["simulated", "all"] | Iterable[tuple[Who, Who]]
+Among = Literal["simulated", "all"] | Iterable[tuple[Who | str, Who | str]]
+Numbered = Literal["simulated", "all"] | Iterable[tuple[Who, Who]]  # without names
+
+
+def listed(pairs: Any) -> list[tuple[Any, Any]]:
+    """Pairs, one by one; bodies or names that are two are one pair. ValueError of what is none."""
+    asked = list(pairs) if isinstance(pairs, Iterable) else None
+    if asked and len(asked) == 2 and all(isinstance(each, (int, str)) for each in asked):
+        asked = [tuple(asked)]
+    if asked is None or not all(isinstance(each, (tuple, list)) and len(each) == 2 for each in asked):
+        raise ValueError(f"pairs must be 'simulated', 'all' or a list of pairs, not {pairs!r}")
+    return [(a, b) for a, b in asked]
 
 
 class AskedPairs:
@@ -25,7 +36,7 @@ class AskedPairs:
         self.layout, self._links = layout, links
         self._listed: tuple[list[tuple[Who, Who]], Codes] | None = None
 
-    def chosen(self, pairs: NDArray[np.int32], among: Among, rules: CollisionRules) -> Mask:
+    def chosen(self, pairs: NDArray[np.int32], among: Numbered, rules: CollisionRules) -> Mask:
         """Which of these pairs of shapes are asked for."""
         first, second = pairs.T
         if among == "all":
@@ -35,7 +46,7 @@ class AskedPairs:
         a, b = self.layout.colliders[first], self.layout.colliders[second]
         return np.asarray((a != b) & rules.allow(a, b))
 
-    def possible(self, among: Among, rules: CollisionRules) -> int:
+    def possible(self, among: Numbered, rules: CollisionRules) -> int:
         """How many pairs of shapes are asked for, wherever they are."""
         if among == "simulated":
             layout = self.layout

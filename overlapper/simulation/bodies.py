@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Literal
 
 import numpy as np
@@ -10,7 +12,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from overlapper import Overlaps, Placed, Shape, overlaps
-from overlapper.simulation.asked_pairs import Among, AskedPairs
+from overlapper.simulation.asked_pairs import Among, AskedPairs, Numbered, Who, listed
 from overlapper.simulation.bullet_contacts import links_in_contact_with_each_other, touching_within_margins
 from overlapper.simulation.collision_rules import CollisionRules, RulesInForce
 from overlapper.simulation.contacts import Contacts
@@ -110,7 +112,7 @@ class Bodies:
         # Of the last overlaps(): what was asked, how many if it was a list, of whom, and what was found.
         self._asked: Literal["simulated", "all"] | int = "simulated"
         self._found = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
-        self._last: tuple[Contacts, AskedPairs, Among, CollisionRules] | None = None
+        self._last: tuple[Contacts, AskedPairs, Numbered, CollisionRules] | None = None
         self._arrange()
         self._refresh()
 
@@ -133,7 +135,7 @@ class Bodies:
         `tolerance`, `method` and `threads` are those of `overlapper.overlaps`, `pairs` is what `Bodies.pairs` is asked
         for. What is found is kept for the next call: pairs of which neither shape has moved by a bit cost nothing.
         """
-        among: Among = pairs if isinstance(pairs, str) else list(pairs)
+        among: Numbered = pairs if isinstance(pairs, str) else self._asked_for(pairs)
         if among == "simulated":
             self._tell_of_self_collision()
         candidates, layout = self.pairs(among), self._layout
@@ -141,7 +143,7 @@ class Bodies:
         self._found = layout.batch.overlaps(
             layout.positions, layout.orientations, candidates, tolerance, threads, method, separated=False
         )
-        contacts = Contacts(layout.key_rows, self._found)
+        contacts = Contacts(layout.key_rows, self._found, self._names)
         self._last = contacts, self._pairs, among, self._in_force.rules
         return contacts
 
@@ -150,12 +152,15 @@ class Bodies:
 
         "simulated" are those that the simulator lets collide, "all" those of different bodies, whatever it does. Any
         other choice is a list of pairs of bodies, links (body, link) or shapes (body, link, shape), as
-        [(robot, table), ((robot, 8), (robot, 3))]; it may name two links of one body, and no filter is asked.
-        A body paired with itself stands for all pairs of its links. ValueError if there is no such body or link.
+        [(robot, table), ((robot, 8), (robot, 3))]; it may name two links of one body, and no filter is asked. Names
+        stand for bodies and links: [("table", "panda/panda_hand")], as `names` has them. One pair of bodies or names
+        needs no list around it. A body paired with itself stands for all pairs of its links. ValueError if there is no
+        such body or link.
         """
+        asked: Numbered = among if isinstance(among, str) else self._asked_for(among)
         layout = self._layout
         pairs: NDArray[np.int32] = layout.batch.candidate_pairs(layout.positions, layout.orientations)
-        return np.asarray(pairs[self._pairs.chosen(pairs, among, self._in_force.rules)])
+        return np.asarray(pairs[self._pairs.chosen(pairs, asked, self._in_force.rules)])
 
     def partners(self) -> dict[tuple[int, int], list[tuple[int, int]]]:
         """The links that the simulator lets each link collide with, by (body, link), of those that have shapes."""
@@ -185,6 +190,10 @@ class Bodies:
         """Take the marks off the bodies, unless another `Bodies` needs them. What was read stays; no update follows."""
         self._closed = True
         self._known.close()
+
+    def __repr__(self) -> str:
+        of = f"{len(self._known.by_id)} bodies, {len(self._layout.keys)} shapes"
+        return f"Bodies({of}{f', {len(self.skipped)} left out' if self.skipped else ''})"
 
     def __enter__(self) -> Bodies:
         return self
@@ -228,7 +237,7 @@ class Bodies:
     @property
     def names(self) -> dict[tuple[int, int], str]:
         """Names like "panda/panda_hand" by (body, link); those that several would share end in "#" and the id."""
-        return self._known.names
+        return dict(self._names)
 
     @property
     def decomposed(self) -> list[Decomposed]:
@@ -265,6 +274,21 @@ class Bodies:
             # The caller of update() or of Bodies() is three calls up.
             warnings.warn(message, SkippedShapeWarning, stacklevel=3)
 
+    def _asked_for(self, pairs: Iterable[tuple[Who | str, Who | str]]) -> list[tuple[Who, Who]]:
+        """The pairs of a list, by numbers. What has been here before comes out as it went in."""
+        return [(self._who(a), self._who(b)) for a, b in listed(pairs)]
+
+    def _who(self, named: Who | str) -> Who:
+        if not isinstance(named, str):
+            return named
+        known: dict[str, Who] = {label: id for id, label in self._labels.items()}
+        known |= {name: link for link, name in self._names.items()}
+        if named not in known:
+            alike = get_close_matches(named, known, 1)
+            hint = f"; {alike[0]!r} is" if alike else ""
+            raise ValueError(f"pairs names {named!r}, which is no body or link in the simulation{hint}")
+        return known[named]
+
     def _lost(self, id: int) -> Skipped:
         return Skipped(id, BASE, self._known.by_id[id].name, "it has no finite pose: the simulation has diverged")
 
@@ -277,6 +301,7 @@ class Bodies:
             (left_out if id in self._nowhere else placed)[id] = body
         self._layout = Layout(self.physicsClientId, placed, known.hidden)
         self._left_out = Layout(self.physicsClientId, left_out, known.hidden)
+        self._names, self._labels = known.names, known.labels
         self._pairs = AskedPairs(self._layout, known.links)
         self._grounds.follow(self._layout, placed)
 

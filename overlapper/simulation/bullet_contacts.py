@@ -8,7 +8,7 @@ import numpy as np
 import pybullet
 
 from overlapper import Hull
-from overlapper.simulation.asked_pairs import Among, AskedPairs
+from overlapper.simulation.asked_pairs import AskedPairs, Numbered
 from overlapper.simulation.collision_rules import CollisionRules
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.recorder import Link
@@ -23,7 +23,7 @@ def links_in_contact_with_each_other(client: int, body: int) -> tuple[int, int] 
 
 
 def touching_within_margins(
-    client: int, found: Contacts, asked: AskedPairs, among: Among, rules: CollisionRules
+    client: int, found: Contacts, asked: AskedPairs, among: Numbered, rules: CollisionRules
 ) -> int:
     """How many pairs of links that were asked for touch in Bullet and not in `found`, one of them by a hull.
 

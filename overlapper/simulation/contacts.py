@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, SupportsIndex, overload
 
@@ -10,6 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Overlap, Overlaps
+from overlapper.columns import MEASURES, Columns, Tabular
+
+STATUS = np.array(["separated", "touching", "overlapping"])  # by the numbers of Overlaps.status
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,18 +33,23 @@ class Contact:
     overlap: Overlap
 
 
-class Contacts(Sequence[Contact]):
+class Contacts(Tabular, Sequence[Contact]):
     """Contacts sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB); each is made when it is looked at, and kept.
 
     `overlaps` has volumes, centroids, normals, depths, gradients and more as arrays, a row per contact, which cost
     nothing more. A slice, a mask or an array of indices picks contacts: `contacts[contacts.overlaps.depth > 1e-3]`.
+    `names` are those of the links, by (body, link). As a table, by `to_pandas()` and its like, contacts have the
+    columns of `overlapper run` but for its steps and poses.
     """
 
-    __slots__ = ("_keys", "_made", "overlaps")
+    __slots__ = ("_keys", "_made", "names", "overlaps")
 
-    def __init__(self, keys: NDArray[np.int64], overlaps: Overlaps) -> None:
+    def __init__(
+        self, keys: NDArray[np.int64], overlaps: Overlaps, names: Mapping[tuple[int, int], str] | None = None
+    ) -> None:
         """`keys` (k, 3) are body, link and shape of what the pairs of `overlaps` index."""
         self.overlaps = overlaps
+        self.names = names or {}
         self._keys = keys
         self._made: list[Contact | None] = [None] * len(overlaps)
 
@@ -59,7 +67,7 @@ class Contacts(Sequence[Contact]):
     def __getitem__(self, which: slice | Sequence[int] | NDArray[Any]) -> Contacts: ...
     def __getitem__(self, which: Any) -> Contact | Contacts:
         if not isinstance(which, SupportsIndex) or isinstance(which, np.ndarray):
-            return Contacts(self._keys, self.overlaps[which])
+            return Contacts(self._keys, self.overlaps[which], self.names)
         row = range(len(self))[which]
         made = self._made[row]
         if made is None:
@@ -75,6 +83,19 @@ class Contacts(Sequence[Contact]):
         return list(self) == list(other) if isinstance(other, (list, Contacts)) else NotImplemented
 
     __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Contacts, (self._keys, self.overlaps, dict(self.names))
+
+    def _columns(self) -> Columns:
+        found = self.overlaps
+        keys = self.keys
+        columns: Columns = {}
+        for side, at in (("A", keys[:, :3]), ("B", keys[:, 3:])):
+            columns |= {f"{word}{side}": values for word, values in zip(("body", "link", "shape"), at.T)}
+            columns[f"name{side}"] = [self.names.get((body, link)) for body, link in at[:, :2].tolist()]
+        measures = [found.volume, found.volume_error, *found.centroid.T, found.area, found.depth, *found.normal.T]
+        return columns | {"status": STATUS[found.status].tolist()} | dict(zip(MEASURES, measures))
 
     def __repr__(self) -> str:
         return f"Contacts({len(self)}, {int((self.overlaps.status == Overlaps.OVERLAPPING).sum())} of them overlapping)"

@@ -65,9 +65,14 @@ class KnownBodies:
         return {id: body.link_names for id, body in self.by_id.items()}
 
     @property
+    def labels(self) -> dict[int, str]:
+        """Names of the bodies; those that several would share end in "#" and the id."""
+        return _distinct({id: body.name for id, body in self.by_id.items()})
+
+    @property
     def names(self) -> dict[tuple[int, int], str]:
-        """By (body, link); those that several would share end in "#" and the id."""
-        labels = _distinct({id: body.name for id, body in self.by_id.items()})
+        """By (body, link): label and link, of which what several would share ends in "#" and its number."""
+        labels = self.labels
         return {
             (id, link): f"{labels[id]}/{name}"
             for id, body in self.by_id.items()

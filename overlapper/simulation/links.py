@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Literal
@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper.columns import MEASURES, Columns, Tabular
+from overlapper.simulation.contacts import Contact, Contacts
 from overlapper.union import UnionOverlap, of_pair, of_pairs
 
 if TYPE_CHECKING:
     from overlapper import Placed
-    from overlapper.simulation.contacts import Contact
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,18 @@ class LinkContact:
         return self.overlap.centroid
 
     @property
+    def gradient(self) -> NDArray[np.float64]:
+        """(2, 6) d volume / d (translation, rotation vector) of A's link and of B's, m² and m³: about the point
+        `overlap.about`, world axes; zeros unless overlapping."""
+        return self.overlap.gradient
+
+    @property
+    def patch_area(self) -> NDArray[np.float64]:
+        """(3,) m², the area vector of what the union of A's shapes holds of the surface of B's, from B to A: as
+        gradient[1, :3]; zeros unless overlapping."""
+        return self.gradient[1, :3]
+
+    @property
     def deepest(self) -> Contact:
         return max(self.contacts, key=lambda contact: contact.overlap.depth or 0.0)
 
@@ -72,10 +85,39 @@ class LinkContact:
         return normal
 
 
-def link_contacts(contacts: Iterable[Contact]) -> list[LinkContact]:
+class LinkContacts(Tabular, list[LinkContact]):
+    """A list of them; `names` are those of the links, by (body, link). As a table, by `to_pandas()` and its like, they
+    have the columns of `overlapper run --links` but for its steps; the area is missing."""
+
+    __slots__ = ("names",)
+
+    def __init__(self, pairs: Iterable[LinkContact] = (), names: Mapping[tuple[int, int], str] | None = None) -> None:
+        super().__init__(pairs)
+        self.names = names or {}
+
+    def _columns(self) -> Columns:
+        columns: Columns = {}
+        for side, links in (
+            ("A", [(pair.bodyA, pair.linkA) for pair in self]),
+            ("B", [(pair.bodyB, pair.linkB) for pair in self]),
+        ):
+            at = np.array(links, np.int64).reshape(-1, 2)
+            columns |= {f"body{side}": at[:, 0], f"link{side}": at[:, 1]}
+            columns[f"name{side}"] = [self.names.get(link) for link in links]
+        missing = [np.nan] * 3
+        measures = [
+            [p.volume, p.volume_error, *(missing if p.centroid is None else p.centroid), np.nan, p.depth, *p.normal]
+            for p in self
+        ]
+        status = [pair.status for pair in self]
+        return columns | {"status": status} | dict(zip(MEASURES, np.array(measures).reshape(-1, len(MEASURES)).T))
+
+
+def link_contacts(contacts: Iterable[Contact]) -> LinkContacts:
     """The contacts that `Bodies.overlaps` found, per pair of links, sorted by (bodyA, linkA, bodyB, linkB)."""
     ordered = sorted(contacts, key=lambda each: (*_links(each), each.shapeA, each.shapeB))
-    return [LinkContact(*links, (each := tuple(group)), _union(each)) for links, group in groupby(ordered, _links)]
+    pairs = [LinkContact(*links, (each := tuple(group)), _union(each)) for links, group in groupby(ordered, _links)]
+    return LinkContacts(pairs, contacts.names if isinstance(contacts, Contacts) else None)
 
 
 def _links(contact: Contact) -> tuple[int, int, int, int]:

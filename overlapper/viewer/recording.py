@@ -116,6 +116,10 @@ class Recording:
         for pair, overlap in pairs(bodies, contacts).items():
             self._add_overlap(self._stage, pair, overlap)
 
+    def __repr__(self) -> str:
+        until = f", {self._times[-1]:g} s" if self._times else ""
+        return f"Recording({len(self._times)} frames{until}, {len(self._pairs)} pairs)"
+
     def save(self, path: str | Path) -> Path:
         """Write what was added so far to one HTML file, and return its path."""
         if self._stage is None:

@@ -1,11 +1,16 @@
 """What bodies of a simulation share, pair by pair, and by what names and in what colours."""
 
+import pickle
+import re
+import sys
+
 import pybullet as p
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from simulated import body, box, random_robot
 
-from overlapper.simulation import Bodies
+from overlapper.scenes.table import COLUMNS
+from overlapper.simulation import Bodies, SkippedShapeWarning, link_contacts
 
 # --- overlaps
 
@@ -202,3 +207,59 @@ def test_every_shape_has_a_colour_and_a_name(client, tmp_path):
     bodies = Bodies(client)
     links = {key[:2] for key in bodies.keys}
     assert links <= bodies.colors.keys() and links <= bodies.names.keys()
+
+
+# --- as tables
+
+
+def a_cube_in_two_others(client):
+    for position in ([0, 0, 0], [0, 0, 0.9], [0.5, 0, -0.5], [1, 0, 0]):
+        box(client, position=position)
+    return Bodies(client)
+
+
+@pytest.mark.parametrize("by_links", [False, True])
+def test_contacts_are_a_table_of_pandas_polars_and_arrow(client, by_links):
+    found = a_cube_in_two_others(client).overlaps()
+    rows = link_contacts(found) if by_links else found
+    touching = [contact.overlap.status == "touching" for contact in found]
+    assert any(touching) and not all(touching)
+    frame, polar, arrow = rows.to_pandas(), rows.to_polars(), rows.to_arrow()
+    assert [*frame.columns] == polar.columns == arrow.column_names
+    left_out = {"step", "time_s", *(name for name in COLUMNS if name.startswith(("position", "orientation", "fcl")))}
+    if by_links:
+        left_out |= {"shapeA", "shapeB"}
+    assert {*frame.columns} == {*COLUMNS} - left_out
+    assert_array_equal(frame.volume_m3, [each.volume if by_links else each.overlap.volume for each in rows])
+    assert [*frame.nameA] == [found.names[each.bodyA, each.linkA] for each in rows]
+    assert [*frame.status] == ["touching" if each else "overlapping" for each in touching]
+    assert [*frame.centroid_x_m.isna()] == touching
+    assert polar["centroid_x_m"].is_null().to_list() == arrow["centroid_x_m"].is_null().to_pylist() == touching
+    assert polar["bodyB"].to_list() == arrow["bodyB"].to_pylist() == [each.bodyB for each in rows]
+    assert polar["depth_m"].to_list() == arrow["depth_m"].to_pylist() == [*frame.depth_m]
+    empty = found[:0]
+    assert [*(link_contacts(empty) if by_links else empty).to_pandas().columns] == [*frame.columns]
+
+
+@pytest.mark.parametrize("library", ["pandas", "polars", "pyarrow"])
+def test_a_table_names_the_library_that_it_needs(client, monkeypatch, library):
+    contacts = a_cube_in_two_others(client).overlaps()
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(ImportError, match=f"^a table of {library} needs {library}: pip install {library}$"):
+        getattr(contacts, "to_arrow" if library == "pyarrow" else f"to_{library}")()
+
+
+def test_contacts_are_pickled_with_their_names(client):
+    contacts = a_cube_in_two_others(client).overlaps()
+    again = pickle.loads(pickle.dumps(contacts))
+    assert again.names == contacts.names and again.to_pandas().equals(contacts.to_pandas())
+
+
+def test_what_is_found_says_what_it_is(client):
+    bodies = a_cube_in_two_others(client)
+    assert repr(bodies) == "Bodies(4 bodies, 4 shapes)"
+    assert re.fullmatch(r"Contacts\(\d+, \d of them overlapping\)", repr(bodies.overlaps()))
+    p.resetBasePositionAndOrientation(0, [float("nan")] * 3, [0, 0, 0, 1], physicsClientId=client)
+    with pytest.warns(SkippedShapeWarning):
+        bodies.update()
+    assert repr(bodies) == "Bodies(4 bodies, 3 shapes, 1 left out)"

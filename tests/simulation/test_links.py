@@ -55,6 +55,10 @@ def test_bars_that_cross_share_their_middle_once(client):
     assert abs(pair.volume - exact) <= pair.volume_error + 1e-15 and pair.volume_error < 1e-12
     assert_allclose(pair.centroid[1:], 0, atol=1e-12)
     deepest = max(contacts, key=lambda contact: contact.overlap.depth)
+    assert_allclose(pair.gradient, pair.overlap.gradient)
+    assert_allclose(pair.patch_area, -pair.gradient[0, :3], atol=1e-12)
+    # As the box moves along x, the volume changes by the cross-section in its face.
+    assert_allclose(pair.patch_area, [-0.2, 0, 0], atol=1e-12)
     assert pair.deepest is deepest
     assert pair.depth == deepest.overlap.depth
     assert_array_equal(pair.normal, deepest.overlap.normal)

@@ -453,3 +453,37 @@ def test_rules_count_the_pairs_that_they_allow(seed):
         assert bool(allowed) == bool(should), (links[i], links[j])
         expected += int(weights[i] * weights[j]) * bool(allowed)
     assert rules.count(weights) == expected
+
+
+def test_pairs_are_asked_for_by_name_and_one_pair_without_a_list(client, tmp_path):
+    p.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
+    plane = p.loadURDF("plane.urdf", physicsClientId=client)
+    robot = chain(client, tmp_path)
+    bodies = Bodies(client)
+    of_all = [(each.bodyA, each.linkA, each.bodyB, each.linkB) for each in bodies.overlaps(pairs=[(plane, robot)])]
+    assert len(of_all) == 4
+    for pairs in ((plane, robot), [plane, robot], ("plane", "chain"), [("plane", robot)], [("chain", "plane")]):
+        found = bodies.overlaps(pairs=pairs)
+        assert [(each.bodyA, each.linkA, each.bodyB, each.linkB) for each in found] == of_all
+        assert len(bodies.pairs(pairs)) == 4 and bodies.report().pairs_possible == 4
+    (one,) = bodies.overlaps(pairs=("plane", "chain/l2"))
+    assert (one.bodyB, one.linkB) == (robot, 1)
+    assert len(bodies.overlaps(pairs=("chain/l0", "chain/l3"))) == 1
+
+
+@pytest.mark.parametrize("pairs", [5, None, ["plane"], (0,), (0, 1.5), [("a", "b", "c")], [0, 1, 2], [5, (0, 1)]])
+def test_what_is_no_list_of_pairs_is_refused(client, pairs):
+    box(client)
+    with pytest.raises(ValueError, match=r"^pairs must be 'simulated', 'all' or a list of pairs, not "):
+        Bodies(client).overlaps(pairs=pairs)
+
+
+def test_a_name_that_nobody_has_is_refused_with_the_nearest_one(client, tmp_path):
+    chain(client, tmp_path)
+    bodies = Bodies(client)
+    with pytest.raises(
+        ValueError, match=r"^pairs names 'chaim', which is no body or link in the simulation; 'chain' is$"
+    ):
+        bodies.overlaps(pairs=[("chaim", "chain")])
+    with pytest.raises(ValueError, match=r"^pairs names 'xyz', which is no body or link in the simulation$"):
+        bodies.pairs(("xyz", "chain"))

@@ -178,13 +178,53 @@ nb::object overlap_of_row(const Overlaps& overlaps, size_t row) {
   return answer;
 }
 
+const char* method_name(const Overlaps& o) { return o.method == Method::kAuto ? "auto" : "paper"; }
+
+nb::list shape_list(const std::vector<Shape>& shapes) {
+  nb::list list;
+  for (const Shape& shape : shapes) list.append(to_python(shape));
+  return list;
+}
+
+/// What the rows are of: their arrays are computed again, to the same bits.
+nb::tuple state_of(const Overlaps& self) {
+  std::vector<double> positions, orientations;
+  for (const PoseNumbers& pose : *self.poses) {
+    positions.insert(positions.end(), pose.begin(), pose.begin() + 3);
+    orientations.insert(orientations.end(), pose.begin() + 3, pose.end());
+  }
+  std::vector<int> pairs;
+  for (const IndexPair& pair : self.pairs) pairs.insert(pairs.end(), pair.begin(), pair.end());
+  const size_t k = self.poses->size();
+  return nb::make_tuple(shape_list(*self.shapes), to_numpy<Matrix>(std::move(positions), {k, 3}),
+                        to_numpy<Matrix>(std::move(orientations), {k, 4}),
+                        to_numpy<IndexMatrix>(std::move(pairs), {self.size(), 2}), self.tolerance, method_name(self),
+                        self.examined, self.planes_asked);
+}
+
+size_t to_count(nb::handle given) {
+  std::int64_t count = 0;
+  if (!nb::try_cast<std::int64_t>(given, count) || count < 0) throw nb::value_error("state must be that of overlaps");
+  return static_cast<size_t>(count);
+}
+
+void set_state(Overlaps& self, nb::handle state) {
+  if (!nb::isinstance<nb::tuple>(state) || nb::len(state) != 8) throw nb::value_error("state must be that of overlaps");
+  const size_t examined = to_count(state[6]), planes_asked = to_count(state[7]);
+  Batch batch(to_shapes(state[0]));
+  const nb::object found = batch_overlaps(batch, state[1], state[2], state[3], state[4], nb::int_(1), state[5], true);
+  new (&self) Overlaps(std::move(nb::cast<Overlaps&>(found)));
+  self.examined = examined, self.planes_asked = planes_asked;
+}
+
 void define_overlaps_class(nb::module_& m) {
   nb::class_<Overlaps> cls(
       m, "Overlaps",
       R"(What many pairs of shapes share: an array per quantity, a row per pair. SI units, world coordinates.
 
 The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again
-unless it took long and its Batch has not been asked since; `overlaps[mask]`, a slice or an array of indices picks rows.)");
+unless it took long and its Batch has not been asked since; `overlaps[mask]`, a slice or an array of indices picks rows.
+A pickle has the shapes and their poses, of which the rows are computed again, to the same bits.)");
   define_columns(cls);
   for (const auto& [name, status] : {std::pair{"SEPARATED", Status::kSeparated},
                                      {"TOUCHING", Status::kTouching},
@@ -199,9 +239,7 @@ unless it took long and its Batch has not been asked since; `overlaps[mask]`, a 
       R"(How many planes of the shapes were asked for in that call: placed to be held against corners, or given by a shape
 as an answer to where a ray leaves it or which of its planes is tightest about a point.)");
   cls.def_ro("tolerance", &Overlaps::tolerance);
-  cls.def_prop_ro(
-      "method", [](const Overlaps& o) { return o.method == Method::kAuto ? "auto" : "paper"; },
-      nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
+  cls.def_prop_ro("method", &method_name, nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
   cls.def("__len__", &Overlaps::size);
   cls.def(
       "__getitem__",
@@ -218,6 +256,8 @@ as an answer to where a ray leaves it or which of its planes is tightest about a
     const auto overlapping = std::count(self.status.begin(), self.status.end(), int(Status::kOverlapping));
     return "Overlaps(" + std::to_string(self.size()) + " pairs, " + std::to_string(overlapping) + " overlapping)";
   });
+  cls.def("__getstate__", &state_of, nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+  cls.def("__setstate__", &set_state, nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
 #define OVERLAPPER_SHAPES \
@@ -244,10 +284,23 @@ void define_batch_class(nb::module_& m) {
 
 `overlaps` is the function of that name for these shapes. What it finds is kept for its next call: pairs of which
 neither has moved by a bit cost nothing, and pairs that are still apart along the same axis next to nothing. The
-answers are those of a first call to the last bit. Threads that ask at the same time get their answers without waiting.)");
+answers are those of a first call to the last bit. Threads that ask at the same time get their answers without waiting.
+A pickle has the shapes alone.)");
   cls.def(
       "__init__", [](Batch* self, nb::handle shapes) { new (self) Batch(to_shapes(shapes)); }, "shapes"_a.none(),
       nb::sig("def __init__(self, shapes: " OVERLAPPER_SHAPES ") -> None"));
+  cls.def("__repr__", [](const Batch& self) { return "Batch(" + std::to_string(self.shapes().size()) + " shapes)"; });
+  cls.def(
+      "__getstate__", [](const Batch& self) { return nb::make_tuple(shape_list(self.shapes())); },
+      nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+  cls.def(
+      "__setstate__",
+      [](Batch& self, nb::handle state) {
+        if (!nb::isinstance<nb::tuple>(state) || nb::len(state) != 1)
+          throw nb::value_error("state must be that of a batch");
+        new (&self) Batch(to_shapes(state[0]));
+      },
+      nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
   cls.def("overlaps", &batch_overlaps, "positions"_a.none(), "orientations"_a.none(), "pairs"_a.none() = nb::none(),
           "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1, "method"_a.none() = "auto", "separated"_a = true,
           nb::sig("def overlaps(self, " OVERLAPPER_POSES ", pairs: numpy.typing.ArrayLike | None = None, "

@@ -13,10 +13,6 @@ nb::object wrap(const T& value) {
   return nb::cast(value);
 }
 
-nb::object to_python(const Shape& shape) {
-  return std::visit([](const auto& s) { return wrap(s); }, shape);
-}
-
 template <class... Types>
 bool try_shapes(nb::handle value, Shape& shape, std::variant<Types...>*) {
   return ((nb::isinstance<Types>(value) && (shape = nb::cast<Types>(value), true)) || ...);
@@ -25,6 +21,10 @@ bool try_shapes(nb::handle value, Shape& shape, std::variant<Types...>*) {
 bool is_shape(nb::handle value, Shape& shape) { return try_shapes(value, shape, static_cast<Shape*>(nullptr)); }
 
 }  // namespace
+
+nb::object to_python(const Shape& shape) {
+  return std::visit([](const auto& s) { return wrap(s); }, shape);
+}
 
 Shape to_shape(nb::handle value, const std::string& name) {
   Shape shape;

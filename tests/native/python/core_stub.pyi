@@ -721,6 +721,7 @@ class Overlaps:
 
     The arrays are read-only views. `overlaps[i]` is the Overlap of row i with all that can be asked of it, computed again
     unless it took long and its Batch has not been asked since; `overlaps[mask]`, a slice or an array of indices picks rows.
+    A pickle has the shapes and their poses, of which the rows are computed again, to the same bits.
     """
 
     @property
@@ -832,6 +833,10 @@ class Overlaps:
 
     def __repr__(self) -> str: ...
 
+    def __getstate__(self) -> tuple[object, ...]: ...
+
+    def __setstate__(self, state: tuple[object, ...]) -> None: ...
+
 class Batch:
     """
     Shapes that are asked for their overlaps again and again as they move.
@@ -839,9 +844,16 @@ class Batch:
     `overlaps` is the function of that name for these shapes. What it finds is kept for its next call: pairs of which
     neither has moved by a bit cost nothing, and pairs that are still apart along the same axis next to nothing. The
     answers are those of a first call to the last bit. Threads that ask at the same time get their answers without waiting.
+    A pickle has the shapes alone.
     """
 
     def __init__(self, shapes: Sequence[Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace]) -> None: ...
+
+    def __repr__(self) -> str: ...
+
+    def __getstate__(self) -> tuple[object, ...]: ...
+
+    def __setstate__(self, state: tuple[object, ...]) -> None: ...
 
     def overlaps(self, positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
         """

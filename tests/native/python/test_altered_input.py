@@ -7,7 +7,20 @@ import numpy as np
 import pytest
 from strategies import hull_points
 
-from overlapper import Batch, Box, Hull, Overlap, Placed, RoundedHull, Sphere, _core, overlap, overlaps
+from overlapper import (
+    Batch,
+    Box,
+    HalfSpace,
+    Hull,
+    Overlap,
+    Overlaps,
+    Placed,
+    RoundedHull,
+    Sphere,
+    _core,
+    overlap,
+    overlaps,
+)
 
 POSES = np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
 CUBE = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
@@ -58,7 +71,7 @@ def test_a_surface_that_is_no_hull_is_refused(triangles):
 
 @pytest.mark.parametrize("state", [(), ((), 0.1), (None, 0.1), 3])
 def test_a_state_of_another_kind_is_refused(state):
-    for kind in (Hull, RoundedHull, Overlap):
+    for kind in (Hull, RoundedHull, Overlap, Overlaps, Batch):
         with pytest.raises(ValueError, match="state must be that of"):
             kind.__new__(kind).__setstate__(state)
 
@@ -73,6 +86,49 @@ def test_an_altered_state_of_a_rounded_hull_or_an_overlap_is_refused():
     for state in ((bare, 0.1, "auto"), (bodies, 2.0, "auto"), (bodies, 0.1, "car"), (bodies[:1], 0.1, "auto")):
         with pytest.raises(ValueError, match=r"^[^\n]+$"):
             Overlap.__new__(Overlap).__setstate__(state)
+
+
+def some_overlaps(**options):
+    shapes = [Box([1, 1, 1]), Sphere(1.0), RoundedHull(CUBE, 0.1), HalfSpace([0, 0, 1], 0)]
+    places = [[0, 0, 0], [0.5, 0, 0], [5, 0, 0], [0, 0, 0]]
+    return Batch(shapes).overlaps(places, [[0, 0, 0, 1], [0, 0, 0, 2], [0.5, 1, 0, 0], [0, 0, 0, 1]], **options)
+
+
+@pytest.mark.parametrize("options", [{}, {"pairs": [[2, 0], [0, 1], [0, 2]]}, {"pairs": np.empty((0, 2), int)}])
+def test_pickled_overlaps_are_the_same_to_the_last_bit(options):
+    found = some_overlaps(tolerance=0.01, **options)
+    again = pickle.loads(pickle.dumps(found))
+    for name in ("pairs", "status", "way", "volume", "volume_error", "centroid", "normal", "gradient", "patch_moments"):
+        assert getattr(again, name).tobytes() == getattr(found, name).tobytes()
+    for name in ("examined", "planes_asked", "tolerance", "method"):
+        assert getattr(again, name) == getattr(found, name)
+
+
+def test_a_pickled_batch_has_its_shapes():
+    batch = Batch([Box([1, 1, 1]), Sphere(1.0)])
+    again = pickle.loads(pickle.dumps(batch))
+    assert repr(again) == repr(batch) == "Batch(2 shapes)"
+    assert again.overlaps(*POSES).volume.tobytes() == batch.overlaps(*POSES).volume.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "message"),
+    [
+        (0, ("box",) * 4, r"^shapes\[0\] must be"),
+        (1, np.full((4, 3), np.nan), "^pose 0: position must"),
+        (2, np.zeros((4, 4)), "^pose 0: orientation must not be"),
+        (3, [[0, 9]], "^pairs must index the 4 shapes, not 9$"),
+        (4, 2.0, "^tolerance must"),
+        (5, "car", "^method must"),
+        (6, -1, "^state must be that of overlaps$"),
+        (7, "many", "^state must be that of overlaps$"),
+    ],
+)
+def test_an_altered_state_of_overlaps_is_refused(place, value, message):
+    state = list(some_overlaps().__getstate__())
+    state[place] = value
+    with pytest.raises((ValueError, TypeError), match=message):
+        Overlaps.__new__(Overlaps).__setstate__(tuple(state))
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -1,0 +1,62 @@
+"""What was found as a table of pyarrow, pandas or polars: columns with their units, a row per pair."""
+
+from __future__ import annotations
+
+import importlib
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from overlapper.install import hint
+
+if TYPE_CHECKING:
+    import pandas
+    import polars
+    import pyarrow
+
+# The measures of a pair, in the order of the columns; the unit is in the name. The centroid is missing of a pair that
+# only touches, `normal` points from B to A.
+MEASURES = [
+    "volume_m3",
+    "volume_error_m3",
+    *[f"centroid_{axis}_m" for axis in "xyz"],
+    "area_m2",
+    "depth_m",
+    *[f"normal_{axis}" for axis in "xyz"],
+]
+
+Columns = dict[str, NDArray[Any] | Sequence[Any]]
+
+
+class Tabular(ABC):
+    """What has rows, and columns of them. A number that is missing is null, and in pandas not a number."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def _columns(self) -> Columns:
+        """By name, all of one length; numbers that are missing are not numbers."""
+
+    def to_arrow(self) -> pyarrow.Table:
+        """A pyarrow.Table, columns as those of `overlapper run`. ImportError without pyarrow."""
+        arrow = _library("pyarrow")
+        return arrow.table({name: arrow.array(values, from_pandas=True) for name, values in self._columns().items()})
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame, columns as those of `overlapper run`. ImportError without pandas."""
+        frame: pandas.DataFrame = _library("pandas").DataFrame(self._columns())
+        return frame
+
+    def to_polars(self) -> polars.DataFrame:
+        """A polars.DataFrame, columns as those of `overlapper run`. ImportError without polars."""
+        frame: polars.DataFrame = _library("polars").DataFrame(self._columns(), nan_to_null=True)
+        return frame
+
+
+def _library(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise ImportError(f"a table of {name} needs {hint(name)}") from error
