@@ -762,6 +762,18 @@ def folded_hulls(rng):
     return Case(f"{type(shape).__name__} and {margin:g}", fold, bodies if rng.random() < 0.5 else bodies[::-1])
 
 
+def tilted_round(rng):
+    """A rounded box and a cylinder or another, turned by quarters and by about `parameter`, so that planes of the one
+    are nearly parallel to planes and axes of the other."""
+    tilt = power(rng, -11, -4)
+    quarter = [(0, 0, 0, 1), (0, 0, 1, 1), (1, 0, 0, 1), (0, 1, 0, 1), (1, 1, 1, 1)][int(rng.integers(5))]
+    turned = turned_by(np.append(tilt * rng.normal(size=3), 1.0), np.array(quarter, float))
+    one, other = (RoundedHull(CORNERS * rng.uniform(0.3, 1, 3), rng.uniform(0.1, 0.5)) for _ in range(2))
+    second = other if rng.random() < 0.5 else Cylinder(rng.uniform(0.3, 1), rng.uniform(0.5, 2))
+    bodies = Placed(one), Placed(second, rng.uniform(-1, 1, 3), turned)
+    return Case(type(second).__name__, tilt, bodies if rng.random() < 0.5 else bodies[::-1])
+
+
 def flush_round(rng):
     """Two bodies about one axis, one of them round, that share surfaces, or do but for rounding. What they have in
     common is the smaller, or the part of it up to a plane in which a capsule becomes a half ball."""
@@ -916,8 +928,8 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
-        round_contacts, rounded_hulls, rounded_meshes, folded_hulls, flush_round, special_poses, ellipsoids,
-        posed_ellipsoids,
+        round_contacts, rounded_hulls, rounded_meshes, folded_hulls, tilted_round, flush_round, special_poses,
+        ellipsoids, posed_ellipsoids,
     )
 }  # fmt: skip
 

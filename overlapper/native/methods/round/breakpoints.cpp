@@ -331,6 +331,7 @@ class Settling {
       if (values[i] >= low_ && values[i + 1] <= high_ && values[i + 1] - values[i] > least &&
           !settle(values[i], values[i + 1]))
         return false;
+    if (!intervals_.empty()) refine();
     return true;
   }
 
@@ -414,6 +415,30 @@ class Settling {
     }
     append(from, high, seen[samples - 1]);
     return true;
+  }
+
+  /// Near the origin doubles are finer than what the equations of breakpoints leave: there, changes of the outline are
+  /// found again, to the last bit that outlines know.
+  void refine() {
+    constexpr double kFine = 1e-6, kRounding = 1e-15;
+    const double range = stack_.high - stack_.low, away = kRounding * range;
+    for (size_t i = 0; i <= intervals_.size(); ++i) {
+      double* end = i > 0 ? &intervals_[i - 1].high : nullptr;
+      double* begin = i < intervals_.size() ? &intervals_[i].low : nullptr;
+      const double t = begin ? *begin : *end;
+      if (!(std::abs(t) < kFine * range)) continue;
+      double low = t - away, high = t + away;
+      if ((end && !(low > intervals_[i - 1].low)) || (begin && !(high < intervals_[i].high))) continue;
+      const Outline before = end ? intervals_[i - 1].outline : Outline{};
+      if (!(at(low) == before) || !(at(high) == (begin ? intervals_[i].outline : Outline{}))) continue;
+      for (int step = 0; step < 60; ++step) {
+        const double middle = low + (high - low) / 2;
+        if (middle <= low || middle >= high) break;
+        (at(middle) == before ? low : high) = middle;
+      }
+      if (end) *end = begin ? high : low;
+      if (begin) *begin = high;
+    }
   }
 
   /// The slice there is looked at first.

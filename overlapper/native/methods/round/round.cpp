@@ -99,6 +99,7 @@ class Measuring {
     if (!around) return add_stack();
     // Axes of slices are chosen by what is near the point that coordinates count from.
     const Vec3 middle = around->middle();
+    if (const std::optional<Vec3> beside = slicing::beside_rushing(rounds_, walls_, middle)) return add_about(*beside);
     return add_about(around->excludes({}) ? middle : Vec3{});
   }
 
@@ -190,7 +191,7 @@ class Measuring {
   template <class Use>
   bool any_two(double side, Use use) {
     constexpr Vec3 kAcross{0.3141, 0.5926, 0.7417};
-    constexpr double kEqual = 1e-12;  // beyond the rounding of these lengths
+    const double equal = std::max(1e-12, 2 * layer / extent);  // beyond the rounding of these lengths
     constexpr size_t kMany = 24;
     by_length_.clear();
     for (int i = 0; i < static_cast<int>(walls_.size()); ++i)
@@ -198,7 +199,7 @@ class Measuring {
     const bool many = walls_.size() > kMany;
     if (many) std::ranges::sort(by_length_);
     for (const auto& [length, i] : by_length_) {
-      const double least = side * length - kEqual, most = side * length + kEqual;
+      const double least = side * length - equal, most = side * length + equal;
       auto other = many ? std::ranges::lower_bound(by_length_, std::pair{least, -1}) : by_length_.begin();
       for (; other != by_length_.end() && !(many && other->first > most); ++other)
         if (other->first >= least && other->first <= most && other->second != i &&
@@ -677,7 +678,8 @@ class Measuring {
 
   /// Whether there is something between where intervals end and where a quadric does.
   static bool holds_to(const slicing::Stack& stack, double t, double end) {
-    return t == end || !slicing::outline(slicing::Slice(stack, t + (end - t) / 2)).empty();
+    const double middle = t + (end - t) / 2;
+    return t == end || !slicing::outline(slicing::Slice(stack, middle == end ? t : middle)).empty();
   }
 
   /// What slices that are drawn out to the end of a quadric leave there is a face as thin as rounding.
@@ -739,8 +741,8 @@ class Measuring {
 
 /// The fraction of a volume that may stay open before slices are looked at more closely, or others are.
 constexpr double kMostOpen = 1e-11;
-/// The fraction of a volume that may lie between planes that are taken for one.
-constexpr double kLayer = 1e-12;
+/// The fraction of a volume that may lie between planes that are taken for one, and where nothing else closes.
+constexpr double kLayer = 1e-12, kWideLayer = 1e-9;
 /// Beyond that fraction of a volume, something is wrong. Polytopes of tangent planes take seconds to be as good.
 constexpr double kMostError = 1e-8;
 
@@ -1042,10 +1044,12 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   measuring.closely = true;
   if (!(open() <= kMostOpen * totals.volume)) try_again();
   // Or faces and cuts lie so near each other that rounding tells which of them is where. Then they are one.
-  if (!(open() <= kMostOpen * totals.volume)) {
-    measuring.layer = kLayer * totals.volume / totals.area, measuring.surface = totals.area;
+  const auto try_layer = [&](double part) {
+    measuring.layer = part * totals.volume / totals.area, measuring.surface = totals.area;
     try_again();
-  }
+  };
+  if (!(open() <= kMostOpen * totals.volume)) try_layer(kLayer);
+  if (!(off() <= kMostError * totals.volume)) try_layer(kWideLayer);
   RoundMeasures result;
   result.volume = totals.volume;
   result.volume_error = totals.error + open();
