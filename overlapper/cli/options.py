@@ -2,9 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+
+from overlapper.cli.refusals import Refused
+
+OutOption = Annotated[Path | None, typer.Option(help="Table of all pairs in all steps: .csv, .parquet, .sqlite.")]
+
+HtmlOption = Annotated[Path | None, typer.Option(help="Recording to look at in a browser, one file.")]
+
+CheckOption = Annotated[
+    Literal["fcl"] | None, typer.Option(help="Ask FCL about every pair, too, and explain what differs.")
+]
+
+ToleranceOption = Annotated[float, typer.Option(help="Relative accuracy of smooth shapes; polyhedra are exact.")]
+
+PerOption = Annotated[
+    Literal["shape", "link"], typer.Option(help="What the rows of --out are of: two shapes, or two links as a whole.")
+]
 
 MethodOption = Annotated[
     Literal["auto", "paper"], typer.Option(help="How overlaps are computed; `paper` is the article, step for step.")
@@ -23,3 +40,15 @@ ConcaveOption = Annotated[
 ThresholdOption = Annotated[
     float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
 ]
+
+
+def refuse_out_of_range(tolerance: float, concave_threshold: float, out: Path | None) -> None:
+    """Refuse what types cannot."""
+    from overlapper.scenes.table_file import TABLES
+
+    if not 0 < tolerance < 1:
+        raise Refused(f"--tolerance must lie between 0 and 1, not {tolerance}")
+    if out and out.suffix not in TABLES:
+        raise Refused(f"--out must end in {', '.join(TABLES)}, not {out.name!r}")
+    if not 0.01 <= concave_threshold <= 1:
+        raise Refused(f"--concave-threshold must lie between 0.01 and 1, not {concave_threshold}")

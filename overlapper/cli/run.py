@@ -4,22 +4,32 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
 
-from overlapper.cli.options import ConcaveOption, MethodOption, SurfaceOption, ThresholdOption
-from overlapper.cli.recorded import recorder, with_progress
+from overlapper.cli.options import (
+    CheckOption,
+    ConcaveOption,
+    HtmlOption,
+    MethodOption,
+    OutOption,
+    PerOption,
+    SurfaceOption,
+    ThresholdOption,
+    ToleranceOption,
+    refuse_out_of_range,
+)
+from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Refused, quiet, say, scene_refusals, without_banner
 from overlapper.scenes.scene import load_scene
 
 if TYPE_CHECKING:
-    from overlapper.cli.summary import Summary
-    from overlapper.scenes.table_file import Table
+    from overlapper.scenes.summary import Summary
 
 
 def run(
@@ -27,17 +37,12 @@ def run(
     steps: Annotated[
         int | None, typer.Option(min=1, help="Steps to simulate; by default as many as the scene says.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Table of all pairs in all steps: .csv, .parquet, .sqlite.")] = None,
-    html: Annotated[Path | None, typer.Option(help="Recording to look at in a browser, one file.")] = None,
-    check: Annotated[
-        Literal["fcl"] | None, typer.Option(help="Ask FCL about every pair, too, and explain what differs.")
-    ] = None,
+    out: OutOption = None,
+    html: HtmlOption = None,
+    check: CheckOption = None,
     method: MethodOption = "auto",
-    tolerance: Annotated[float, typer.Option(help="Relative accuracy of smooth shapes; polyhedra are exact.")] = 1e-3,
-    per: Annotated[
-        Literal["shape", "link"],
-        typer.Option(help="What the rows of --out are of: two shapes, or two links as a whole."),
-    ] = "shape",
+    tolerance: ToleranceOption = 1e-3,
+    per: PerOption = "shape",
     concave: ConcaveOption = "decompose",
     concave_threshold: ThresholdOption = 0.05,
     surface: SurfaceOption = "nominal",
@@ -62,14 +67,7 @@ def run(
 
     [bold]overlapper run kuka_jenga --check fcl --json[/bold]  compared with FCL, for a program to read
     """
-    from overlapper.scenes.table_file import TABLES
-
-    if not 0 < tolerance < 1:
-        raise Refused(f"--tolerance must lie between 0 and 1, not {tolerance}")
-    if out and out.suffix not in TABLES:
-        raise Refused(f"--out must end in {', '.join(TABLES)}, not {out.name!r}")
-    if not 0.01 <= concave_threshold <= 1:
-        raise Refused(f"--concave-threshold must lie between 0.01 and 1, not {concave_threshold}")
+    refuse_out_of_range(tolerance, concave_threshold, out)
     geometry = {
         "tolerance": tolerance,
         "method": method,
@@ -111,61 +109,24 @@ def _measure(
     with quiet() as noise, scene_refusals(noise), ExitStack() as stack:
         with without_banner():
             from overlapper.scenes.run import run as frames_of
-            from overlapper.simulation import link_contacts
-        from overlapper.cli.summary import Summary
         from overlapper.reference import Fcl
-        from overlapper.scenes.table import link_rows, rows
-        from overlapper.scenes.table_file import origin
+        from overlapper.scenes.outputs import outputs
+        from overlapper.scenes.summary import Summary
 
         scene = load_scene(name)
         fcl = stack.enter_context(Fcl()) if check else None
-        for path in filter(None, (out, html)):
-            path.parent.mkdir(parents=True, exist_ok=True)
-        settings = {
-            "scene": scene.name,
-            "steps": str(steps or scene.steps),
-            "per": per,
-            **{setting: str(value) for setting, value in geometry.items()},
-        }
-        # The page is written last, and checked first.
-        record = stack.enter_context(recorder(html, written)) if html else None
-        table = stack.enter_context(_table(out, origin() | settings, written)) if out else None
-        frames = stack.enter_context(closing(frames_of(scene, steps, **geometry)))
+        settings = {"scene": scene.name, "steps": steps or scene.steps, **geometry}
         summary = Summary(scene.name)
+        take = stack.enter_context(outputs(summary, settings, written, out, html, per, fcl))
+        frames = stack.enter_context(closing(frames_of(scene, steps, **geometry)))
         try:
             for frame in with_progress(frames, scene.name, steps or scene.steps):
-                opinions = fcl.compare_many(contact.overlap for contact in frame.contacts) if fcl else []
-                if table:
-                    where = frame.step, frame.time, frame.bodies
-                    if per == "link":
-                        table.write(link_rows(*where, link_contacts(frame.contacts)))
-                    else:
-                        table.write(rows(*where, frame.contacts, opinions))
-                summary.add(frame, opinions)
-                if record:
-                    record(frame)
+                take(frame)
         except KeyboardInterrupt:
             if not summary.steps:
                 raise
             return summary, False
     return summary, True
-
-
-@contextmanager
-def _table(path: Path, metadata: Mapping[str, str], written: list[Path]) -> Iterator[Table]:
-    """A table to be written; named in `written` if it has rows, or the run came to its end."""
-    from overlapper.scenes.table_file import TABLES
-
-    table = TABLES[path.suffix](path, metadata)
-    try:
-        yield table
-    except BaseException as error:
-        left = table.leave()
-        if isinstance(error, Exception) and left:
-            written.append(left)
-        raise
-    table.close()
-    written.append(path)
 
 
 def _show(summary: Summary, finished: bool, written: Sequence[Path]) -> None:

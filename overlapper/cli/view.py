@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from overlapper.cli.recorded import PICTURES_PER_SECOND, recorder, with_progress
+from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
 
 if TYPE_CHECKING:
@@ -100,6 +100,8 @@ def view(
 
 def _film(playback: Playback, html: Path, looks: Sequence[Look], written: list[Path]) -> bool:
     """False if it was interrupted; then the page has what came before. KeyboardInterrupt if that is nothing."""
+    from overlapper.scenes.outputs import PICTURES_PER_SECOND, recorder
+
     html.parent.mkdir(parents=True, exist_ok=True)
     rate = math.inf if playback.sparse else PICTURES_PER_SECOND
     seen = 0
@@ -130,6 +132,7 @@ def _picture(playback: Playback, png: Path, step: int | None, close: bool, looks
 
 def _live(playback: Playback, looks: Sequence[Look], host: str) -> None:
     """As fast as the simulation is in the world, or as it can be; stays until it is interrupted, on a terminal."""
+    from overlapper.scenes.outputs import PICTURES_PER_SECOND
     from overlapper.viewer import Viewer
 
     with Viewer(None, *looks, host=host) as viewer, suppress(KeyboardInterrupt):

@@ -2,56 +2,17 @@
 
 from __future__ import annotations
 
-import functools
-import types
-from collections.abc import Callable
 from typing import Any
 
 import pybullet
 
+from overlapper.simulation.calls import Arguments, listen, unlisten
 from overlapper.simulation.extraction.height_field import HeightField
 
-# The calls that are noted, with their parameters in pybullet's order, as far as they are needed.
-CALLS: dict[str, tuple[str, ...]] = {
-    "setCollisionFilterPair": (
-        *("bodyUniqueIdA", "bodyUniqueIdB", "linkIndexA", "linkIndexB", "enableCollision", "physicsClientId"),
-    ),
-    "setCollisionFilterGroupMask": (
-        *("bodyUniqueId", "linkIndexA", "collisionFilterGroup", "collisionFilterMask", "physicsClientId"),
-    ),
-    "setPhysicsEngineParameter": (
-        *("fixedTimeStep", "numSolverIterations", "useSplitImpulse", "splitImpulsePenetrationThreshold"),
-        *("numSubSteps", "collisionFilterMode"),
-    ),
-    "loadURDF": (
-        *("fileName", "basePosition", "baseOrientation", "useMaximalCoordinates", "useFixedBase", "flags"),
-        *("globalScaling", "physicsClientId"),
-    ),
-    "loadMJCF": ("mjcfFileName", "flags", "useMultiBody", "physicsClientId"),
-    "createMultiBody": (
-        *("baseMass", "baseCollisionShapeIndex", "baseVisualShapeIndex", "basePosition", "baseOrientation"),
-        *("baseInertialFramePosition", "baseInertialFrameOrientation", "linkMasses", "linkCollisionShapeIndices"),
-        *("linkVisualShapeIndices", "linkPositions", "linkOrientations", "linkInertialFramePositions"),
-        *("linkInertialFrameOrientations", "linkParentIndices", "linkJointTypes", "linkJointAxis"),
-        *("useMaximalCoordinates", "flags", "batchPositions", "physicsClientId"),
-    ),
-    "createCollisionShape": (
-        *("shapeType", "radius", "halfExtents", "height", "fileName", "meshScale", "planeNormal", "flags"),
-        *("collisionFramePosition", "collisionFrameOrientation", "vertices", "indices", "heightfieldTextureScaling"),
-        *("heightfieldData", "numHeightfieldRows", "numHeightfieldColumns", "replaceHeightfieldIndex"),
-        "physicsClientId",
-    ),
-    "loadBullet": ("bulletFileName", "physicsClientId"),
-    "removeBody": ("bodyUniqueId", "physicsClientId"),
-    "resetSimulation": ("flags", "physicsClientId"),
-    "disconnect": ("physicsClientId",),
-}
-
 Link = tuple[int, int]  # body and link, -1 for the base
-Arguments = dict[str, Any]
 
-_ORIGINALS: dict[str, Callable[..., Any]] = {}
-_open: list[Recorder] = []
+# What is heard, and says nothing of collisions.
+UNNOTED = frozenset({"connect", "stepSimulation", "setRealTimeSimulation"})
 
 
 class Recorder:
@@ -78,11 +39,7 @@ class Recorder:
         self.scenes_loaded = 0
         """How often bodies may have come or gone that pybullet tells nothing of: those of loadBullet."""
         self._forget()
-        if not _open:
-            _ORIGINALS.update({name: getattr(pybullet, name) for name in CALLS})
-            for name in CALLS:
-                setattr(pybullet, name, _Noted(name))
-        _open.append(self)
+        listen(self._hear)
 
     def _forget(self) -> None:
         self.pair_filters: dict[tuple[Link, Link], bool] = {}
@@ -100,11 +57,7 @@ class Recorder:
 
     def close(self) -> None:
         """Note nothing any more; what was noted stays. pybullet is as before once all recorders are closed."""
-        if self in _open:
-            _open.remove(self)
-            if not _open:
-                for name, original in _ORIGINALS.items():
-                    setattr(pybullet, name, original)
+        unlisten(self._hear)
 
     def __enter__(self) -> Recorder:
         return self
@@ -112,7 +65,11 @@ class Recorder:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def note(self, name: str, arguments: Arguments, result: Any) -> None:
+    def _hear(self, name: str, arguments: Arguments, result: Any) -> None:
+        if arguments.get("physicsClientId", 0) == self.physicsClientId and name not in UNNOTED:
+            self._note(name, arguments, result)
+
+    def _note(self, name: str, arguments: Arguments, result: Any) -> None:
         self.changes += 1
         match name:
             case "setCollisionFilterPair":
@@ -159,24 +116,3 @@ class Recorder:
     def _drop(self, body: int) -> None:
         self.self_collision.pop(body, None)
         self._shapes.pop(body, None)
-
-
-class _Noted:
-    """A function of pybullet that open recorders hear of."""
-
-    def __init__(self, name: str) -> None:
-        functools.update_wrapper(self, _ORIGINALS[name])
-        self._name = name
-
-    @property  # type: ignore[misc]
-    def __class__(self) -> type:
-        # pybullet_utils.bullet_client hands its client's id to what inspect.isbuiltin finds, and to nothing else.
-        return types.BuiltinFunctionType
-
-    def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        result = _ORIGINALS[self._name](*args, **kwargs)
-        arguments = dict(zip(CALLS[self._name], args)) | kwargs
-        for recorder in _open:
-            if recorder.physicsClientId == arguments.get("physicsClientId", 0):
-                recorder.note(self._name, arguments, result)
-        return result

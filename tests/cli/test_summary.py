@@ -6,7 +6,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from overlapper.cli.summary import Disagreement, PairSummary, Summary, overlaps_table, remarks
+from overlapper.cli.summary import overlaps_table, remarks
+from overlapper.scenes.summary import Disagreement, PairSummary, Summary
 from overlapper.simulation import Decomposed, Report, Skipped
 
 

@@ -1,0 +1,137 @@
+"""What a run leaves: a table, a page and a summary, of its frames as they come; of scenes and of scripts alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from overlapper.scenes.summary import Summary
+from overlapper.scenes.table import Bodies, link_rows, rows
+from overlapper.scenes.table_file import TABLES, origin
+from overlapper.simulation.links import link_contacts
+from overlapper.whole_file import must_be_writable, unfinished
+
+if TYPE_CHECKING:
+    from overlapper.reference import Comparison, Fcl
+    from overlapper.scenes.run import Frame
+    from overlapper.simulation.contacts import Contacts
+    from overlapper.viewer.look import Look
+
+PICTURES_PER_SECOND = 30  # of simulated time: as smooth as a film, and a tenth of the size that every step would take
+
+Per = Literal["shape", "link"]
+
+
+class StepTable:
+    """A table of overlaps that grows by what a step has found; the heading says what wrote it, and `settings`.
+
+    `per` says whether a row is of two shapes or of two links as a whole. ValueError for a name of another ending than
+    those of TABLES, OSError if there can be no such file, ImportError without the library that writes it.
+    """
+
+    def __init__(self, path: Path, settings: Mapping[str, Any], per: Per = "shape") -> None:
+        if path.suffix not in TABLES:
+            raise ValueError(f"the name of a table must end in {', '.join(TABLES)}, not {path.name!r}")
+        if per not in ("shape", "link"):
+            raise ValueError(f"per must be 'shape' or 'link', not {per!r}")
+        self.path, self._per = path, per
+        texts = {name: str(value) for name, value in settings.items()}
+        self._table = TABLES[path.suffix](path, origin() | texts | {"per": per})
+
+    def add(
+        self, step: int, time: float, bodies: Bodies, contacts: Contacts, opinions: Sequence[Comparison] = ()
+    ) -> None:
+        """Write the rows of a step at once; `opinions` are FCL's of the same contacts, if it was asked."""
+        if self._per == "link":
+            self._table.write(link_rows(step, time, bodies, link_contacts(contacts)))
+        else:
+            self._table.write(rows(step, time, bodies, contacts, opinions))
+
+    def close(self) -> None:
+        """Put the table in its place."""
+        self._table.close()
+
+    def leave(self) -> Path | None:
+        """Leave the rows beside the place, and say where they are; None, and nothing is left, if there are none."""
+        return self._table.leave()
+
+
+@contextmanager
+def outputs(
+    summary: Summary,
+    settings: Mapping[str, Any],
+    written: list[Path],
+    out: Path | None = None,
+    html: Path | None = None,
+    per: Per = "shape",
+    fcl: Fcl | None = None,
+) -> Iterator[Callable[[Frame[Any]], None]]:
+    """Takes frames in: into the summary, the table `out` and the page `html`, in whose folders there may be none yet.
+
+    `written` gets the files that there are in the end: in their place, or, if the run fails, beside it.
+    """
+    for path in filter(None, (out, html)):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with ExitStack() as stack:
+        # The page is written last, and checked first.
+        record = stack.enter_context(recorder(html, written)) if html else None
+        table = stack.enter_context(_table(out, settings, per, written)) if out else None
+
+        def take(frame: Frame[Any]) -> None:
+            opinions = fcl.compare_many(contact.overlap for contact in frame.contacts) if fcl else []
+            if table:
+                table.add(frame.step, frame.time, frame.bodies, frame.contacts, opinions)
+            summary.add(frame, opinions)
+            if record:
+                record(frame)
+
+        yield take
+
+
+@contextmanager
+def _table(path: Path, settings: Mapping[str, Any], per: Per, written: list[Path]) -> Iterator[StepTable]:
+    """A table to be written; named in `written` if it has rows, or the run came to its end."""
+    table = StepTable(path, settings, per)
+    try:
+        yield table
+    except BaseException as error:
+        left = table.leave()
+        if isinstance(error, Exception) and left:
+            written.append(left)
+        raise
+    table.close()
+    written.append(path)
+
+
+@contextmanager
+def recorder(
+    path: Path, written: list[Path], looks: Sequence[Look] = (), rate: float = PICTURES_PER_SECOND
+) -> Iterator[Callable[[Frame[Any]], None]]:
+    """Records some of the frames it is called with, and writes the page in the end.
+
+    After an error, what was recorded until then is beside the page, and named in `written`, as the page is else.
+    Nothing is written of no frame.
+    """
+    from overlapper.viewer import Recording
+
+    must_be_writable(path)
+    recording = Recording(*looks)
+    shown = 0
+
+    def record(frame: Frame[Any]) -> None:
+        nonlocal shown
+        if frame.time * rate >= shown:
+            recording.add(frame.bodies, frame.contacts, frame.time)
+            shown += 1
+
+    try:
+        yield record
+    except Exception:
+        if shown:
+            with suppress(OSError):  # the error says enough
+                written.append(recording.save(unfinished(path)))
+        raise
+    if shown:
+        written.append(recording.save(path))

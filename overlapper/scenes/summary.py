@@ -1,0 +1,128 @@
+"""What a run came to: the figures of each pair of links, what FCL said of it, and how little had to be modelled."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from overlapper.simulation.links import LinkContact, link_contacts
+
+if TYPE_CHECKING:
+    from overlapper.reference import Comparison
+    from overlapper.scenes.run import Frame
+    from overlapper.simulation import Bodies, Decomposed, Report, Skipped
+
+
+@dataclass(slots=True)
+class PairSummary:
+    """Two links over a run: in how many steps they overlap, and the figures of the largest overlap, with its step.
+
+    Volumes are in m³ and of the links as a whole, where the shapes of one overlap each other counted once. Depths are
+    in m and of two of their shapes; `normal` is that of the largest, from the second link to the first.
+    """
+
+    names: tuple[str, str]
+    steps: int = 0
+    volume: float = 0.0
+    volume_error: float = 0.0
+    volume_step: int = 0
+    depth: float = 0.0
+    depth_step: int = 0
+    normal: tuple[float, ...] = ()
+
+    def add(self, step: int, pair: LinkContact) -> None:
+        """Take in what the links have in common in a step."""
+        self.steps += 1
+        if pair.volume > self.volume:
+            self.volume, self.volume_error, self.volume_step = pair.volume, pair.volume_error, step
+        if pair.depth > self.depth:
+            self.depth, self.depth_step, self.normal = pair.depth, step, tuple(pair.normal.tolist())
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """FCL and we differ, or FCL gave no answer; `explanation` is one sentence."""
+
+    step: int
+    names: tuple[str, str]
+    verdict: str
+    explanation: str
+
+
+@dataclass(slots=True)
+class Summary:
+    """The frames of a run, taken in one by one."""
+
+    scene: str
+    steps: int = 0
+    seconds: float = 0.0
+    pairs: dict[tuple[int, int, int, int], PairSummary] = field(default_factory=dict)
+    report: Report | None = None
+    skipped: list[Skipped] = field(default_factory=list)
+    decomposed: list[Decomposed] = field(default_factory=list)
+    verdicts: Counter[str] = field(default_factory=Counter)
+    disagreements: list[Disagreement] = field(default_factory=list)
+
+    def add(self, frame: Frame[Bodies], opinions: Sequence[Comparison] = ()) -> None:
+        """Take in a frame; `opinions` are FCL's of its contacts, if it was asked."""
+        self.steps, self.seconds = frame.step, frame.time
+        self.report = _sum(self.report, frame.bodies.report())
+        self.skipped, self.decomposed = frame.bodies.skipped, frame.bodies.decomposed
+        names = frame.bodies.names
+        for pair in filter(None, link_contacts(frame.contacts)):
+            key = pair.bodyA, pair.linkA, pair.bodyB, pair.linkB
+            self.pairs.setdefault(key, PairSummary((names[key[:2]], names[key[2:]]))).add(frame.step, pair)
+        for contact, opinion in zip(frame.contacts, opinions):
+            self._add_opinion(
+                frame.step, (names[contact.bodyA, contact.linkA], names[contact.bodyB, contact.linkB]), opinion
+            )
+
+    def _add_opinion(self, step: int, names: tuple[str, str], opinion: Comparison) -> None:
+        self.verdicts[opinion.verdict] += 1
+        if opinion.verdict != "agree":
+            self.disagreements.append(Disagreement(step, names, opinion.verdict, opinion.explanation))
+
+    def largest(self) -> list[PairSummary]:
+        """The pairs that overlap in any step, the largest volume first."""
+        return sorted(self.pairs.values(), key=lambda pair: -pair.volume)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything, as JSON takes it: SI units, said in the names."""
+        return {
+            "scene": self.scene,
+            "steps": self.steps,
+            "time_s": self.seconds,
+            "pairs": [
+                {
+                    "links": dict(zip(("bodyA", "linkA", "bodyB", "linkB"), key)),
+                    "names": pair.names,
+                    "steps_overlapping": pair.steps,
+                    "largest_volume_m3": pair.volume,
+                    "volume_error_m3": pair.volume_error,
+                    "volume_step": pair.volume_step,
+                    "largest_depth_m": pair.depth,
+                    "depth_step": pair.depth_step,
+                    "normal": pair.normal,
+                }
+                for key, pair in sorted(self.pairs.items(), key=lambda item: -item[1].volume)
+            ],
+            "report": asdict(self.report) if self.report else None,
+            "skipped": [asdict(each) for each in self.skipped],
+            "decomposed": [
+                asdict(each) | {"shapes": [*each.shapes], "path": str(each.path) if each.path else None}
+                for each in self.decomposed
+            ],
+            "fcl": dict(self.verdicts),
+            "disagreements": [asdict(each) for each in self.disagreements],
+        }
+
+
+def _sum(before: Report | None, now: Report) -> Report:
+    """Bodies and shapes as they are now, pairs and facets of all steps."""
+    if before is None:
+        return now
+    of_scene = {"bodies", "shapes", "shapes_read"}
+    counts = {name: count for name, count in asdict(before).items() if name not in of_scene}
+    return replace(now, **{name: count + getattr(now, name) for name, count in counts.items()})

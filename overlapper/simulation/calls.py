@@ -1,0 +1,94 @@
+"""pybullet's functions, heard by whoever wants to know what a script tells the simulator, and what it answers."""
+
+from __future__ import annotations
+
+import functools
+import types
+from collections.abc import Callable
+from typing import Any
+
+import pybullet
+
+# The calls that can be heard, with their parameters in pybullet's order, as far as they are needed.
+CALLS: dict[str, tuple[str, ...]] = {
+    "connect": ("method",),
+    "stepSimulation": ("physicsClientId",),
+    "setRealTimeSimulation": ("enableRealTimeSimulation", "physicsClientId"),
+    "setCollisionFilterPair": (
+        *("bodyUniqueIdA", "bodyUniqueIdB", "linkIndexA", "linkIndexB", "enableCollision", "physicsClientId"),
+    ),
+    "setCollisionFilterGroupMask": (
+        *("bodyUniqueId", "linkIndexA", "collisionFilterGroup", "collisionFilterMask", "physicsClientId"),
+    ),
+    "setPhysicsEngineParameter": (
+        *("fixedTimeStep", "numSolverIterations", "useSplitImpulse", "splitImpulsePenetrationThreshold"),
+        *("numSubSteps", "collisionFilterMode"),
+    ),
+    "loadURDF": (
+        *("fileName", "basePosition", "baseOrientation", "useMaximalCoordinates", "useFixedBase", "flags"),
+        *("globalScaling", "physicsClientId"),
+    ),
+    "loadMJCF": ("mjcfFileName", "flags", "useMultiBody", "physicsClientId"),
+    "createMultiBody": (
+        *("baseMass", "baseCollisionShapeIndex", "baseVisualShapeIndex", "basePosition", "baseOrientation"),
+        *("baseInertialFramePosition", "baseInertialFrameOrientation", "linkMasses", "linkCollisionShapeIndices"),
+        *("linkVisualShapeIndices", "linkPositions", "linkOrientations", "linkInertialFramePositions"),
+        *("linkInertialFrameOrientations", "linkParentIndices", "linkJointTypes", "linkJointAxis"),
+        *("useMaximalCoordinates", "flags", "batchPositions", "physicsClientId"),
+    ),
+    "createCollisionShape": (
+        *("shapeType", "radius", "halfExtents", "height", "fileName", "meshScale", "planeNormal", "flags"),
+        *("collisionFramePosition", "collisionFrameOrientation", "vertices", "indices", "heightfieldTextureScaling"),
+        *("heightfieldData", "numHeightfieldRows", "numHeightfieldColumns", "replaceHeightfieldIndex"),
+        "physicsClientId",
+    ),
+    "loadBullet": ("bulletFileName", "physicsClientId"),
+    "removeBody": ("bodyUniqueId", "physicsClientId"),
+    "resetSimulation": ("flags", "physicsClientId"),
+    "disconnect": ("physicsClientId",),
+}
+
+Arguments = dict[str, Any]
+Listener = Callable[[str, Arguments, Any], None]
+"""Called after a call, with its name, its arguments by name and its result."""
+
+_ORIGINALS: dict[str, Callable[..., Any]] = {}
+_listeners: list[Listener] = []
+
+
+def listen(listener: Listener) -> None:
+    """Let all CALLS of all clients be heard: they are replaced in the module `pybullet` by ones that call them."""
+    if not _listeners:
+        _ORIGINALS.update({name: getattr(pybullet, name) for name in CALLS})
+        for name in CALLS:
+            setattr(pybullet, name, _Heard(name))
+    _listeners.append(listener)
+
+
+def unlisten(listener: Listener) -> None:
+    """The opposite, also if it was none; once nobody listens, pybullet is as before."""
+    if listener in _listeners:
+        _listeners.remove(listener)
+        if not _listeners:
+            for name, original in _ORIGINALS.items():
+                setattr(pybullet, name, original)
+
+
+class _Heard:
+    """A function of pybullet that listeners hear of."""
+
+    def __init__(self, name: str) -> None:
+        functools.update_wrapper(self, _ORIGINALS[name])
+        self._name = name
+
+    @property  # type: ignore[misc]
+    def __class__(self) -> type:
+        # pybullet_utils.bullet_client hands its client's id to what inspect.isbuiltin finds, and to nothing else.
+        return types.BuiltinFunctionType
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        result = _ORIGINALS[self._name](*args, **kwargs)
+        arguments = dict(zip(CALLS[self._name], args)) | kwargs
+        for listener in tuple(_listeners):
+            listener(self._name, arguments, result)
+        return result
