@@ -7,7 +7,7 @@ from importlib import import_module
 
 
 def lazily(package: str, offers: Mapping[str, tuple[str, ...]], needs: str | None = None) -> Callable[[str], object]:
-    """The `__getattr__` of a package (PEP 562) that offers names of its modules.
+    """The `__getattr__` of a package (PEP 562) that offers names of its modules, or of others: ".other" is beside it.
 
     `needs` is what an ImportError says of a library that is not installed; without it, the module's own words are kept.
     """
@@ -17,7 +17,7 @@ def lazily(package: str, offers: Mapping[str, tuple[str, ...]], needs: str | Non
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         try:
-            return getattr(import_module(f"{package}.{homes[name]}"), name)
+            return getattr(import_module(f".{homes[name]}", package), name)
         except ImportError as error:
             if needs:
                 raise ImportError(f"{package} needs {needs}") from error

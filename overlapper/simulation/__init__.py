@@ -11,6 +11,7 @@ from overlapper.face import lazily
 from overlapper.install import hint
 
 if TYPE_CHECKING:
+    from overlapper.scenes.log import Log
     from overlapper.simulation.asked_pairs import Among
     from overlapper.simulation.bodies import Bodies, SelfCollisionWarning, SkippedShapeWarning
     from overlapper.simulation.contacts import Contact, Contacts
@@ -28,6 +29,7 @@ __all__ = [
     "Decomposed",
     "LinkContact",
     "LinkContacts",
+    "Log",
     "Recorder",
     "Report",
     "SelfCollisionWarning",
@@ -47,6 +49,7 @@ __getattr__ = lazily(
         "extraction.model": ("Concave", "Decomposed", "Skipped", "Surface"),
         "links": ("LinkContact", "LinkContacts", "link_contacts"),
         "recorder": ("Recorder",),
+        ".scenes.log": ("Log",),  # a table, which is above what it is of
         "report": ("Report",),
     },
     needs=hint("pybullet"),

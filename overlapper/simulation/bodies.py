@@ -245,6 +245,12 @@ class Bodies:
         return self._known.decomposed
 
     @property
+    def settings(self) -> dict[str, str | float]:
+        """`concave`, `concave_threshold` and `surface`, as they were given."""
+        given = self._settings
+        return {"concave": given.concave, "concave_threshold": given.threshold, "surface": given.surface}
+
+    @property
     def skipped(self) -> list[Skipped]:
         """What is not modelled, one entry per body and link."""
         return self._known.skipped + [self._lost(id) for id in sorted(self._nowhere)]

@@ -1,0 +1,89 @@
+"""A loop of one's own as a table."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Literal
+
+from overlapper.scenes.outputs import StepTable
+
+import pybullet  # isort: skip  # after what says what to install
+
+if TYPE_CHECKING:
+    from overlapper.simulation import Bodies
+    from overlapper.simulation.contacts import Contacts
+
+
+class Log:
+    """The table that `overlapper run` writes, of a loop of one's own: a row for each contact of each step.
+
+        with Log("run.parquet", bodies) as log:
+            for _ in range(240):
+                pybullet.stepSimulation()
+                bodies.update()
+                log.add(bodies.overlaps())
+
+    `path` ends in .csv, .parquet or .sqlite. `per` says what a row is of: "shape", two shapes, or "link", two links as
+    a whole. The heading has the versions of this package and of pybullet, what `bodies` was told of surfaces and
+    concave meshes, and `settings`: what else is worth knowing, as `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
+
+    A step is on disk when `add` returns. The table grows beside its place, as `run.unfinished.parquet`, and takes it at
+    the end of the `with`, or by `close()`, also if Ctrl-C or sys.exit() ends the loop. It stays where it is after an
+    error, and when the process is killed, and is a table like any other; `unfinished` says where.
+
+    ValueError for another ending or `per`, OSError if there can be no such file, ImportError without the library that
+    writes it.
+    """
+
+    def __init__(
+        self, path: str | Path, bodies: Bodies, *, per: Literal["shape", "link"] = "shape", **settings: Any
+    ) -> None:
+        self.steps = 0
+        """The number of the last step added."""
+        self.unfinished: Path | None = None
+        """Where the rows are that an error has kept from their place, if there are any."""
+        self._bodies, self._time = bodies, 0.0
+        self._table: StepTable | None = StepTable(Path(path), {**bodies.settings, **settings}, per)
+
+    def add(self, contacts: Contacts, step: int | None = None, time: float | None = None) -> None:
+        """Write what `bodies.overlaps()` has found, before the next `bodies.update()`.
+
+        `step` is the one after the last by default, `time`, in s, that of so many of pybullet's time steps. ValueError
+        if a step comes no later than the last, if `time` is not finite, if `contacts` are not of these bodies, or if
+        the log is closed; OSError if it cannot be written.
+        """
+        if self._table is None:
+            raise ValueError(f"this Log is closed: {contacts!r} came too late")
+        step = self.steps + 1 if step is None else step
+        if step <= self.steps:
+            raise ValueError(f"step must be larger from one add() to the next: {step} came after {self.steps}")
+        if time is None:
+            time = step * pybullet.getPhysicsEngineParameters(self._bodies.physicsClientId)["fixedTimeStep"]
+        if not math.isfinite(time):
+            raise ValueError(f"time must be finite, not {time}")
+        strange = {key for row in contacts.keys.tolist() for key in (tuple(row[:3]), tuple(row[3:]))}
+        if strange := strange.difference(self._bodies.keys):
+            body, link, shape = min(strange)
+            raise ValueError(f"contacts has shape {shape} of link {link} of body {body}, which is not among the bodies")
+        self._table.add(step, time, self._bodies, contacts)
+        self.steps = step
+
+    def close(self) -> None:
+        """Put the table in its place."""
+        table, self._table = self._table, None
+        if table:
+            table.close()
+
+    def __enter__(self) -> Log:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        # What ends a loop of one's own without an error is no failure; of no step nothing is written then.
+        if error is None or (self.steps and not isinstance(error, Exception)):
+            self.close()
+        elif self._table:
+            self.unfinished, self._table = self._table.leave(), None
