@@ -702,3 +702,16 @@ def test_needles_between_a_thin_plate_and_a_thin_margin_have_all_their_digits(ma
     exact = 2 * plate * (wide * high + margin * (wide + high) + np.pi / 4 * margin**2)
     assert abs(found.volume - exact) <= found.volume_error + 1e-15 * exact
     assert found.volume_error <= 1e-12 * exact
+
+
+@pytest.mark.parametrize("digits", [4, 5])
+def test_no_slice_is_missed_where_a_wall_goes_through_the_point_inside(digits):
+    """Where one of the planes that a corner lies on has no terms but rounding, the corner still counts."""
+    turns = (-0.30017150, 0.20430073, -0.02528523, -0.02503337), (1.46507563, -0.92387953, 0.38268343, 0.92387953)
+    place = np.round([-0.40088835, 0.97411165, -1.39904852], digits)
+    found = overlap(
+        Placed(Capsule(round(1.42968083, digits), 0.5), (0, 0, 0), np.round(turns[0], digits)),
+        Placed(RoundedHull(CORNERS * [1.5, 0.5, 0.25], 0.25), place, np.round(turns[1], digits)),
+    )
+    lower, upper = found.certificate().verify()
+    assert found.volume - found.volume_error <= lower <= upper <= found.volume + found.volume_error

@@ -32,6 +32,9 @@ void for_roots(double a, double h, double c, Use use) {
 
 class Candidates {
   static constexpr int kSamples = 24;
+  static constexpr int kMostTurns = 12;
+  /// Of the values beside it: one that may be zero when the turn is known better, and one that is but for rounding.
+  static constexpr double kGrazing = 0.1, kTouching = 1e-9;
   using Samples = std::array<double, kSamples>;
 
  public:
@@ -102,16 +105,18 @@ class Candidates {
   }
   void add_if_near(Point p, double t) {
     if (!(t > stack_.low && t < stack_.high)) return;
+    // A plane may go through the origin, where all its terms are nothing but the rounding of a point.
+    const double blur = kNear * stack_.line[stack_.lines - 1].offset;
     for (int i = 0; i < stack_.lines - 4; ++i) {
       if (!plane(i)) continue;
       const Line& l = stack_.line[i];
-      const double terms =
-          std::abs(l.offset) + std::abs(l.rate * t) + std::abs(l.normal.x * p.x) + std::abs(l.normal.y * p.y);
+      const double terms = std::abs(l.offset) + std::abs(l.rate * t) + l.length * (norm(p) + blur);
       if (l.offset - l.rate * t - dot(l.normal, p) < -kNear * terms) return;
     }
     for (int i = 0; i < stack_.quadrics; ++i) {
       const Quadric& q = stack_.quadric[i];
-      const double terms = q.terms(t) + dot(p, p) + 2 * (std::abs(q.centre.x * p.x) + std::abs(q.centre.y * p.y));
+      const double terms = q.terms(t) + dot(p, p) + 2 * (std::abs(q.centre.x * p.x) + std::abs(q.centre.y * p.y)) +
+                           blur * (norm(p) + norm(q.centre) + std::abs(t) + std::abs(q.level));
       if (q.value(p, t) > kNear * terms) return;
     }
     values_.push_back(t);
@@ -183,16 +188,40 @@ class Candidates {
       const double before = value[k - 1], here = value[k], after = value[k + 1], side = here < 0 ? -1 : 1;
       // In a pose that is symmetric, samples on either side of the turn are equal.
       if (!(side * before > side * here && side * after >= side * here)) continue;
-      // The turning point of the parabola through three samples.
-      const double p = samples_[k] - samples_[k - 1], q = samples_[k + 1] - samples_[k];
-      const double fall = (here - before) / p, rise = (after - here) / q, curve = (rise - fall) / (p + q);
-      const double t = samples_[k] - (fall + p * curve) / (2 * curve);
-      if (!(t > samples_[k - 1] && t < samples_[k + 1])) continue;
-      const double least = at(t);
-      if ((least < 0) == (here < 0)) continue;
-      if (t < samples_[k]) between(samples_[k - 1], t, before, least), between(t, samples_[k], least, here);
-      else between(samples_[k], t, here, least), between(t, samples_[k + 1], least, after);
+      add_turn({samples_[k - 1], samples_[k], samples_[k + 1]}, {before, here, after}, i, j, at, between);
     }
+  }
+
+  /// Where a function turns before it is zero, by the turning points of parabolas through three values; and where it
+  /// touches zero but for rounding, as a corner does that grazes another surface, which two values then are that close.
+  template <class Function, class Between>
+  void add_turn(std::array<double, 3> t, std::array<double, 3> value, int i, int j, Function at, Between between) {
+    const bool negative = value[1] < 0;
+    const double size = std::max(std::abs(value[0]), std::abs(value[2])), first = std::abs(value[1]);
+    for (int step = 0; step < kMostTurns; ++step) {
+      const double p = t[1] - t[0], q = t[2] - t[1];
+      const double fall = (value[1] - value[0]) / p, rise = (value[2] - value[1]) / q, curve = (rise - fall) / (p + q);
+      const double turn = t[1] - (fall + p * curve) / (2 * curve);
+      if (!(turn > t[0] && turn < t[2]) || turn == t[1]) break;
+      const double there = at(turn);
+      const bool later = turn > t[1];
+      if ((there < 0) != negative) {
+        const int before = later ? 1 : 0;
+        between(t[before], turn, value[before], there), between(turn, t[before + 1], there, value[before + 1]);
+        return;
+      }
+      // The three about the value that is nearest to zero.
+      const bool nearer = std::abs(there) < std::abs(value[1]);
+      if (nearer) {
+        const int end = later ? 0 : 2;
+        t[end] = t[1], value[end] = value[1], t[1] = turn, value[1] = there;
+      } else {
+        const int end = later ? 2 : 0;
+        t[end] = turn, value[end] = there;
+      }
+      if (!(std::abs(value[1]) < kGrazing * first)) break;
+    }
+    if (std::abs(value[1]) <= kTouching * size) add_if_near(Slice(stack_, t[1]).corner(i, j), t[1]);
   }
 
   /// By false position after Dowell and Jarratt (1971).
