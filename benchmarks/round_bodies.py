@@ -474,8 +474,9 @@ BOUNDS = {
     "common frame. They are enclosed by tangent planes, some thousand for a tolerance of 1e-3.",
     "pieces": "**Pieces of rounded hulls.** Which facets, edges and corners are met is found by cutting a polytope "
     "around what is common, and each piece that is met is measured on its own: the time goes with their number.",
-    "slices": "**Slices.** There is no formula for two round bodies whose surfaces cross, and for one over an edge or "
-    "a corner it cancels where the contact is shallow. What is left are slices, dozens to hundreds, each an outline.",
+    "slices": "**Slices.** There is no formula for two round bodies whose surfaces cross, and for a side of a capsule "
+    "or a cylinder over an edge or a corner it cancels where the contact is shallow. What is left are slices, dozens "
+    "to hundreds, each an outline.",
 }
 
 
@@ -506,7 +507,7 @@ def listed(names: list[str]) -> str:
 
 # What the time of a scene goes to, said where it misses its aim.
 BOUNDS_OF_SCENES = {
-    "bin_of_balls": "capsules that meet capsules and balls side by side, which are sliced",
+    "bin_of_balls": "capsules on edges of walls, and others near where their ends begin, which are sliced",
     "fifty capsule humanoids": "capsules of neighbours that cross or touch, which are sliced",
     "random_objects_pile, with margins": "small hulls of up to a hundred facets, every one of which has pieces",
     "36 mixed robots, all measures": "poses and shapes of so many links",

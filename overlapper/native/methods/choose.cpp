@@ -380,7 +380,8 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
   const double finest = std::max(overlapping.tolerance, kFinest);
   MeasuresAndInertia kept;
   auto formula = choice.tries(Way::kClosedForm) && !in_doubt ? by_formula(overlapping, finest) : std::nullopt;
-  if (choice.tries(Way::kSlicing) && !(formula && error_of(formula->measures) <= kEnough * formula->measures.volume))
+  if (choice.tries(Way::kSlicing) &&
+      !(formula && error_of(formula->measures) <= kEnoughOfRound * formula->measures.volume))
     if (const auto& sliced = overlapping.sliced()) return *sliced;
   if (in_doubt) return by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);
   if (formula) kept = std::move(*formula);

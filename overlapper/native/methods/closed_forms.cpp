@@ -594,22 +594,36 @@ bool shallow_at_sides(double r, double s, DoubleDouble depth) {
   return depth.head > 0 && depth.head <= kShallowSides * std::min(r, s);
 }
 
-/// A ball at the side of a capsule or a cylinder, far from the ends of that.
+/// A ball, or the end of a capsule that is nearer, at the side of another capsule or a cylinder, far from the ends of
+/// that and from the other side of the plane through the capsule's end.
 std::optional<Measures> ball_beside(const Revolved& ball, const Placed& placed_ball, const Revolved& body,
                                     const Placed& placed_body, Vec3 reference, const std::array<Vec3, 2>& positions) {
   const double r = body.radius, s = ball.radius, h = body.half_length;
-  const Vec3 plain = ball.centre - body.centre;
-  const double along = dot(plain, body.axis);
-  if (!(std::abs(along) < h)) return std::nullopt;
-  const WideVector between = wide_difference(placed_ball.position, placed_body.position), axis = axis_of(placed_body);
+  const auto along_body = [&](Vec3 point) { return dot(point - body.centre, body.axis); };
+  const auto from_axis = [&](Vec3 point) { return norm(point - body.centre - along_body(point) * body.axis); };
+  double side = 0;
+  Vec3 centre = ball.centre;
+  if (ball.half_length > 0) {
+    const Vec3 arm = ball.half_length * ball.axis;
+    side = from_axis(ball.centre + arm) < from_axis(ball.centre - arm) ? 1 : -1;
+    centre += side * arm;
+  }
+  const double along = along_body(centre);
+  if (!(std::abs(along) < h && from_axis(centre) < r + s)) return std::nullopt;
+  const WideVector axis = axis_of(placed_body);
+  WideVector between = wide_difference(placed_ball.position, placed_body.position);
+  if (side != 0) between = between + side * ball.half_length * axis_of(placed_ball);
   const WideVector out = between - dot(between, axis) * axis;
   const DoubleDouble distance = norm(out), depth = two_sum(r, s) - distance;
   if (!shallow_at_sides(r, s, depth)) return std::nullopt;
   const double reach = reach_of_ball(s, depth.head);
   if (!(std::abs(along) + reach < h - kEndMargin * (h + r))) return std::nullopt;
+  const Vec3 normal = rounded(out / distance);
+  // All that is shared is beyond the cylinder's tangent plane.
+  const double margin = kEndMargin * (ball.half_length + s);
+  if (side != 0 && !(reach_of_cap(s, normal, depth.head - s, -side * ball.axis, margin) < 0)) return std::nullopt;
   const SideContact contact = ball_at_side(r, s, distance.head, depth.head);
-  const Vec3 foot = body.centre + along * body.axis;
-  return of_sides(contact, foot, rounded(out / distance), 0, reference, positions);
+  return of_sides(contact, body.centre + along * body.axis, normal, 0, reference, positions);
 }
 
 /// The sides of two capsules or cylinders that cross far from all ends.
@@ -643,9 +657,11 @@ std::optional<Measures> sides_of_two(const Revolved& a, const Placed& placed_a, 
 
 std::optional<Measures> sides(const Revolved& a, const Placed& placed_a, const Revolved& b, const Placed& placed_b,
                               Vec3 reference, const std::array<Vec3, 2>& positions) {
-  if (a.half_length > 0 && b.half_length > 0) return sides_of_two(a, placed_a, b, placed_b, reference, positions);
-  if (a.half_length > 0) return ball_beside(b, placed_b, a, placed_a, reference, positions);
-  auto found = ball_beside(a, placed_a, b, placed_b, reference, {positions[1], positions[0]});
+  std::optional<Measures> found;
+  if (a.half_length > 0 && b.half_length > 0) found = sides_of_two(a, placed_a, b, placed_b, reference, positions);
+  if (!found && a.half_length > 0 && b.round) found = ball_beside(b, placed_b, a, placed_a, reference, positions);
+  if (found || b.half_length == 0 || !a.round) return found;
+  found = ball_beside(a, placed_a, b, placed_b, reference, {positions[1], positions[0]});
   if (found) std::swap(found->pulls[0], found->pulls[1]);
   return found;
 }
@@ -844,7 +860,7 @@ std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, 
   const auto error = [](const MeasuresAndInertia& m) { return m.measures.volume_error / m.measures.volume; };
   const auto enough = [&](std::optional<MeasuresAndInertia> found) {
     if (found && !(best && error(*best) <= error(*found))) best = std::move(found);
-    return best && error(*best) <= kEnough;
+    return best && error(*best) <= kEnoughOfRound;
   };
   const Revolved& whole = *revolved_body;
   const bool ball = whole.half_length == 0, outside = over > 0;

@@ -285,6 +285,12 @@ def test_shallow_contacts_at_sides_keep_every_digit(depth):
                     # Towards each other they share more, as fast in either direction; across, nothing changes at first.
                     assert_allclose(answer.gradient[:, 1:3], 0, atol=1e-13)
                     assert_allclose(answer.gradient[0, :3] + answer.gradient[1, :3], 0, atol=1e-15)
+            # The end of a capsule, whose axis is along x, is a ball.
+            end = Placed(Capsule(0.75, 6), (place + 3, 0, 0.25), (0, 1, 0, 1))
+            truth = ball_at_side(r, s, exactly(place + 3) - 3)
+            for answer in (overlap(solid, end), overlap(end, solid)):
+                assert abs(exactly(answer.volume) - truth) <= min(answer.volume_error, 1e-13 * truth)
+                assert answer.volume_error <= 1e-12 * truth
 
 
 @pytest.mark.parametrize("solid", [Sphere(0.75), Capsule(0.75, 6), Cylinder(0.75, 6)])
