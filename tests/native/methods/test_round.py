@@ -715,3 +715,19 @@ def test_no_slice_is_missed_where_a_wall_goes_through_the_point_inside(digits):
     )
     lower, upper = found.certificate().verify()
     assert found.volume - found.volume_error <= lower <= upper <= found.volume + found.volume_error
+
+
+@pytest.mark.parametrize(("sides", "sure"), [(4, 1e-11), (12, 1e-11), (30, 1e-11), (80, 1e-3)])
+def test_lids_that_are_flat_but_for_rounding_are_as_many_planes_as_they_have_triangles(sides, sure):
+    # Of so many that slices have no lines for all, one plane stands for them, and the error says so.
+    rng = np.random.default_rng(sides)
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    angles = 2 * np.pi * np.arange(sides) / sides
+    rim = np.stack([np.cos(angles), np.sin(angles)], 1)
+    prism = Hull(np.vstack([np.column_stack([rim, np.full(sides, height)]) for height in (-0.5, 0.5)]) @ turn.T)
+    found = overlap(Placed(Cylinder(0.5, 0.25), turn @ [0.1, 0, 0.75], rng.normal(size=4)), Placed(prism))
+    by = found.depth - 1e-8
+    a, b = found.shapes
+    found = overlap(moved(a, by * np.array(found.normal)), b)
+    lower, upper = found.certificate().verify()
+    assert max(abs(found.volume - lower), abs(found.volume - upper)) <= found.volume_error <= sure * found.volume

@@ -13,9 +13,9 @@ namespace {
 constexpr size_t kMostFaces = 64;
 
 /// Of a hull whose facets hold their corners but for rounding, the triangles whose planes are looked at instead, and
-/// how many of these may matter: slices have so many lines, and some for the other body.
+/// how many of these may matter: slices have lines for as many, and as many again for the other body.
 constexpr size_t kMostTriangles = 256;
-constexpr size_t kMostOfTriangles = 20;
+constexpr size_t kMostOfTriangles = kMostLines / 2;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
