@@ -545,6 +545,17 @@ def test_the_tip_of_a_rounded_cone_of_many_slivers_is_measured_truly(shape):
         assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume
 
 
+# Beside the point inside, the middle of what encloses a piece may be far from all that it has.
+@pytest.mark.parametrize("seed", [156, 246, 314, 328, 353, 507, *range(20)])
+def test_shallow_contacts_of_rounded_hulls_are_measured_to_eleven_digits(seed):
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(20, 3))
+    points *= rng.uniform(0.3, 0.6, 3) / np.linalg.norm(points, axis=1)[:, None]
+    hull = Placed(RoundedHull(points, rng.uniform(0.02, 0.1)), 0.4 * rng.normal(size=3), quaternion(rng))
+    found = overlap(*sink(hull, Placed(Capsule(0.3, 0.7), (0, 0, 0), quaternion(rng)), 10.0 ** -rng.uniform(4, 6)))
+    assert found.way == "slicing" and found.volume_error <= 1e-11 * found.volume
+
+
 def test_rounded_boxes_that_are_nearly_parallel_are_sliced():
     """Slices of two cylinders may not be turned: planes nearly parallel to them rush across, in a billionth of all."""
     found = []

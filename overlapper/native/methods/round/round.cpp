@@ -100,7 +100,9 @@ class Measuring {
     // Axes of slices are chosen by what is near the point that coordinates count from.
     const Vec3 middle = around->middle();
     if (const std::optional<Vec3> beside = slicing::beside_rushing(rounds_, walls_, middle)) return add_about(*beside);
-    return add_about(around->excludes({}) ? middle : Vec3{});
+    if (!around->excludes({})) return add_stack();
+    // Beside the point inside, a shallow piece has more digits about that than about the middle of what encloses it.
+    return (norm(middle) <= around->reach(middle) && add_surely()) || add_about(middle);
   }
 
   /// Takes the walls of a polytope and finds out which of them are one; false if there is nothing between them.
@@ -633,6 +635,19 @@ class Measuring {
     const bool done = add_stack();
     offset_ = offset, extent = usual;
     return done;
+  }
+
+  /// False, and nothing is added, if slices about the present point are not sure to a fraction of the whole that
+  /// matters.
+  bool add_surely() {
+    const Totals before = totals;
+    const std::optional<PatchSums> patch_before = patch ? std::optional(*patch) : std::nullopt;
+    const std::vector<Round> rounds = rounds_;
+    const std::vector<Wall> walls = walls_;
+    if (add_stack() && totals.error + totals.open <= before.error + before.open + kSure * totals.volume) return true;
+    totals = before, rounds_ = rounds, walls_ = walls;
+    if (patch) *patch = *patch_before;
+    return false;
   }
 
   /// Fills sum_ and returns how much may be missing.
