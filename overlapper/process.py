@@ -135,6 +135,8 @@ def _end(process: subprocess.Popen[bytes], reader: threading.Thread, files: Iter
 
 def serve(module: str, name: str) -> None:
     """The process: requests on standard input; on standard output a greeting, then the replies to each request."""
+    # Ctrl-C is for whoever asks, who may want another answer before the end.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever else gets printed must not mix with the replies
     with contextlib.suppress(ImportError):

@@ -1,4 +1,4 @@
-"""The command line: scenes run, seen, listed, checked, compared; shapes listed; polytopes intersected; hard cases."""
+"""The command line: scripts watched; scenes run, seen, listed, checked, compared; shapes, polytopes, hard cases."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from overlapper.cli.refusals import Interrupted, Refused, give_up, say
 from overlapper.cli.run import run
 from overlapper.cli.shapes import shapes
 from overlapper.cli.view import view
+from overlapper.cli.watch import watch
 from overlapper.scenes.scene import headline, scene_paths
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -25,7 +26,7 @@ def main() -> NoReturn:
     # UsageError, which is click's or typer's own, as the version of typer has it.
     usage_error: Any = typer.BadParameter.__bases__[0]
     try:
-        sys.exit(app(sys.argv[1:] or ["--help"], prog_name="overlapper", standalone_mode=False))
+        answer = app(sys.argv[1:] or ["--help"], prog_name="overlapper", standalone_mode=False)
     except Interrupted:
         say("overlapper: interrupted; nothing was written", sys.stderr)
         sys.exit(130)
@@ -35,6 +36,8 @@ def main() -> NoReturn:
         give_up("there is not enough memory for this")
     except usage_error as error:
         give_up(error.format_message())
+    # Whatever a script raises is its own, and Python's to tell.
+    sys.exit(answer() if callable(answer) else answer)
 
 
 def _show_version(wanted: bool) -> None:
@@ -54,6 +57,10 @@ def overlapper(
     Start with [bold]overlapper scenes[/bold], then run one of them:
 
     [bold]overlapper run franka_grasp --html grasp.html[/bold]
+
+    A script of your own is watched as it is:
+
+    [bold]overlapper watch --html mine.html my_script.py[/bold]
     """
 
 
@@ -63,5 +70,7 @@ def scenes() -> None:
         say(f"{name:22}{headline(path)}")
 
 
+# What stands behind a script is the script's.
+app.command(context_settings={"allow_interspersed_args": False})(watch)
 for command in (scenes, run, view, check, diff, intersect, shapes, stability, chart):
     app.command()(command)

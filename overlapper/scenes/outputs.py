@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from overlapper.scenes.summary import Summary
 from overlapper.scenes.table import Bodies, link_rows, rows
-from overlapper.scenes.table_file import TABLES, origin
+from overlapper.scenes.table_file import TABLES, must_be_a_table, origin
 from overlapper.simulation.links import link_contacts
 from overlapper.whole_file import must_be_writable, unfinished
 
@@ -32,8 +32,7 @@ class StepTable:
     """
 
     def __init__(self, path: Path, settings: Mapping[str, Any], per: Per = "shape") -> None:
-        if path.suffix not in TABLES:
-            raise ValueError(f"the name of a table must end in {', '.join(TABLES)}, not {path.name!r}")
+        must_be_a_table(path)
         if per not in ("shape", "link"):
             raise ValueError(f"per must be 'shape' or 'link', not {per!r}")
         self.path, self._per = path, per

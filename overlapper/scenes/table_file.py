@@ -222,12 +222,8 @@ class ParquetTable:
     GROUP = 20_000  # rows; a row group of a few megabytes, as Parquet's readers expect
 
     def __init__(self, path: Path, metadata: Mapping[str, str] | None = None) -> None:
-        try:
-            import pyarrow
-            import pyarrow.parquet
-        except ImportError as error:
-            raise ImportError(f"a .parquet table needs {hint('pyarrow')}") from error
-        self._arrow: Any = pyarrow
+        self._arrow: Any = _arrow()
+        pyarrow = self._arrow
         kinds = {int: pyarrow.int32(), float: pyarrow.float64(), str: pyarrow.string()}
         self._schema = pyarrow.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()], metadata)
         self._place, self._empty = path, True
@@ -311,7 +307,8 @@ class SqliteTable:
     def __init__(self, path: Path, metadata: Mapping[str, str] | None = None) -> None:
         self._place, self._empty = path, True
         self._path = claim(path)
-        self._connection = sqlite3.connect(self._path)
+        # Whoever writes takes care that no two threads do so at once.
+        self._connection = sqlite3.connect(self._path, check_same_thread=False)
         kinds = {int: "INTEGER", float: "REAL", str: "TEXT"}
         columns = ", ".join(f"{name} {kinds[kind]}" for name, kind in COLUMNS.items())
         try:
@@ -366,6 +363,23 @@ TABLES: dict[str, Callable[[Path, Mapping[str, str] | None], Table]] = {
 }
 
 
+def must_be_a_table(path: Path) -> None:
+    """ValueError if the name is not that of a table, ImportError without the library that writes it."""
+    if path.suffix not in TABLES:
+        raise ValueError(f"the name of a table must end in {', '.join(TABLES)}, not {path.name!r}")
+    if path.suffix == ".parquet":
+        _arrow()
+
+
+def _arrow() -> Any:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise ImportError(f"a .parquet table needs {hint('pyarrow')}") from error
+    return pyarrow
+
+
 def read_metadata(path: Path) -> dict[str, str]:
     """What a table says of itself, by name: what wrote it and with which settings. ValueError if it is none."""
     if path.suffix == ".parquet":
@@ -400,11 +414,7 @@ def read_table(path: Path) -> list[Row]:
 
 @contextmanager
 def _opened_parquet(path: Path) -> Iterator[Any]:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError as error:
-        raise ImportError(f"a .parquet table needs {hint('pyarrow')}") from error
+    pyarrow = _arrow()
     path.stat()  # OSError, with its name, if it is not there
     try:
         dataset = pyarrow.parquet.ParquetDataset(path, page_checksum_verification=True)

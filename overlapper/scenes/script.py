@@ -1,0 +1,78 @@
+"""A Python script run as Python itself runs it, by somebody who wants to do something before it ends."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib.machinery import SourceFileLoader
+from pathlib import Path
+from types import ModuleType, TracebackType
+
+from overlapper.simulation import calls
+
+
+def run_script(path: Path, arguments: Sequence[str]) -> BaseException | None:
+    """Run the script as __main__, and wait for its threads; returns what ended it, if it was no return.
+
+    The traceback of an exception has been shown then, without anything of this package; `end_as` does the rest. OSError
+    if the file cannot be read.
+    """
+    place = path.absolute()
+    source = path.read_bytes()
+    main = ModuleType("__main__")
+    main.__dict__.update(
+        __file__=str(place),
+        __builtins__=__builtins__,
+        __loader__=SourceFileLoader("__main__", str(place)),
+        __annotations__={},
+        __cached__=None,
+    )
+    # Whatever is still held of the one that was there stays alive as long as it would have.
+    sys.modules["__main__"], main.__dict__["__overlapper__"] = main, sys.modules["__main__"]
+    sys.argv[:] = [str(path), *arguments]
+    sys.path[0] = str(place.resolve().parent)
+    try:
+        exec(compile(source, str(place), "exec", dont_inherit=True), main.__dict__)
+        _wait_for_threads()
+    except SystemExit as ended:
+        with suppress(KeyboardInterrupt):
+            _wait_for_threads()
+        return ended
+    except BaseException as error:
+        shown = error.with_traceback(_of_script(error.__traceback__, str(place)))
+        sys.excepthook(type(error), shown, shown.__traceback__)
+        return error
+    return None
+
+
+def _wait_for_threads() -> None:
+    for thread in threading.enumerate():
+        if not thread.daemon and thread is not threading.current_thread():
+            thread.join()
+
+
+def _of_script(trace: TracebackType | None, place: str) -> TracebackType | None:
+    """The part from the script's first line to the call of pybullet, if there is one that is heard."""
+    entries: list[TracebackType] = []
+    while trace:
+        file = trace.tb_frame.f_code.co_filename
+        if entries and file == calls.__file__:
+            break
+        if entries or file == place:
+            entries.append(trace)
+        trace = trace.tb_next
+    kept = None
+    for entry in reversed(entries):
+        kept = TracebackType(kept, entry.tb_frame, entry.tb_lasti, entry.tb_lineno)
+    return kept
+
+
+def end_as(ended: BaseException | None) -> None:
+    """Let Python end the process as it would have ended it after the script: exit code, signal, last words."""
+    if ended is None:
+        return
+    if not isinstance(ended, SystemExit):
+        sys.excepthook = lambda *_: None  # it has been shown
+    raise ended

@@ -1,0 +1,305 @@
+"""Simulations that somebody else steps, noticed and measured."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from types import FrameType, TracebackType
+from typing import Any, Literal, TypedDict
+
+from overlapper.reference import Fcl
+from overlapper.scenes.outputs import Per, outputs
+from overlapper.scenes.run import Frame
+from overlapper.scenes.summary import Summary
+from overlapper.scenes.table_file import must_be_a_table
+from overlapper.simulation import Among, Bodies, Concave, Recorder, SelfCollisionWarning, SkippedShapeWarning, Surface
+from overlapper.simulation.calls import Arguments, listen, unlisten
+from overlapper.whole_file import must_be_writable
+
+import pybullet  # isort: skip  # after the simulation, which says what to install
+
+
+class How(TypedDict, total=False):
+    """What a Watch may be told, but for whom it watches and where that is written."""
+
+    every: int
+    pairs: Among
+    surface: Surface
+    concave: Concave
+    concave_threshold: float
+    tolerance: float
+    method: Literal["auto", "paper"]
+    per: Per
+    check: Literal["fcl"] | None
+
+
+class Watch:
+    """Measures a pybullet client whenever it has been stepped, by whomever, as `overlapper run` does with scenes.
+
+        with overlapper.watch(client, "run.parquet", "run.html") as watch:
+            ...  # any code that calls pybullet.stepSimulation()
+        watch.summary.as_dict()
+
+    `out` is the table (.csv, .parquet, .sqlite), `html` the page to look at in a browser; both grow beside their places
+    and take them at the end of the `with`, by `close()`, or when the client disconnects, but stay there after an error,
+    as `written` then says. `every` is the number of steps from one that is measured to the next, `per` what the rows of
+    the table are of, check="fcl" asks FCL, too; `surface`, `concave` and `concave_threshold` are those of
+    `simulation.Bodies`, `pairs`, `tolerance` and `method` of `Bodies.overlaps`. What pybullet cannot be asked for
+    (pair filters, the filter mode, self-collision, height fields) is known if it was said after the watch began, or to
+    `recorder`.
+
+    Steps are noticed of `pybullet.stepSimulation`, not of a name that was imported `from pybullet` before, and not in
+    other processes; a simulation in real time is not stepped by calls. What cannot be measured or written raises in the
+    call that made the step, and the watch is over.
+
+    ValueError for a client that is not connected or an option that is none, OSError if a file cannot be written,
+    ImportError without the library that does it.
+    """
+
+    def __init__(
+        self,
+        physicsClientId: int = 0,
+        out: str | Path | None = None,
+        html: str | Path | None = None,
+        *,
+        every: int = 1,
+        pairs: Among = "simulated",
+        surface: Surface = "nominal",
+        concave: Concave = "decompose",
+        concave_threshold: float = 0.05,
+        tolerance: float = 1e-3,
+        method: Literal["auto", "paper"] = "auto",
+        per: Per = "shape",
+        check: Literal["fcl"] | None = None,
+        recorder: Recorder | None = None,
+        name: str = "the simulation",
+    ) -> None:
+        if not pybullet.isConnected(physicsClientId):
+            raise ValueError(f"physicsClientId {physicsClientId} is not connected to a physics server")
+        if every < 1:
+            raise ValueError(f"every must be a number of steps from 1, not {every}")
+        if check not in (None, "fcl"):
+            raise ValueError(f"check must be 'fcl' or None, not {check!r}")
+        self.physicsClientId = physicsClientId
+        self.out, self.html = (Path(path) if path else None for path in (out, html))
+        can_be_written(self.out, self.html)
+        self.every, self._per = every, per
+        self.steps, self.time = 0, 0.0
+        """Steps since the watch began, measured or not, and the seconds that they took in the simulation."""
+        self.measured = 0
+        """How many of them were measured."""
+        self.summary = Summary(name)
+        self.written: list[Path] = []
+        """The files that there are, once the watch is over."""
+        self.open = True
+        self._read: Callable[[], Bodies] = lambda: Bodies(
+            physicsClientId,
+            concave=concave,
+            concave_threshold=concave_threshold,
+            surface=surface,
+            recorder=self._recorder,
+        )
+        self._asked: dict[str, Any] = {"tolerance": tolerance, "method": method, "pairs": pairs}
+        self._fcl = Fcl() if check else None
+        self._recorder = recorder or Recorder(physicsClientId)
+        self._own_recorder = recorder is None
+        self._bodies: Bodies | None = None
+        self._files = ExitStack()
+        self._take: Callable[[Frame[Bodies]], None] | None = None
+        self._rhythm = 0, 0.0, 0.0  # steps and time since which a step takes so many seconds
+        self._lock = threading.RLock()
+        self._process = os.getpid()
+        listen(self._hear)
+
+    def _hear(self, name: str, arguments: Arguments, result: Any) -> None:
+        # A process that was forked off has simulations of its own, and no business in our files.
+        if arguments.get("physicsClientId", 0) != self.physicsClientId or os.getpid() != self._process:
+            return
+        if name == "stepSimulation":
+            with self._lock:
+                self._stepped()
+        elif name == "disconnect":
+            self.close()
+
+    def _stepped(self) -> None:
+        seconds = pybullet.getPhysicsEngineParameters(self.physicsClientId)["fixedTimeStep"]
+        if seconds != self._rhythm[2]:
+            self._rhythm = self.steps, self.time, seconds
+        self.steps += 1
+        self.time = self._rhythm[1] + (self.steps - self._rhythm[0]) * seconds
+        if self.steps % self.every:
+            return
+        try:
+            self._measure()
+        except KeyboardInterrupt:
+            self._bodies = None  # which may have been interrupted in the middle of anything
+            raise
+        except Exception:
+            self.leave()
+            raise
+
+    def _measure(self) -> None:
+        if self._bodies is None:
+            # The summary names what is left out. Only what is told here is not said.
+            for kind in (SkippedShapeWarning, SelfCollisionWarning):
+                warnings.filterwarnings("ignore", category=kind, module=rf"{__name__}$")
+            self._bodies = self._read()
+        else:
+            self._bodies.update()
+        contacts = self._bodies.overlaps(**self._asked)
+        with interrupted_later():
+            if self._take is None:
+                self._take = self._begun(self._bodies)
+            self._take(Frame(self.steps, self.time, self._bodies, contacts))
+            self.measured += 1
+
+    def _begun(self, bodies: Bodies) -> Callable[[Frame[Bodies]], None]:
+        """What takes the frames; the files are there from now on."""
+        settings = {"simulation": self.summary.scene, "every": self.every, **self._asked, **bodies.settings}
+        files = outputs(self.summary, settings, self.written, self.out, self.html, self._per, self._fcl)
+        return self._files.enter_context(files)
+
+    def close(self) -> None:
+        """End the watch: files are put in their places. OSError if one cannot be."""
+        self._end()
+        self._files.close()
+
+    def leave(self) -> None:
+        """End the watch because something failed: files stay beside their places, as `written` says."""
+        self._end()
+        self._files.__exit__(RuntimeError, RuntimeError(), None)
+
+    def _end(self) -> None:
+        self.open = False
+        unlisten(self._hear)
+        if self._own_recorder:
+            self._recorder.close()
+        if self._bodies:
+            self._bodies.close()
+        if self._fcl:
+            self._fcl.close()
+
+    def __enter__(self) -> Watch:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if isinstance(error, Exception):
+            self.leave()
+        else:
+            self.close()
+
+
+class Watches:
+    """Watches all clients of this process from their connection on; each that is measured has files of its own.
+
+    The first has `out` and `html`, the second `out-2` and so on. What cannot be measured or written ends the watch of
+    that client, and goes to `failed`, not to the code that makes steps.
+    """
+
+    def __init__(self, name: str, out: Path | None, html: Path | None, how: How) -> None:
+        self._name, self._out, self._html, self._how = name, out, html, how
+        self.all: list[Watch] = []
+        """Those that have measured something, in the order in which they began to."""
+        self.failed: list[tuple[Watch, Exception]] = []
+        self.steps = 0
+        """Of all clients, measured or not."""
+        self.in_real_time = False
+        """Whether a simulation was let run by the clock."""
+        self._of: dict[int, Watch] = {}
+        self._process = os.getpid()
+        listen(self._hear)
+
+    def _hear(self, name: str, arguments: Arguments, result: Any) -> None:
+        if os.getpid() != self._process:
+            return
+        if name == "connect" and result >= 0:
+            self._of[result] = _Kept(result, self._number, self.failed, name=self._name, **self._how)
+        elif name == "stepSimulation":
+            self.steps += 1
+        elif name == "setRealTimeSimulation":
+            self.in_real_time |= bool(arguments.get("enableRealTimeSimulation"))
+        elif name == "disconnect":
+            self._of.pop(arguments.get("physicsClientId", 0), None)
+
+    def _number(self, watch: Watch) -> None:
+        """Give a watch its files, as it is about to measure."""
+        self.all.append(watch)
+        number = len(self.all)
+        if number > 1:
+            watch.summary.scene += f", simulation {number}"
+        watch.out, watch.html = (
+            path and (path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}"))
+            for path in (self._out, self._html)
+        )
+
+    def end(self, failed: bool) -> None:
+        """End all watches; their files stay beside their places if what was watched has `failed`."""
+        if os.getpid() != self._process:
+            return
+        unlisten(self._hear)
+        for watch in self._of.values():
+            if watch.open:
+                watch.leave() if failed else watch.close()
+
+
+class _Kept(Watch):
+    """A watch that keeps its failures from the code that makes the steps."""
+
+    def __init__(
+        self, client: int, number: Callable[[Watch], None], failed: list[tuple[Watch, Exception]], **how: Any
+    ) -> None:
+        super().__init__(client, **how)
+        self._number, self._failed = number, failed
+
+    def _stepped(self) -> None:
+        try:
+            super()._stepped()
+        except Exception as error:
+            self._failed.append((self, error))
+
+    def _begun(self, bodies: Bodies) -> Callable[[Frame[Bodies]], None]:
+        self._number(self)
+        return super()._begun(bodies)
+
+    def close(self) -> None:
+        try:
+            super().close()
+        except Exception as error:
+            self._failed.append((self, error))
+
+
+def can_be_written(out: Path | None, html: Path | None) -> None:
+    """Now, not when much has been simulated: ValueError, OSError or ImportError of a table or a page that cannot be."""
+    for path in filter(None, (out, html)):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        must_be_writable(path)
+    if out:
+        must_be_a_table(out)
+    if html:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of meshcat's imports, and no business of the user's
+            import overlapper.viewer  # noqa: F401
+
+
+@contextmanager
+def interrupted_later() -> Iterator[None]:
+    """Ctrl-C waits for the end of the block, so that what is written is written whole."""
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[tuple[int, FrameType | None]] = []
+    signal.signal(signal.SIGINT, lambda number, frame: came.append((number, frame)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if came:
+            handler(*came[0])
