@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from round_exact import exactly
 from round_truth import dot, number, truth, vector
+from rules import a_turn_keeps_the_measures_of_round_bodies
 from strategies import product, quaternion, rotation
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
@@ -742,3 +743,10 @@ def test_lids_that_are_flat_but_for_rounding_are_as_many_planes_as_they_have_tri
     found = overlap(moved(a, by * np.array(found.normal)), b)
     lower, upper = found.certificate().verify()
     assert max(abs(found.volume - lower), abs(found.volume - upper)) <= found.volume_error <= sure * found.volume
+
+
+@pytest.mark.parametrize("seed", [421, 693, 2590, 3551])
+def test_of_planes_of_one_direction_the_nearer_bounds_a_slice(seed):
+    """Two triangles of a facet differ there by less than the corners far outside are right to."""
+    case = make("round_contacts", seed)
+    assert not a_turn_keeps_the_measures_of_round_bodies(case, overlap(*case.placed))

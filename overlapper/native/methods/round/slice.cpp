@@ -63,19 +63,45 @@ struct Polygon {
   void append(int edge, Point p) { line[size] = edge, x[size] = p.x, y[size] = p.y, ++size; }
 };
 
+bool of_one_direction(Point a, Point b) {
+  const double one = a.x * b.y, two = a.y * b.x;
+  return dot(a, b) > 0 && std::abs(one - two) <= 32 * DBL_EPSILON * (std::abs(one) + std::abs(two));
+}
+
 /// Whether two lines of one direction cross at no place but one that rounding has made up: anywhere on the two, or
 /// beyond the edge from p to q, although the other line has these on either side.
 bool along_one_another(const Slice& slice, int edge, int other, Point p, Point q) {
   const Point a = slice.stack.line[edge].normal, b = slice.stack.line[other].normal;
-  const double one = a.x * b.y, two = a.y * b.x, off = std::abs(one - two);
-  if (!(off <= 32 * DBL_EPSILON * dot(a, b))) return false;
-  if (off <= 32 * DBL_EPSILON * (std::abs(one) + std::abs(two))) return true;
+  if (!(std::abs(cross(a, b)) <= 32 * DBL_EPSILON * dot(a, b))) return false;
+  if (of_one_direction(a, b)) return true;
   const double along = dot(slice.corner(edge, other) - p, q - p);
   return !(along >= 0 && along <= dot(q - p, q - p));
 }
 
+/// Of two lines of one direction that lie nearer to one another than corners far away are right to, sides alone tell
+/// which is the nearer: it takes the other's place. True if there is such a line.
+bool replaced(Polygon& polygon, const Slice& slice, int line) {
+  const Line& b = slice.stack.line[line];
+  const double near = 64 * DBL_EPSILON * slice.stack.line[slice.stack.lines - 1].offset * b.length;
+  for (int i = 0; i < polygon.size; ++i) {
+    const Line& a = slice.stack.line[polygon.line[i]];
+    if (!of_one_direction(a.normal, b.normal)) continue;
+    const double farther = slice.side(polygon.line[i]) * (b.length / a.length) - slice.side(line);
+    if (!(std::abs(farther) <= near)) continue;
+    if (farther <= 0) return true;
+    const int before = i > 0 ? i - 1 : polygon.size - 1, after = i + 1 < polygon.size ? i + 1 : 0;
+    const Point from = slice.corner(polygon.line[before], line), to = slice.corner(line, polygon.line[after]);
+    polygon.line[i] = line;
+    polygon.x[before] = from.x, polygon.y[before] = from.y;
+    polygon.x[i] = to.x, polygon.y[i] = to.y;
+    return true;
+  }
+  return false;
+}
+
 /// Cuts off what lies beyond the line, with `spare` to work in and to be exchanged; false if nothing is left.
 bool clip(Polygon*& now, Polygon*& spare_one, const Slice& slice, int line) {
+  if (replaced(*now, slice, line)) return true;
   const Polygon& polygon = *now;
   Polygon& spare = *spare_one;
   const Stack& stack = slice.stack;
