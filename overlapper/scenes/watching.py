@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, TypedDict, get_args
 
 from overlapper.reference import Fcl
 from overlapper.scenes.outputs import Per, outputs
@@ -19,6 +19,7 @@ from overlapper.scenes.summary import Summary
 from overlapper.scenes.table_file import must_be_a_table
 from overlapper.simulation import Among, Bodies, Concave, Recorder, SelfCollisionWarning, SkippedShapeWarning, Surface
 from overlapper.simulation.calls import Arguments, listen, unlisten
+from overlapper.simulation.extraction.model import Settings
 from overlapper.whole_file import must_be_writable
 
 import pybullet  # isort: skip  # after the simulation, which says what to install
@@ -85,6 +86,9 @@ class Watch:
             raise ValueError(f"every must be a number of steps from 1, not {every}")
         if check not in (None, "fcl"):
             raise ValueError(f"check must be 'fcl' or None, not {check!r}")
+        if per not in get_args(Per):
+            raise ValueError(f"per must be 'shape' or 'link', not {per!r}")
+        Settings(concave, concave_threshold, surface)
         self.physicsClientId = physicsClientId
         self.out, self.html = (Path(path) if path else None for path in (out, html))
         can_be_written(self.out, self.html)
