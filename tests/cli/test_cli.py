@@ -77,7 +77,9 @@ def test_the_version_is_that_of_the_package():
 
 def test_help_shows_examples_and_is_what_a_bare_command_says():
     assert "overlapper run franka_grasp" in overlapper().stdout
+    assert "overlapper watch --html mine.html my_script.py" in overlapper().stdout
     assert "--html my_scene.html" in overlapper("run", "--help").stdout
+    assert "overlapper watch --direct my_script.py" in overlapper("watch", "--help").stdout
 
 
 def test_scenes_are_listed_with_what_happens_in_them():

@@ -2,6 +2,8 @@
 
 import re
 import signal
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -164,3 +166,12 @@ def test_an_interruption_in_the_middle_of_reading_costs_no_later_step(pile, monk
 def test_the_names_are_offered_by_the_package():
     assert overlapper.Log is Log
     assert overlapper.watch is overlapper.watch
+
+
+def test_the_loop_of_the_documents_is_watched():
+    text = (Path(__file__).parents[2] / "docs" / "watch.md").read_text(encoding="utf-8")
+    (loop,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    done = subprocess.run([sys.executable, "-c", loop], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) == 4  # wheels on the ground
+    assert {row["step"] % 4 for row in read_table(Path("r2d2.csv"))} == {0}
