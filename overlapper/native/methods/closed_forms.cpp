@@ -134,10 +134,10 @@ Part half_ball_below(double r, double sine, double cosine, double t, double heig
   const double spherical = r * r * (2 * kPi - 2 * exterior) + 2 * r * t * arc;
   // Segments of discs: area, and second moment about the disc's centre as that of a sector less that of a triangle.
   const double width = root / cosine;
-  const auto segment = [width](double radius, double half_angle, double height) {
-    const double area = radius * radius * half_angle - height * width;
+  const auto segment = [width](double radius, double half_angle, double over) {
+    const double area = radius * radius * half_angle - over * width;
     const double second =
-        radius * radius * radius * radius * half_angle / 2 - height * width * (3 * height * height + width * width) / 6;
+        radius * radius * radius * radius * half_angle / 2 - over * width * (3 * over * over + width * width) / 6;
     return std::pair(area, second);
   };
   const auto [cut, cut_second] = segment(rho, arc, -t * sine / cosine);
