@@ -148,7 +148,7 @@ def _show(watches: Watches, interrupted: bool) -> None:
         for line in remarks(summary):
             say(line, sys.stderr)
         if watch.every > 1:
-            say(f"Every {watch.every}th step was measured, {watch.measured} of {watch.steps}.", sys.stderr)
+            say(f"One step in {watch.every} was measured, {watch.measured} of {watch.steps}.", sys.stderr)
         for path in watch.written:
             say(f"Written: {path}", sys.stderr)
     if interrupted and watches.all:

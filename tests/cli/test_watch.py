@@ -134,7 +134,7 @@ def test_every_so_many_steps_are_measured():
     script("steps(20)")
     assert watch("--out", "all.csv", "script.py").returncode == 0
     done = watch("--out", "some.csv", "--every", "6", "script.py")
-    assert "Every 6th step was measured, 3 of 20." in done.stderr
+    assert "One step in 6 was measured, 3 of 20." in done.stderr
     chosen = [row for row in read_table(Path("all.csv")) if row["step"] in (6, 12, 18)]
     assert chosen and read_table(Path("some.csv")) == chosen
     done = watch("--out", "none.csv", "--every", "21", "script.py")
@@ -360,6 +360,17 @@ def test_a_disk_that_is_full_ends_the_watch_and_not_the_script(end, code):
     steps = {row["step"] for row in read_table(Path("own.unfinished.csv"))}
     assert steps in (set(range(1, int(last))), set(range(1, int(last) + 1)))
     assert Path("own.csv").read_text() == "of yesterday"
+
+
+@pytest.mark.parametrize("end", ["", "p.disconnect(c); print('on it goes')"])
+def test_a_page_that_cannot_be_written_in_the_end_is_told(end):
+    script(f"c = steps(3)\n{FULL}\n{end}")
+    Path("own.html").write_text("of yesterday")
+    done = watch("--html", "own.html", "script.py")
+    assert (done.returncode, done.stdout) == (2, "on it goes\n" if end else "")
+    last = "overlapper: script.py was watched up to step 3: cannot write the results: File too large"
+    assert done.stderr.splitlines()[-1] == last and "Written" not in done.stderr
+    assert Path("own.html").read_text() == "of yesterday"
 
 
 def test_shapes_that_cannot_be_read_end_the_watch_and_not_the_script():
