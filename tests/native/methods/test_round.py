@@ -750,3 +750,19 @@ def test_of_planes_of_one_direction_the_nearer_bounds_a_slice(seed):
     """Two triangles of a facet differ there by less than the corners far outside are right to."""
     case = make("round_contacts", seed)
     assert not a_turn_keeps_the_measures_of_round_bodies(case, overlap(*case.placed))
+
+
+def test_a_corner_far_along_a_slice_lies_on_the_line_that_is_near():
+    # Along the capsule's side, the shallow wedge between an edge's planes is a million times as long as thick.
+    quaternions = (
+        (-0.5313145913072558, 0.5970141033675275, 0, 0.3989351404014111),
+        (1.6266727903151692, 1.008756250097606, -0.19070143169002304, 1.1952774054593656),
+    )
+    capsule = Capsule(1.7147773662353345, 0.5468782601593691)
+    box = Box([0.792969742836171, 0.3970358065590349, 0.6134672871300209])
+    found = overlap(
+        Placed(capsule, (-13636.426426100701, 8080.76746871306, 8716.486692016246), quaternions[0]),
+        Placed(box, (-13638.381416296654, 8081.188494593891, 8715.509426177532), quaternions[1]),
+    )
+    lower, upper = found.certificate().verify()
+    assert max(abs(found.volume - lower), abs(found.volume - upper)) <= found.volume_error <= 1e-12 * found.volume

@@ -72,21 +72,34 @@ struct Line {
   double offset_tail = 0, rate_tail = 0;
 };
 
-/// The points where two lines cross, from their sides: the first line's foot, and as far along that as the second says.
-/// However nearly parallel the two are, the point lies on both but for the rounding of their sides.
+/// The points where two lines cross, from their sides: the foot of the nearer line, and as far along that as the other
+/// says. So the point lies on both but for the rounding of their sides, however nearly parallel the two are, and
+/// however much farther one of them is.
 struct LineCorner {
-  Point foot, way;
-  double share, inverse;
+  struct Base {
+    Point foot, way;
+    double share, inverse;
+  };
+  std::array<Base, 2> base;
+  std::array<double, 2> length;
 
-  LineCorner(const Line& first, const Line& second) {
+  LineCorner(const Line& first, const Line& second) : length{first.length, second.length} {
     const Point a = first.normal, b = second.normal;
-    const double square = first.length * first.length;
-    foot = (1 / square) * a, way = {-a.y, a.x};
-    share = dot(a, b) / square, inverse = 1 / cross(a, b);
+    const double both = dot(a, b), inverse = 1 / cross(a, b);
+    base[0] = about(a, first.length, both, inverse), base[1] = about(b, second.length, both, -inverse);
   }
   Point operator()(double first_side, double second_side) const {
-    const double along = (second_side - share * first_side) * inverse;
-    return {first_side * foot.x + along * way.x, first_side * foot.y + along * way.y};
+    const bool second = std::abs(second_side) * length[0] < std::abs(first_side) * length[1];
+    const Base& nearer = base[second];
+    const double side = second ? second_side : first_side, other = second ? first_side : second_side;
+    const double along = (other - nearer.share * side) * nearer.inverse;
+    return {side * nearer.foot.x + along * nearer.way.x, side * nearer.foot.y + along * nearer.way.y};
+  }
+
+ private:
+  static Base about(Point normal, double length, double both, double inverse) {
+    const double square = length * length;
+    return {(1 / square) * normal, {-normal.y, normal.x}, both / square, inverse};
   }
 };
 
