@@ -10,6 +10,7 @@ from overlapper.scenes.scene import Scene, SceneError, Step, broken
 from overlapper.scenes.still import Still
 from overlapper.simulation import Among, Bodies, Concave, Recorder, Surface
 from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.extraction.naming import named
 from overlapper.simulation.extraction.saved_scene import NotSaved
 
 import pybullet  # isort: skip  # after the simulation, which says what to install
@@ -61,7 +62,12 @@ def run(
     try:
         step = _built(scene, client)
         bodies = Bodies(
-            client, concave=concave, concave_threshold=concave_threshold, surface=surface, recorder=recorder
+            client,
+            concave=concave,
+            concave_threshold=concave_threshold,
+            surface=surface,
+            recorder=recorder,
+            names=scene.names,
         )
         seconds = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
         for i in range(steps or scene.steps):
@@ -78,10 +84,15 @@ def run(
 
 
 def _built(scene: Scene, client: int) -> Step | None:
+    scene.names.clear()
     try:
         step = scene.build(client)
     except Exception as error:
         raise broken(scene.path, "cannot be built", error) from error
+    try:
+        named(scene.names)
+    except ValueError as error:
+        raise SceneError(f"{scene.path} has NAMES that are none: {error}") from error
     if step is not None and not callable(step):
         raise SceneError(f"build(client) of {scene.path} must return None or a function step(i), not {step!r}")
     return step

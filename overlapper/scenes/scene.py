@@ -3,7 +3,8 @@
 A scene is a Python file with a docstring that says what is hard about it, `STEPS`, and `build(client)`, which fills the
 pybullet client and may return `step(i)`, called before every stepSimulation. `PAIRS`, if it is there, says which pairs
 are looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
-apart.
+apart. `NAMES`, a dictionary that `build` fills, has names of bodies by their numbers, as `simulation.Bodies` takes
+them.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import difflib
 import re
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -35,6 +36,7 @@ class Scene:
     steps: int
     build: Callable[[int], Step | None]
     pairs: Any = "simulated"
+    names: dict[int, str] = field(default_factory=dict)
 
     @property
     def expected(self) -> Path:
@@ -100,7 +102,10 @@ def load_scene(name_or_path: str | Path) -> Scene:
     pairs = getattr(module, "PAIRS", "simulated")
     if isinstance(pairs, str) and pairs not in ("simulated", "all"):
         raise SceneError(f"{path} has PAIRS = {pairs!r}, which must be 'simulated', 'all' or a list of pairs")
-    return Scene(path.stem, path, (module.__doc__ or "").strip(), steps, build, pairs)
+    names = getattr(module, "NAMES", {})
+    if not isinstance(names, dict):
+        raise SceneError(f"{path} has NAMES = {names!r}, which must be a dictionary of names by the numbers of bodies")
+    return Scene(path.stem, path, (module.__doc__ or "").strip(), steps, build, pairs, names)
 
 
 def _find(name_or_path: str | Path) -> Path:

@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType, TracebackType
@@ -50,9 +50,9 @@ class Watch:
     and take them at the end of the `with`, by `close()`, or when the client disconnects, but stay there after an error,
     as `written` then says. `every` is the number of steps from one that is measured to the next, `per` what the rows of
     the table are of, check="fcl" asks FCL, too; `surface`, `concave` and `concave_threshold` are those of
-    `simulation.Bodies`, `pairs`, `tolerance` and `method` of `Bodies.overlaps`. What pybullet cannot be asked for
-    (pair filters, the filter mode, self-collision, height fields) is known if it was said after the watch began, or to
-    `recorder`.
+    `simulation.Bodies`, as are `names`; `pairs`, `tolerance` and `method` of `Bodies.overlaps`. What pybullet cannot be
+    asked for (pair filters, the filter mode, self-collision, height fields, files) is known if it was said after the
+    watch began, or to `recorder`.
 
     Steps are noticed of `pybullet.stepSimulation`, not of a name that was imported `from pybullet` before, and not in
     other processes; a simulation in real time is not stepped by calls. What cannot be measured or written raises in the
@@ -78,6 +78,7 @@ class Watch:
         per: Per = "shape",
         check: Literal["fcl"] | None = None,
         recorder: Recorder | None = None,
+        names: Mapping[int, str] | None = None,
         name: str = "the simulation",
     ) -> None:
         if not pybullet.isConnected(physicsClientId):
@@ -107,6 +108,7 @@ class Watch:
             concave_threshold=concave_threshold,
             surface=surface,
             recorder=self._recorder,
+            names=names,
         )
         self._asked: dict[str, Any] = {"tolerance": tolerance, "method": method, "pairs": pairs}
         self._fcl = Fcl() if check else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from typing import Literal
 
@@ -27,6 +27,7 @@ from overlapper.simulation.extraction.model import (
     Skipped,
     Surface,
 )
+from overlapper.simulation.extraction.naming import named
 from overlapper.simulation.ground import Grounds
 from overlapper.simulation.known_bodies import KnownBodies
 from overlapper.simulation.layout import Layout
@@ -74,6 +75,9 @@ class Bodies:
     Height fields that a recorder has noted are modelled as the prisms below their triangles, near what may meet them;
     behind what moves away they are released. `report()` counts all triangles, and as read those modelled.
 
+    A body is called by the `names` given, by its number; else by the stem of its file, which a recorder hears, by the
+    name of its robot, or by its mesh or kind of shape, whichever says most.
+
     That a body collides with itself, and no recorder has heard of it, is seen in pybullet's contact points. overlaps()
     says so with one SelfCollisionWarning.
 
@@ -85,8 +89,8 @@ class Bodies:
     them apart. Bodies that another process adds to a shared simulation are noticed after `pybullet.syncBodyInfo()`. To
     those that loadBullet brings pybullet gives no ids; they are counted in `skipped`.
 
-    ValueError if `physicsClientId` is not connected, or the recorder is of another client; RuntimeError if the physics
-    server writes where this process cannot read.
+    ValueError if `physicsClientId` is not connected, the recorder is of another client, or a name is none; RuntimeError
+    if the physics server writes where this process cannot read.
     """
 
     def __init__(
@@ -97,12 +101,13 @@ class Bodies:
         concave_threshold: float = 0.05,
         surface: Surface = "nominal",
         recorder: Recorder | None = None,
+        names: Mapping[int, str] | None = None,
     ) -> None:
         if recorder and recorder.physicsClientId != physicsClientId:
             raise ValueError(f"recorder is of client {recorder.physicsClientId}, not of {physicsClientId}")
         self.physicsClientId = physicsClientId
         settings = Settings(concave, concave_threshold, surface)
-        self._known = KnownBodies(physicsClientId, settings, recorder)
+        self._known = KnownBodies(physicsClientId, settings, recorder, named(names))
         self._settings, self._recorder = settings, recorder
         self._in_force = RulesInForce(recorder)
         self._grounds = Grounds(physicsClientId)

@@ -28,6 +28,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("fileName", "basePosition", "baseOrientation", "useMaximalCoordinates", "useFixedBase", "flags"),
         *("globalScaling", "physicsClientId"),
     ),
+    "loadSDF": ("sdfFileName", "useMaximalCoordinates", "globalScaling", "physicsClientId"),
     "loadMJCF": ("mjcfFileName", "flags", "useMultiBody", "physicsClientId"),
     "createMultiBody": (
         *("baseMass", "baseCollisionShapeIndex", "baseVisualShapeIndex", "basePosition", "baseOrientation"),

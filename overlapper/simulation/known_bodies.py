@@ -22,8 +22,11 @@ class KnownBodies:
     body and link, as they were when the last body was read, or at the last `read_filters`.
     """
 
-    def __init__(self, client: int, settings: Settings, recorder: Recorder | None) -> None:
+    def __init__(
+        self, client: int, settings: Settings, recorder: Recorder | None, given_names: Mapping[int, str]
+    ) -> None:
         self._client, self._settings, self._recorder = client, settings, recorder
+        self._given_names = given_names
         self._marks = BodyMarks(client)
         self._unidentified = 0
         self._scenes_loaded = -1  # those that the recorder has noted
@@ -143,7 +146,8 @@ class KnownBodies:
         for id in fresh:
             body = file.bodies[rows[id]] if id in rows else None
             field = self._recorder.height_field(id) if self._recorder else None
-            known[id] = read_body(client, id, file, body, self._settings, field)
+            source = self._recorder.sources.get(id) if self._recorder else None
+            known[id] = read_body(client, id, file, body, self._settings, field, source, self._given_names.get(id))
             self._marks.put(id)
         self.by_id = dict(sorted(known.items()))
         grown, self._unidentified = unidentified > self._unidentified, unidentified

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import os
+from typing import Any, NamedTuple
 
 import pybullet
 
@@ -14,11 +15,21 @@ Link = tuple[int, int]  # body and link, -1 for the base
 # What is heard, and says nothing of collisions.
 UNNOTED = frozenset({"connect", "stepSimulation", "setRealTimeSimulation"})
 
+# The parameters of the functions that make bodies from a file.
+FILE_NAMES = ("fileName", "sdfFileName", "mjcfFileName")
+
+
+class Source(NamedTuple):
+    """The file that a body was loaded from, `alone` or with others."""
+
+    file: str
+    alone: bool
+
 
 class Recorder:
-    """Notes what pybullet is told about collisions and cannot be asked for later.
+    """Notes what pybullet is told and cannot be asked for later.
 
-    These are pair filters, the filter mode, self-collision and the data of height fields.
+    These are pair filters, the filter mode, self-collision, the data of height fields, and the files of bodies.
 
         client = pybullet.connect(pybullet.DIRECT)
         recorder = Recorder(client)
@@ -48,6 +59,8 @@ class Recorder:
         """collisionFilterMode 0; by default one mask that admits the other's group is enough."""
         self.self_collision: dict[int, int] = {}
         """The flags, by body, that a body with URDF_USE_SELF_COLLISION was loaded with."""
+        self.sources: dict[int, Source] = {}
+        """Where bodies come from that loadURDF, loadSDF or loadMJCF made."""
         self._fields: dict[int, HeightField] = {}  # by shape
         self._shapes: dict[int, int] = {}  # by body that is a height field
 
@@ -81,10 +94,13 @@ class Recorder:
             case "setPhysicsEngineParameter":
                 if (mode := arguments.get("collisionFilterMode", -1)) >= 0:
                     self.both_masks_must_agree = mode == 0
-            case "loadURDF" | "loadMJCF" | "createMultiBody":
+            case "loadURDF" | "loadSDF" | "loadMJCF" | "createMultiBody":
                 flags = arguments.get("flags", 0)
-                for body in result if isinstance(result, tuple) else (result,):
+                made = result if isinstance(result, tuple) else (result,)
+                for body in made:
                     self._drop(body)
+                    if file := next((arguments[each] for each in FILE_NAMES if each in arguments), None):
+                        self.sources[body] = Source(os.fspath(file), len(made) == 1)
                     if arguments.get("baseCollisionShapeIndex", -1) in self._fields:
                         self._shapes[body] = arguments["baseCollisionShapeIndex"]
                     if flags & pybullet.URDF_USE_SELF_COLLISION:
@@ -116,3 +132,4 @@ class Recorder:
     def _drop(self, body: int) -> None:
         self.self_collision.pop(body, None)
         self._shapes.pop(body, None)
+        self.sources.pop(body, None)

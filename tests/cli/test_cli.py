@@ -98,7 +98,7 @@ def test_what_is_not_modelled_is_named_below_the_table(tmp_path):
     assert done.returncode == 0
     assert "Nothing overlaps in 2 steps." in done.stdout
     assert "2 bodies, 1 of 2 shapes read" in done.stdout
-    assert re.search(r"^Not modelled: body 1/.*concave", done.stdout, re.MULTILINE)
+    assert re.search(r"^Not modelled: mesh/link0, .*concave", done.stdout, re.MULTILINE)
     assert done.stderr == ""
 
 
@@ -193,7 +193,7 @@ def test_a_concave_mesh_is_named_with_its_parts_and_where_they_are_kept(tmp_path
     assert first.stdout == second.stdout
     assert "CoACD decomposes a mesh of 28 triangles, once" in first.stderr and second.stderr == ""
     words = (
-        r"^Concave: body 0/link0 is (\d+) convex parts of (\S+) m³ together, the mesh bounds (\S+) m³; kept in (.*)\.$"
+        r"^Concave: mesh/link0 is (\d+) convex parts of (\S+) m³ together, the mesh bounds (\S+) m³; kept in (.*)\.$"
     )
     parts, volume, mesh, path = re.search(words, first.stdout, re.MULTILINE).groups()
     assert int(parts) >= 5
@@ -204,7 +204,7 @@ def test_a_concave_mesh_is_named_with_its_parts_and_where_they_are_kept(tmp_path
     cap = 3.14159 * 0.01**2 * (0.09 - 0.01) / 3  # of a ball of 3 cm, 1 cm high
     assert pair["largest_volume_m3"] == pytest.approx(cap, rel=0.05)
     skipped = overlapper("run", "cup.py", "--concave", "skip")
-    assert "Not modelled: body 0/link0, a concave mesh is left out" in skipped.stdout
+    assert "Not modelled: mesh/link0, a concave mesh is left out" in skipped.stdout
 
 
 def test_a_threshold_out_of_range_is_refused():
@@ -220,9 +220,9 @@ def test_a_run_prints_a_table_of_pairs_with_units():
     quantities, units, _, first, second = lines[next(k for k, line in enumerate(lines) if "volume" in line) :][:5]
     assert quantities.split() == ["volume", "±", "depth", "normal", "at"]
     assert units.split() == ["pair", "of", "links", "steps", "cm³", "cm³", "mm", "x,", "y,", "z", "step"]
-    assert first.split()[:2] == ["body", "0/link0"]
-    assert second.split() == ["body", "1/link0"]
-    steps, volume, _, depth, *normal, _ = first.split()[2:]
+    assert first.split()[0] == "box#0/link0"
+    assert second.split() == ["box#1/link0"]
+    steps, volume, _, depth, *normal, _ = first.split()[1:]
     assert (steps, volume, depth, normal) == ("8", "200", "20", ["+0.00", "+0.00", "-1.00"])
     assert "2 of 2 shapes read" in done.stdout
     assert done.stderr == "a scene may talk\n"

@@ -127,7 +127,7 @@ def test_pair_filters_that_the_script_sets_are_known():
     said = [watch("--json", f"--pairs={pairs}", "script.py").stderr for pairs in ("simulated", "all")]
     answers = [json.loads(words.splitlines()[-1]) for words in said]
     fewer, more = ({tuple(pair["names"]) for pair in answer["simulations"][0]["pairs"]} for answer in answers)
-    assert more - fewer == {("body 0/link0", "body 1/link0")}
+    assert more - fewer == {("box#0/link0", "box#1/link0")}
 
 
 def test_every_so_many_steps_are_measured():

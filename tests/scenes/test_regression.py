@@ -77,6 +77,11 @@ def test_a_run_can_be_shorter_than_the_scene_or_show_some_steps_of_it(scene_file
             "STEPS = 5\nPAIRS = 'some'\ndef build(client): pass",
             "PAIRS = 'some', which must be 'simulated', 'all' or a list",
         ),
+        ("STEPS = 5\nNAMES = ['duck']\ndef build(client): pass", r"NAMES = \['duck'\], which must be a dictionary"),
+        (
+            "STEPS = 5\nNAMES = {}\ndef build(client): NAMES['duck'] = 1",
+            r"has NAMES that are none: names must have names by the numbers of bodies, such as .*, not 'duck': 1",
+        ),
         ("STEPS = 5\ndef build(client:", "cannot be loaded at line 2: SyntaxError"),
         (
             "\nimport nothing_like_it",

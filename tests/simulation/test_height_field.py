@@ -142,7 +142,7 @@ def test_a_field_without_a_finite_pose_is_left_out_until_it_has_one(client, reco
     bodies = Bodies(client, recorder=recorder)
     before = modelled(bodies, ground)
     p.resetBasePositionAndOrientation(ground, [math.nan] * 3, [0, 0, 0, 1], physicsClientId=client)
-    with pytest.warns(SkippedShapeWarning, match=f"body {ground} .*no finite pose"):
+    with pytest.warns(SkippedShapeWarning, match=rf"height field \(body {ground}, .*no finite pose"):
         bodies.update()
     assert modelled(bodies, ground) == {} and bodies.overlaps() == []
     p.resetBasePositionAndOrientation(ground, [0, 0, 0], [0, 0, 0, 1], physicsClientId=client)

@@ -17,6 +17,7 @@ from overlapper.simulation.extraction.bullet_file import BulletFile, Leaf, Saved
 from overlapper.simulation.extraction.height_field import HeightField
 from overlapper.simulation.extraction.model import BASE, Body, Color, Decomposed, Ground, Part, Settings, Skipped
 from overlapper.simulation.extraction.modelling import in_one_sentence, modelled
+from overlapper.simulation.extraction.naming import body_name
 from overlapper.simulation.extraction.saved_scene import MULTIBODY, SOFT_BODY, body_type
 
 REPORTED = {  # by getCollisionShapeData
@@ -37,14 +38,19 @@ def read_body(
     saved: SavedBody | None,
     settings: Settings,
     field: HeightField | None = None,
+    source: tuple[str, bool] | None = None,
+    given: str | None = None,
 ) -> Body:
-    """A body as it is in a .bullet file, and in pybullet; `field` is the height field that it is known to be."""
-    base, name = (printable(text.decode(errors="replace")) for text in pybullet.getBodyInfo(id, client))
-    name = name or f"body {id}"
+    """A body as it is in a .bullet file, and in pybullet; `field` is the height field that it is known to be.
+
+    `source` is the file that it was loaded from and whether alone, `given` the name that it has been given.
+    """
+    base, own = (printable(text.decode(errors="replace")) for text in pybullet.getBodyInfo(id, client))
     joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
     link_names = {BASE: base or "base"} | {joint[0]: printable(joint[12].decode(errors="replace")) for joint in joints}
     parents = {joint[0]: joint[16] for joint in joints}
     leaves = _leaves(client, id, file, saved) if saved else {}
+    name = given or _name(client, id, own, source, leaves) or f"body {id}"
     parts: list[Part] = []
     skipped: list[Skipped] = []
     decomposed: list[Decomposed] = []
@@ -82,6 +88,20 @@ def read_body(
         tuple(decomposed),
         ground,
     )
+
+
+def _name(
+    client: int, id: int, own: str, source: tuple[str, bool] | None, leaves: Mapping[int, tuple[Leaf, ...]]
+) -> str:
+    """What a body is called that has been given no name; empty if nothing says anything."""
+    meshes: list[str] = []
+    only = leaves.get(BASE, ()) if pybullet.getNumJoints(id, client) == 0 else ()
+    if only:
+        seen = pybullet.getVisualShapeData(id, physicsClientId=client)
+        meshes = [each[4].decode(errors="replace") for each in seen if each[4] != b"unknown_file"]
+    kind = only[0].kind.removeprefix("concave ") if len(only) == 1 else None
+    file, alone = source or (None, True)
+    return body_name(own, file, alone, meshes, kind)
 
 
 def _colors(client: int, id: int, links: Mapping[int, str]) -> dict[int, Color]:

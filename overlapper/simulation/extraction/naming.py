@@ -1,0 +1,66 @@
+"""What a person would call a body: by its file, by the name of its robot, or by what it is made of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
+
+import numpy as np
+
+from overlapper.printable import printable
+
+ENDINGS = (".urdf", ".sdf", ".xml", ".obj", ".stl", ".dae")
+
+# Words that many robots, files and meshes bear, and that tell none from another: exporters and templates write them.
+EMPTY = {"base", "body", "collision", "cube", "description", "dump", "dumpurdf", "link", "main", "mesh", "model", "obj"}
+EMPTY |= {"object", "part", "physics", "robot", "scene", "sdf", "untitled", "urdf", "visual", "world", "xml"}
+IN_FILE_NAMES = EMPTY - {"cube"}  # robots are called so by whoever copied one, files only if they are of one
+# Words that are left out at the end of a name: duck_vhacd is a duck.
+OF_TOOLS = {"coacd", "description", "urdf", "vhacd"}
+
+
+def body_name(own: str, file: str | None, alone: bool, meshes: Sequence[str], kind: str | None) -> str:
+    """The name that says most, or an empty one.
+
+    `own` is what pybullet calls it, `file` what it was loaded from, `alone` or with others, `meshes` are the files of a
+    body of one link, and `kind` is what its only shape is.
+    """
+    stem, folder = (PurePath(file).stem, PurePath(file).parent.name) if file else ("", "")
+    named_after_a_file = own.lower().endswith(ENDINGS)
+    plain = PurePath(own.replace("\\", "/")).stem if named_after_a_file else own
+    of_file = [name for name in (stem, folder) if _says_something(name, IN_FILE_NAMES)]
+    # Of a file of many bodies, their own names are all that tells them apart.
+    own_says = _says_something(plain, EMPTY) and not (named_after_a_file and alone)
+    candidates = [plain] if own_says else []
+    if alone and of_file[:1] == [stem]:
+        candidates = of_file[:1] + candidates
+    candidates += of_file
+    candidates += [name for name in (PurePath(mesh).stem for mesh in meshes) if _says_something(name, IN_FILE_NAMES)]
+    candidates += [name for name in (plain, kind, stem) if name]
+    return printable(_without_words_of_tools(candidates[0])) if candidates else ""
+
+
+def _says_something(name: str, empty: set[str]) -> bool:
+    """Whether there is a word that is not empty; a model is a model, of whatever kind."""
+    words = [word.strip("0123456789") or word for word in re.findall(r"[^\W_]+", name.lower())]
+    said = [word for word in words if word not in empty and len(word) > 1 and not word.isdigit()]
+    return bool(said) and words[0] != "model"
+
+
+def _without_words_of_tools(name: str) -> str:
+    first, *rest = name.split("_")
+    while rest and rest[-1].lower() in OF_TOOLS:
+        rest.pop()
+    return "_".join([first, *rest])
+
+
+def named(names: Mapping[int, str] | None) -> dict[int, str]:
+    """The names given to bodies by their numbers, fit to be seen. ValueError if they are none."""
+    wanted = "names must have names by the numbers of bodies, such as {3: 'duck'}, not "
+    if not isinstance(names or {}, Mapping):
+        raise ValueError(f"{wanted}{names!r}")
+    for body, name in (names or {}).items():
+        if not (isinstance(body, int | np.integer) and isinstance(name, str) and name.strip()):
+            raise ValueError(f"{wanted}{body!r}: {name!r}")
+    return {int(body): printable(name) for body, name in (names or {}).items()}
