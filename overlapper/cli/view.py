@@ -6,7 +6,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,7 @@ from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
 
 if TYPE_CHECKING:
-    from overlapper.scenes.playback import Playback
+    from overlapper.scenes.playback import Playback, View
     from overlapper.viewer.look import Look
 
 
@@ -122,12 +122,21 @@ def _film(playback: Playback, html: Path, looks: Sequence[Look], written: list[P
 def _picture(playback: Playback, png: Path, step: int | None, close: bool, looks: tuple[Look, Look]) -> None:
     from overlapper.scenes.playback import at_step, largest
     from overlapper.viewer import picture
+    from overlapper.viewer.framing import Framing
 
-    views = with_progress(playback.views, playback.name, playback.total)
-    view = at_step(views, step) if step else largest(views)
+    framing = None
+
+    def watched() -> Iterator[View]:
+        nonlocal framing
+        for each in with_progress(playback.views, playback.name, playback.total):
+            framing = framing or Framing(each.bodies)
+            framing.see(each.bodies, each.contacts)
+            yield each
+
+    view = at_step(watched(), step) if step else largest(watched())
     png.parent.mkdir(parents=True, exist_ok=True)
     title = f"{playback.name}, step {view.step}, {view.time:.3f} s"
-    picture.save(png, view.bodies, view.contacts, title, close, looks)
+    picture.save(png, view.bodies, view.contacts, title, close, looks, framing)
 
 
 def _live(playback: Playback, looks: Sequence[Look], host: str) -> None:

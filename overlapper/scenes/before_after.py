@@ -10,8 +10,6 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 
-import numpy as np
-
 from overlapper.scenes.comparison import Move
 from overlapper.scenes.still import Still
 from overlapper.scenes.verdict import Verdict
@@ -34,7 +32,6 @@ def save(verdict: Verdict, name: str, path: Path) -> Path:
         "step": str(step),
         "verdicts": "\n".join(_section(*each) for each in sections.items()),
         "recording": base64.b64encode(gzip.compress(recording, compresslevel=6, mtime=0)).decode(),
-        "camera": _camera(stills),
     }
     page = filled(Path(__file__).with_suffix(".html"), texts, recording.decode())
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -57,21 +54,6 @@ def _recording(stills: Sequence[Still], tolerance: float) -> bytes:
         recording.add(still, still.contacts(tolerance), float(time))
     with tempfile.TemporaryDirectory() as folder:
         return recording.save(Path(folder) / "page.html").read_bytes()
-
-
-def _camera(stills: Sequence[Still]) -> str:
-    """Where the recording is to be seen from, in its own words, so that what is bounded of both frames is in sight."""
-    bounds = [placed.bounds for still in stills for placed in still.placed if np.isfinite(placed.bounds).all()]
-    if not bounds:
-        return ""
-    lower, upper = np.min([each[0] for each in bounds], axis=0), np.max([each[1] for each in bounds], axis=0)
-    at = (lower + upper) / 2
-    # The recording's camera sees 35 degrees, which a ball fills from 1.66 times its diameter.
-    back = np.array([0.60, -0.68, 0.42])
-    start = at + 1.66 * float(np.linalg.norm(upper - lower)) * back
-    return "&" + "&".join(
-        f"{name}={','.join(f'{value:.6g}' for value in point)}" for name, point in (("from", start), ("at", at))
-    )
 
 
 def _section(cause: str, moves: Sequence[Move]) -> str:

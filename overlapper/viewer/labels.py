@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 from overlapper import Overlap, Placed
 
 ROOT = "/overlapper/bodies"
+Pair = tuple[str, str]
+Link = tuple[str, str]  # body and link
 
 # meshcat's tree and its panel look names up in objects, where these are found before any is put there; "<object>" is
 # what it calls the drawing at a node.
@@ -69,17 +71,26 @@ def body_paths(bodies: Bodies) -> list[str]:
     return [f"{ROOT}/{'/'.join(names[body, link])}/{shape}" for body, link, shape in bodies.keys]
 
 
-def pairs(bodies: Bodies, contacts: Iterable[Contact]) -> dict[tuple[str, str], Overlap]:
+def pairs(bodies: Bodies, contacts: Iterable[Contact]) -> dict[Pair, Overlap]:
     """The overlapping pairs by their names; a link or shape is named only where its body or link has more than one."""
+    return {pair: overlap for pair, _, overlap in labelled(bodies, contacts)}
+
+
+def labelled(bodies: Bodies, contacts: Iterable[Contact]) -> Iterator[tuple[Pair, tuple[Link, Link], Overlap]]:
+    """The name of each overlapping pair, its bodies and links, and the overlap; "" is the link of a body of one."""
     names = link_names(bodies)
     links = Counter(body for body, _ in names)
     shapes = Counter((body, link) for body, link, _ in bodies.keys)
 
-    def name(body: int, link: int, shape: int) -> str:
+    def where(body: int, link: int) -> Link:
         first, rest = names[body, link]
-        label = f"{first}.{rest}" if links[body] > 1 else first
+        return first, rest if links[body] > 1 else ""
+
+    def name(body: int, link: int, shape: int) -> str:
+        label = ".".join(filter(None, where(body, link)))
         return f"{label}.{shape}" if shapes[body, link] > 1 else label
 
-    return {
-        (name(c.bodyA, c.linkA, c.shapeA), name(c.bodyB, c.linkB, c.shapeB)): c.overlap for c in contacts if c.overlap
-    }
+    for c in contacts:
+        if c.overlap:
+            pair = name(c.bodyA, c.linkA, c.shapeA), name(c.bodyB, c.linkB, c.shapeB)
+            yield pair, (where(c.bodyA, c.linkA), where(c.bodyB, c.linkB)), c.overlap

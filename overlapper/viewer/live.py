@@ -17,8 +17,9 @@ import numpy as np
 
 from overlapper import Overlap
 from overlapper.process import START_LIMIT, Ended, NotStarted, Worker
+from overlapper.viewer.framing import Framing
 from overlapper.viewer.labels import Bodies, Contact, body_paths, pairs
-from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, boxes, volume_text
+from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, volume_text
 from overlapper.viewer.recording import Recording
 from overlapper.viewer.stage import Stage, matrix
 
@@ -65,10 +66,13 @@ class Viewer:
 
     def show(self, bodies: Bodies, contacts: Iterable[Contact]) -> None:
         """Draw the bodies where they are now and the overlapping pairs among `contacts`, in place of what was there."""
+        contacts = list(contacts)
         if self._stage is None:
-            self._stage = Stage(bodies.placed, *self._looks)
+            framing = Framing(bodies)
+            self._stage = Stage(framing, *self._looks)
             if self._server:
-                self._stage.set(self.visualizer, boxes(bodies.placed))
+                framing.see(bodies, contacts)
+                self._stage.set(self.visualizer, framing.whole())  # what will move is not known yet
         self._show_bodies(self._stage, bodies)
         self._show_overlaps(self._stage, pairs(bodies, contacts))
 

@@ -9,13 +9,12 @@ for in many models everything is white or grey.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import HalfSpace, Overlap, Placed
+from overlapper import Overlap
 from overlapper import overlap as common_part
 
 Array = NDArray[np.float64]
@@ -32,6 +31,8 @@ OWNER_COLORS = [
 INK = (1.00, 0.31, 0.64)  # for what shines through everything: a colour that models hardly ever have
 LINE = (0.91, 0.92, 0.94)  # edges and vertices of overlaps
 TOP, BOTTOM = (0.20, 0.23, 0.28), (0.09, 0.10, 0.13)  # of the background
+GROUND, GRID = (0.36, 0.40, 0.47), (0.62, 0.68, 0.77)  # of a ground: its face and its lines, calm
+GROUND_OPACITY, GRID_OPACITY = 0.5, 0.45  # in its middle; it fades out from there
 LIGHT = np.array([0.5, -0.8, 1.4]) / np.linalg.norm([0.5, -0.8, 1.4])  # the way to it
 FIELD_OF_VIEW = 35.0  # degrees, from bottom to top
 PARTS = ("faces", "edges", "vertices", "marks")  # what a Look may show
@@ -71,24 +72,6 @@ OVERLAPS = Look(edges=False)
 def channels(color: str) -> Array:
     """(3,) red, green and blue in 0..1 of a colour #rrggbb."""
     return np.array([int(color[k : k + 2], 16) for k in (1, 3, 5)]) / 255
-
-
-def boxes(placed: Iterable[Placed]) -> list[Array]:
-    """The boxes (2, 3) around what is bounded; one about the origin if nothing is."""
-    bounded = [np.asarray(each.bounds) for each in placed if not isinstance(each.shape, HalfSpace)]
-    return bounded or [np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])]
-
-
-def camera(framed: Sequence[Array]) -> tuple[Array, Array, float]:
-    """The point to look at, the unit direction from it to the camera, and how far off that sees all boxes, in 4 : 3."""
-    corners = np.array(framed)
-    center = (corners[:, 0].min(axis=0) + corners[:, 1].max(axis=0)) / 2
-    back = np.array([0.60, -0.68, 0.42]) / np.linalg.norm([0.60, -0.68, 0.42])
-    right = np.array([-back[1], back[0], 0.0]) / np.hypot(back[0], back[1])
-    corners = np.array([corners[:, list(pick), range(3)] for pick in np.ndindex(2, 2, 2)]).reshape(-1, 3) - center
-    slope = np.tan(np.deg2rad(FIELD_OF_VIEW) / 2)
-    aside = np.maximum(np.abs(corners @ np.cross(back, right)), np.abs(corners @ right) / (4 / 3))
-    return center, back, float(1.15 * np.max(aside / slope + corners @ back))
 
 
 def to_draw(overlap: Overlap, size: float) -> Overlap:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Sphere
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Shape, Sphere
 
 Array = NDArray[np.float64]
 Facets = Sequence[NDArray[np.integer[Any]]]
@@ -31,8 +31,9 @@ class Outline:
     wires: Array
 
 
-def outline(shape: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull) -> Outline:
+def outline(shape: Shape) -> Outline:
     """The surface of a bounded shape; round ones within 0.3 % of the radius, rounded hulls with bevelled edges."""
+    assert not isinstance(shape, HalfSpace)
     if isinstance(shape, RoundedHull):
         core = shape.core
         outward = [core.vertices[ring] + shape.radius * plane[:3] for ring, plane in zip(core.facets, core.halfspaces)]
@@ -62,19 +63,71 @@ def _stretched(ball: Outline, half_axes: Array) -> Outline:
     return replace(ball, vertices=vertices, normals=normals, edges=edges, wires=wires)
 
 
-def plate(shape: HalfSpace, center: Array, size: float) -> Outline:
-    """The part of the boundary plane around `center` that reaches `size` metres, with a grid 1, 0.1, ... m wide."""
-    basis = rotation_from_z(shape.normal)
+@dataclass(frozen=True)
+class Ground(Outline):
+    """The part of a plane that is seen of a ground, around `middle`, fading out as far as `reach` metres from there.
+
+    The grid, among `edges` and `wires`, is 1, 0.1, ... m wide.
+    """
+
+    middle: Array
+    reach: float
+
+    def strength(self, points: Array) -> Array:
+        """How much is seen at points (..., 3), from 1 to 0."""
+        faded: Array = np.clip(1 - (np.linalg.norm(points - self.middle, axis=-1) / self.reach) ** 2, 0, 1)
+        return faded
+
+
+def ground(shape: Shape, center: Array, size: float) -> Ground | None:
+    """A half-space, or the side of a box or a hull on which the scene is, with `center` and `size`; None if round.
+
+    Of a hull it is the rectangle around that side.
+    """
+    reach = 1.5 * size
+    if isinstance(shape, HalfSpace):
+        normal, offset = np.asarray(shape.normal), float(shape.offset)
+        sides = np.empty((0, 2))
+    elif isinstance(shape, Box | Hull):
+        vertices, facets = _box(shape) if isinstance(shape, Box) else (shape.vertices, shape.facets)
+        planes = [_plane(vertices[ring]) for ring in facets]
+        nearest = int(np.argmax([center @ normal - offset for normal, offset in planes]))
+        normal, offset = planes[nearest]
+        sides = (vertices[facets[nearest]] @ rotation_from_z(normal))[:, :2]
+    else:
+        return None
+    basis = rotation_from_z(normal)
+    middle = (center @ basis)[:2]
+    lower, upper = middle - reach, middle + reach
+    if len(sides):
+        lower, upper = (np.clip(each, sides.min(axis=0), sides.max(axis=0)) for each in (lower, upper))
+
+    def in_shape(flat: Array) -> Array:
+        placed: Array = np.insert(flat, 2, offset, axis=-1) @ basis.T
+        return placed
+
+    cells = 24  # each way: fine enough to fade
+    across, along = (np.linspace(lower[k], upper[k], cells + 1) for k in (0, 1))
+    lattice = np.stack(np.meshgrid(across, along), axis=-1)
+    number = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
+    a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
+    faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
     step = 10 ** np.floor(np.log10(size / 2))
-    half = np.ceil(size / step) * step
-    (left, bottom), (right, top) = (np.round((center @ basis)[:2] / step) * step + side for side in (-half, half))
-    corners = np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
-    across = [((u, bottom), (u, top)) for u in np.arange(left, right + step / 2, step)]
-    along = [((left, v), (right, v)) for v in np.arange(bottom, top + step / 2, step)]
-    vertices, grid = (
-        np.insert(flat, 2, shape.offset, axis=-1) @ basis.T for flat in (corners, np.array(across + along))
-    )
-    return Outline(vertices, np.array([[0, 1, 2], [0, 2, 3]]), None, grid, grid)
+    lines = []
+    for k, ticks in enumerate((along, across)):
+        places = np.arange(np.ceil(lower[k] / step), np.floor(upper[k] / step) + 1) * step
+        line = np.stack(np.meshgrid(ticks, places), axis=-1)  # (place, tick, 2)
+        lines.append(_polylines(in_shape(line[..., ::-1] if k == 0 else line)))
+    grid = np.concatenate(lines)
+    where = in_shape(middle[None])[0]
+    return Ground(in_shape(lattice.reshape(-1, 2)), faces, None, grid, grid, where, reach)
+
+
+def _plane(corners: Array) -> tuple[Array, float]:
+    """The unit normal of a facet, counter-clockwise from outside, and how far it is from the origin."""
+    normal = np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
+    normal /= np.linalg.norm(normal)
+    return normal, float(corners.mean(axis=0) @ normal)
 
 
 def cone(radius: float, bottom: float, top: float) -> Outline:

@@ -14,14 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from overlapper import HalfSpace, Overlap, Placed
+from overlapper import Overlap, Placed
 from overlapper.install import hint
 from overlapper.quaternion import rotated
+from overlapper.viewer.framing import Framing, View
 from overlapper.viewer.labels import Bodies, Contact, pairs
 from overlapper.viewer.look import (
     BODIES,
     BOTTOM,
     FIELD_OF_VIEW,
+    GRID,
+    GRID_OPACITY,
+    GROUND,
+    GROUND_OPACITY,
     INK,
     LIGHT,
     LINE,
@@ -31,13 +36,11 @@ from overlapper.viewer.look import (
     Array,
     Look,
     arrow_length,
-    boxes,
-    camera,
     channels,
     to_draw,
     volume_text,
 )
-from overlapper.viewer.outline import Outline, outline, plate, polytope_edges
+from overlapper.viewer.outline import Ground, ground, outline, polytope_edges
 from overlapper.whole_file import beside
 
 try:
@@ -63,15 +66,19 @@ def save(
     title: str = "",
     close: bool = False,
     looks: tuple[Look, Look] = (BODIES, OVERLAPS),
+    framing: Framing | None = None,
 ) -> Path:
     """Draw the bodies where they are and the overlapping pairs among `contacts`; returns the path.
 
     With `close`, the camera comes near the largest of them. `looks` are those of the bodies and of the overlaps.
+    A `framing` that has seen other moments, too, knows what moves; without one, the bodies that overlap are framed.
     """
+    contacts = list(contacts)
+    here = Framing(bodies)
+    here.see(bodies, contacts)
     overlaps = sorted(pairs(bodies, contacts).items(), key=lambda item: -item[1].volume)
-    framed = boxes(bodies.placed)
-    near = [np.asarray(overlaps[0][1].bounds)] if close and overlaps else None
-    picture = _Picture(framed, near)
+    near = np.asarray(overlaps[0][1].bounds) if close and overlaps else None
+    picture = _Picture(framing or here, here.side(), near)
     for key, placed in zip(bodies.keys, bodies.placed, strict=True):
         picture.add_body(placed, np.array(bodies.colors[key[:2]][:3]), looks[0])
     for _, overlap in overlaps:
@@ -82,19 +89,23 @@ def save(
 
 @dataclass
 class _Side:
-    """What is seen of a convex body from outside, or from inside: polygons on the screen, and their colours."""
+    """What is seen of a convex body from outside, or from inside: polygons on the screen, and their colours.
+
+    The opacity is that of all, or there is one of each polygon.
+    """
 
     depth: float
-    opacity: float
+    opacity: float | Sequence[float]
     polygons: list[Array]
     colors: list[Array]
 
     def paint(self, canvas: Image.Image) -> None:
-        if not self.polygons or self.opacity == 0:
+        opacities = np.broadcast_to(self.opacity, len(self.polygons))
+        if not opacities.any():
             return
         scale = FINER * HEIGHT / 2
         middle = np.array(canvas.size) / 2
-        polygons = [np.clip(middle + points * [scale, -scale], -1e5, 1e5) for points in self.polygons]
+        polygons = [np.clip(middle + points * [scale, -scale], -1e7, 1e7) for points in self.polygons]
         corners = np.concatenate(polygons)
         left, top = np.clip(np.floor(corners.min(axis=0)), 0, canvas.size).astype(int)
         right, bottom = np.clip(np.ceil(corners.max(axis=0)) + 1, 0, canvas.size).astype(int)
@@ -102,27 +113,26 @@ class _Side:
             return
         paint = Image.new("RGB", (right - left, bottom - top))
         mask = Image.new("L", paint.size)
-        for points, color in zip(polygons, self.colors, strict=True):
+        for points, color, opacity in zip(polygons, self.colors, opacities, strict=True):
             outline = list(map(tuple, points - [left, top]))
             ImageDraw.Draw(paint).polygon(outline, fill=tuple((255 * color).round().astype(int)))
-            ImageDraw.Draw(mask).polygon(outline, fill=round(255 * self.opacity))
+            ImageDraw.Draw(mask).polygon(outline, fill=round(255 * float(opacity)))
         paint.putalpha(mask)
         canvas.alpha_composite(paint, (int(left), int(top)))
 
 
 class _Picture:
-    def __init__(self, framed: Sequence[Array], near: Sequence[Array] | None) -> None:
-        corners = np.array(framed)
-        lower, upper = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
-        self.center, self.size = (lower + upper) / 2, float(np.linalg.norm(upper - lower))
-        self.target, self.back, self.distance = camera(near or framed)
-        if near:
-            self.distance = NEAR * float(np.linalg.norm(near[0][1] - near[0][0]))
+    def __init__(self, framing: Framing, back: Array, near: Array | None) -> None:
+        view = View.of([near] if near is not None else framing.opening().framed, back)
+        self.center, self.size, self._is_ground = framing.center, framing.size, framing.is_ground
+        self.target, self.back, self.distance = view.at, view.back, view.distance(WIDTH / HEIGHT)
+        if near is not None:
+            self.distance = NEAR * float(np.linalg.norm(near[1] - near[0]))
         right = np.array([-self.back[1], self.back[0], 0.0]) / np.hypot(self.back[0], self.back[1])
         self.axes = np.array([right, np.cross(self.back, right), self.back])
         self.bodies: list[_Side] = []
         self.overlaps: list[_Side] = []
-        self.lines: list[tuple[Array, Array, int]] = []  # (k, 2, 2) segments, colour with opacity, BEHIND or BEFORE
+        self.lines: list[tuple[Array, Array, int]] = []  # (k, 2, 2) segments, (k, 4) colours, BEHIND or BEFORE
         self.heads: list[Array] = []
         self.dots: list[tuple[Array, Array, float]] = []
 
@@ -132,28 +142,55 @@ class _Picture:
         depth = np.maximum(self.distance - view[:, 2], 1e-3 * self.distance)
         return view[:, :2] / (depth * np.tan(np.deg2rad(FIELD_OF_VIEW) / 2))[:, None], depth
 
+    def _before_camera(self, ring: Array) -> Array:
+        """What of a polygon (n, 3) is before the camera: (m, 3), of which there may be none."""
+        ahead = 0.99 * self.distance - (ring - self.target) @ self.back
+        if (ahead >= 0).all():
+            return ring
+        kept = []
+        for here, there, a, b in zip(ring, np.roll(ring, -1, axis=0), ahead, np.roll(ahead, -1), strict=True):
+            if a >= 0:
+                kept.append(here)
+            if (a >= 0) != (b >= 0):
+                kept.append(here + a / (a - b) * (there - here))
+        return np.array(kept).reshape(-1, 3)
+
     def add_body(self, placed: Placed, color: Array, look: Look) -> None:
-        endless = isinstance(placed.shape, HalfSpace)
-        drawn = self._outline(placed)
-        vertices = _in_world(placed, drawn.vertices)
-        opacity = look.opacity * (0.4 if endless else 1.0)
+        if self._is_ground(placed) and (drawn := self._ground(placed)):
+            self._add_ground(placed, drawn, look)
+            return
+        outlined = outline(placed.shape)
+        vertices = _in_world(placed, outlined.vertices)
         if look.faces:
             front = channels(look.front) if look.front else color
-            back = channels(look.back) if look.back else color if endless else None
-            rings = list(drawn.faces)
-            self._add_sides([vertices[ring] for ring in rings], [front] * len(rings), back, opacity, self.bodies)
-        segments = drawn.edges if look.faces else drawn.wires
+            back = channels(look.back) if look.back else None
+            rings = list(outlined.faces)
+            self._add_sides([vertices[ring] for ring in rings], [front] * len(rings), back, look.opacity, self.bodies)
+        segments = outlined.edges if look.faces else outlined.wires
         if look.edges:
             shade = np.append(color, 0.35 if look.faces else 0.8)
             self._add_lines(_in_world(placed, segments), shade, BEHIND)
         if look.vertices:
             self.dots.append((self.seen(vertices)[0], color, 4.0))
 
-    def _outline(self, placed: Placed) -> Outline:
-        if not isinstance(placed.shape, HalfSpace):
-            return outline(placed.shape)
+    def _ground(self, placed: Placed) -> Ground | None:
         back = np.append(-placed.orientation[:3], placed.orientation[3])
-        return plate(placed.shape, rotated(back, self.center - placed.position), self.size)
+        return ground(placed.shape, rotated(back, self.center - placed.position), self.size)
+
+    def _add_ground(self, placed: Placed, drawn: Ground, look: Look) -> None:
+        """The plane, which fades out from its middle, behind all that stands on it."""
+        if look.faces:
+            triangles = drawn.vertices[drawn.faces]
+            strength = GROUND_OPACITY * drawn.strength(triangles.mean(axis=1))
+            cells = [self._before_camera(_in_world(placed, each)) for each in triangles]
+            seen = [(cell, each) for cell, each in zip(cells, strength, strict=True) if len(cell)]
+            polygons = [self.seen(cell)[0] for cell, _ in seen]
+            opacities = [float(each) for _, each in seen]
+            self.bodies.append(_Side(np.inf, opacities, polygons, [np.array(GROUND)] * len(polygons)))
+        if look.edges:
+            strength = GRID_OPACITY * drawn.strength(drawn.edges.mean(axis=1))
+            colors = np.column_stack([np.tile(GRID, (len(strength), 1)), strength])
+            self._add_lines(_in_world(placed, drawn.edges), colors, BEHIND)
 
     def add_overlap(self, overlap: Overlap, look: Look) -> None:
         vertices, centroid = overlap.vertices, np.asarray(overlap.centroid)
@@ -200,15 +237,26 @@ class _Picture:
                 side, color = inside, back
             else:
                 continue
-            side.polygons.append(self.seen(corners)[0])
+            before = self._before_camera(corners)
+            if not len(before):
+                continue
+            side.polygons.append(self.seen(before)[0])
             side.colors.append(np.minimum(color, 1.0))
         # Of two bodies, the one whose middle is nearer is taken for the one in front.
         depth = float(self.seen(np.mean([face.mean(axis=0) for face in faces], axis=0)[None])[1][0])
         outside.depth, inside.depth = depth, depth + 1e-6 * self.size
         to += [outside, inside]
 
-    def _add_lines(self, segments: Array, color: Array, order: int) -> None:
-        self.lines.append((self.seen(segments.reshape(-1, 3))[0].reshape(-1, 2, 2), color, order))
+    def _add_lines(self, segments: Array, colors: Array, order: int) -> None:
+        """Segments (k, 2, 3) in the world; a colour with its opacity, (4,), or one of each, (k, 4)."""
+        ahead = 0.99 * self.distance - (segments - self.target) @ self.back  # (k, 2)
+        seen = (ahead > 0).any(axis=1)
+        ends, ahead = segments[seen], ahead[seen]
+        cut = np.clip(ahead / np.where(ahead == ahead[:, ::-1], 1, ahead - ahead[:, ::-1]), None, 1)
+        behind = ahead < 0
+        ends = np.where(behind[..., None], ends + cut[..., None] * (ends[:, ::-1] - ends), ends)
+        colors = np.broadcast_to(colors, (len(segments), 4))[seen]
+        self.lines.append((self.seen(ends.reshape(-1, 3))[0].reshape(-1, 2, 2), colors, order))
 
     def save(self, path: Path, title: str, overlaps: Sequence[tuple[tuple[str, str], Overlap]]) -> None:
         figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, facecolor=BOTTOM)
@@ -219,7 +267,7 @@ class _Picture:
         for order, layer in ((0, shades), (1, _painted(self.bodies)), (3, _painted(self.overlaps))):
             axes.imshow(layer, extent=(-WIDTH / HEIGHT, WIDTH / HEIGHT, -1, 1), aspect="auto", zorder=order)
         for segments, color, order in self.lines:
-            axes.add_collection(LineCollection(list(segments), colors=[tuple(color)], linewidths=1.0, zorder=order))
+            axes.add_collection(LineCollection(list(segments), colors=color, linewidths=1.0, zorder=order))
         axes.add_collection(PolyCollection(self.heads, facecolors=[INK], zorder=BEFORE))
         for points, color, size in self.dots:
             axes.plot(*points.T, ".", color=tuple(color), markersize=size, zorder=BEFORE + 1)

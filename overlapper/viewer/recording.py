@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Overlap, Placed, Sphere
-from overlapper.viewer.labels import ROOT, Bodies, Contact, body_paths, pairs
+from overlapper.viewer.framing import Framing, View
+from overlapper.viewer.labels import ROOT, Bodies, Contact, Link, Pair, body_paths, labelled
 from overlapper.viewer.look import (
     BODIES,
     INK,
@@ -31,7 +32,6 @@ from overlapper.viewer.look import (
     OWNER_COLORS,
     Array,
     Look,
-    boxes,
     to_draw,
 )
 from overlapper.viewer.page_text import filled, licences
@@ -42,7 +42,6 @@ from meshcat import Visualizer  # isort: skip  # after the stage, which says wha
 from meshcat.servers.zmqserver import VIEWER_ROOT  # isort: skip
 from meshcat.transformations import translation_matrix  # isort: skip
 
-Pair = tuple[str, str]
 SCRIPTS = (
     "film",
     "scene",
@@ -52,6 +51,7 @@ SCRIPTS = (
     "chart",
     "time",
 )  # of the page, in the order they need each other
+ASPECTS = (0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0)
 ARRAYS = {"float32": "Float32Array", "uint32": "Uint32Array", "int32": "Int32Array", "uint16": "Uint16Array"}
 ARRAYS |= {"int16": "Int16Array", "uint8": "Uint8Array"}
 
@@ -74,16 +74,17 @@ class Recording:
         self._tape = _Tape([])
         self._visualizer = Visualizer(window=self._tape)
         self._stage: Stage | None = None
+        self._framing: Framing | None = None
         self._start = 0.0
         self._times: list[float] = []
-        self._framed: list[Array] = []
         self._bodies: dict[str, tuple[bytes, str]] = {}
         self._nodes: dict[str, int] = {}
+        self._grounds: list[int] = []  # nodes
         self._poses: dict[str, tuple[float, ...]] = {}  # the last of each node
         self._keys: list[tuple[int, int, tuple[float, ...]]] = []  # frame, node, pose
         self._pairs: dict[Pair, int] = {}
+        self._links: dict[Pair, tuple[Link, Link]] = {}
         self._drawn: dict[Pair, tuple[Overlap, int]] = {}  # the last of each pair, and its place among the polytopes
-        self._seen_in: dict[Pair, Array] = {}  # the box around all that a pair has shared
         self._polytopes = _Polytopes()
         self._sightings: list[tuple[int, int, int]] = []  # frame, pair, polytope
         self._numbers: list[Array] = []
@@ -93,10 +94,10 @@ class Recording:
 
         `time` in seconds must increase from call to call; the page counts from the first.
         """
-        if self._stage is None:
-            self._stage = Stage(bodies.placed, *self._looks.values())
+        if self._stage is None or self._framing is None:
+            self._framing = Framing(bodies)
+            self._stage = Stage(self._framing, *self._looks.values())
             self._start = time
-            self._framed.extend(boxes(bodies.placed))
             self._visualizer[ROOT].set_transform(translation_matrix(self._stage.center))
         seconds = time - self._start
         if self._times and not seconds > self._times[-1]:
@@ -113,7 +114,10 @@ class Recording:
             if self._poses.get(node, absent) != pose:
                 self._keys.append((len(self._times) - 1, self._nodes[node], pose))
             self._poses[node] = pose
-        for pair, overlap in pairs(bodies, contacts).items():
+        contacts = list(contacts)
+        self._framing.see(bodies, contacts)
+        for pair, links, overlap in labelled(bodies, contacts):
+            self._links.setdefault(pair, links)
             self._add_overlap(self._stage, pair, overlap)
 
     def __repr__(self) -> str:
@@ -122,29 +126,33 @@ class Recording:
 
     def save(self, path: str | Path) -> Path:
         """Write what was added so far to one HTML file, and return its path."""
-        if self._stage is None:
+        if self._stage is None or self._framing is None:
             raise ValueError("there is nothing to save: add at least one frame first")
         tape = _Tape(list(self._tape.commands))
-        self._stage.set(Visualizer(window=tape), [*self._framed, *self._seen_in.values()])
+        self._stage.set(Visualizer(window=tape), self._framing.opening())
         folder = Path(__file__).with_name("page")
         texts = {
             "script": "\n".join((folder / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS),
             "meshcat": Path(VIEWER_ROOT, "main.min.js").read_text(encoding="utf-8"),
             "commands": _packed(f"[{','.join(tape.commands)}]".encode()),
             "licences": licences(Path(VIEWER_ROOT).parent),
-            "film": _packed(_film(self._heading(self._stage), self._arrays())),
+            "film": _packed(_film(self._heading(self._stage, self._framing), self._arrays())),
         }
         with beside(path) as file:
             file.write_text(filled(folder / "recording.html", texts), encoding="utf-8")
         return Path(path)
 
-    def _heading(self, stage: Stage) -> dict[str, Any]:
+    def _heading(self, stage: Stage, framing: Framing) -> dict[str, Any]:
         return {
             "times": self._times,
             "pairs": list(self._pairs),
+            "links": list(self._links.values()),
             "nodes": list(self._nodes),
             "center": stage.center.tolist(),
             "size": stage.size,
+            "moment": max(framing.moment, 0),
+            "views": {"opening": _seen_from(framing.opening()), "whole": _seen_from(framing.whole())},
+            "grounds": self._grounds,
             "looks": {name: asdict(look) for name, look in self._looks.items()},
             "colors": {"owners": [rgb(color) for color in OWNER_COLORS[:2]], "ink": rgb(INK), "line": rgb(LINE)},
             "light": LIGHT.tolist(),
@@ -174,6 +182,8 @@ class Recording:
             self._visualizer[node].set_object(stage.body(placed, color))
             self._bodies[path] = shape, node
             self._nodes[node] = len(self._nodes)
+            if stage.ground(placed):
+                self._grounds.append(self._nodes[node])
         return node
 
     def _add_overlap(self, stage: Stage, pair: Pair, overlap: Overlap) -> None:
@@ -183,9 +193,6 @@ class Recording:
         if last is None or not _look_alike(last, overlap, slack):
             polytope = self._polytopes.add(to_draw(overlap, stage.size), stage.center, polytope, slack)
             self._drawn[pair] = overlap, polytope
-            box = np.asarray(overlap.bounds)
-            lower, upper = self._seen_in.get(pair, box)
-            self._seen_in[pair] = np.array([np.minimum(lower, box[0]), np.maximum(upper, box[1])])
         self._sightings.append((len(self._times) - 1, number, polytope))
         measures = [overlap.volume, overlap.volume_error, overlap.depth or 0.0, overlap.area]
         normal = np.zeros(3) if overlap.normal is None else overlap.normal
@@ -254,6 +261,12 @@ class _Tape:
                 del each["data"]
             self._known.add(each["uuid"])
         self.commands.append(json.dumps(lowered, default=lambda packed: base64.b64encode(packed.data).decode()))
+
+
+def _seen_from(view: View) -> dict[str, Any]:
+    """A view for the page: the distances are for pictures of the widths that ASPECTS has for a height of 1."""
+    distances = {f"{aspect:g}": view.distance(aspect) for aspect in ASPECTS}
+    return {"at": view.at.tolist(), "back": view.back.tolist(), "distances": distances}
 
 
 def _pose(stage: Stage, placed: Placed) -> tuple[float, ...]:

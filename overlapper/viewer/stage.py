@@ -9,11 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import HalfSpace, Overlap, Placed
+from overlapper import Overlap, Placed
 from overlapper.install import hint
+from overlapper.viewer.framing import Framing, View
 from overlapper.viewer.look import (
     BOTTOM,
     FIELD_OF_VIEW,
+    GRID,
+    GRID_OPACITY,
+    GROUND,
+    GROUND_OPACITY,
     INK,
     LIGHT,
     LINE,
@@ -21,12 +26,10 @@ from overlapper.viewer.look import (
     TOP,
     Look,
     arrow_length,
-    boxes,
-    camera,
     channels,
     to_draw,
 )
-from overlapper.viewer.outline import Outline, cone, outline, plate, polytope_edges, rotation_from_z, triangles
+from overlapper.viewer.outline import Ground, cone, ground, outline, polytope_edges, rotation_from_z, triangles
 
 try:
     from meshcat import geometry
@@ -41,11 +44,9 @@ FRONT, BACK, BOTH = 0, 1, 2  # three.js: the sides from which a face is seen
 class Stage:
     """Background, lights, camera, and the sizes that follow the scene; fixed by the first bodies seen."""
 
-    def __init__(self, placed: Sequence[Placed], bodies: Look, overlaps: Look) -> None:
-        corners = np.array(boxes(placed))
-        lower, upper = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
-        self.center = (lower + upper) / 2
-        self.size = float(np.linalg.norm(upper - lower))
+    def __init__(self, framing: Framing, bodies: Look, overlaps: Look) -> None:
+        self.center, self.size = framing.center, framing.size
+        self._is_ground = framing.is_ground
         self._bodies, self._overlaps = bodies, overlaps
         self._known: dict[bytes, tuple[bool, _Mesh, geometry.PointsGeometry, geometry.PointsGeometry]] = {}
         fronts = [channels(overlaps.front)] if overlaps.front else [np.array(color) for color in OWNER_COLORS]
@@ -68,20 +69,22 @@ class Stage:
             _Mesh(head.vertices, head.faces), geometry.MeshBasicMaterial(**through_everything)
         )
 
-    def outline(self, placed: Placed) -> Outline:
-        """What to draw a shape by, in its own frame; a half-space is a plate as large as the scene."""
-        if not isinstance(placed.shape, HalfSpace):
-            return outline(placed.shape)
+    def ground(self, placed: Placed) -> Ground | None:
+        """What is drawn, in its own frame, of a shape that is a ground; None of another."""
+        if not self._is_ground(placed):
+            return None
         center = np.linalg.inv(matrix(placed)) @ [*self.center, 1]
-        return plate(placed.shape, center[:3], self.size)
+        return ground(placed.shape, center[:3], self.size)
 
     def body(self, placed: Placed, color: Sequence[float]) -> Group:
         """A shape in its own frame. What is not to be seen is there, too, so that a page can show it."""
-        look, endless = self._bodies, isinstance(placed.shape, HalfSpace)
+        if seen := self.ground(placed):
+            return self._plane(seen)
+        look = self._bodies
         flat, mesh, edges, wires = self._geometries(placed)
-        opacity = look.opacity * (0.4 if endless else 1)
-        seen = {"opacity": opacity, "depthWrite": opacity == 1, "side": BOTH if endless and not look.back else FRONT}
-        front = _skin(rgb(channels(look.front) if look.front else color), flat, **seen)
+        front = _skin(
+            rgb(channels(look.front) if look.front else color), flat, opacity=look.opacity, depthWrite=look.opacity == 1
+        )
         line = geometry.LineBasicMaterial(color=rgb(color), opacity=0.35, transparent=True, depthWrite=False)
         wire = geometry.LineBasicMaterial(color=rgb(color), transparent=True)
         dots = _DotMaterial(color=rgb(color), size=4, sizeAttenuation=False, transparent=True)
@@ -96,11 +99,26 @@ class Stage:
             (geometry.Points(mesh, dots), {"name": "vertices", "visible": look.vertices}),
         )
 
+    def _plane(self, seen: Ground) -> Group:
+        """A ground, in colours of its own, before all that stands on it."""
+        lines = seen.edges.reshape(-1, 3)
+        faded = {"transparent": True, "depthWrite": False, "vertexColors": True}
+        face = geometry.MeshBasicMaterial(color=rgb(GROUND), side=BOTH, opacity=GROUND_OPACITY, **faded)
+        line = geometry.LineBasicMaterial(color=rgb(GRID), opacity=GRID_OPACITY, **faded)
+        mesh = _Mesh(seen.vertices, seen.faces, strength=seen.strength(seen.vertices))
+        return Group(
+            (geometry.Mesh(mesh, face), {"name": "faces", "visible": self._bodies.faces, "renderOrder": -2}),
+            (
+                geometry.LineSegments(_points(lines, seen.strength(lines)), line),
+                {"name": "edges", "visible": self._bodies.edges, "renderOrder": -1},
+            ),
+        )
+
     def _geometries(self, placed: Placed) -> tuple[bool, _Mesh, geometry.PointsGeometry, geometry.PointsGeometry]:
         """Whether faces are flat; faces, edges and wires, which are the same for the same shape."""
         shape = pickle.dumps(placed.shape)
-        if shape not in self._known or isinstance(placed.shape, HalfSpace):
-            drawn = self.outline(placed)
+        if shape not in self._known:
+            drawn = outline(placed.shape)
             mesh = _Mesh(drawn.vertices, drawn.faces, drawn.normals)
             self._known[shape] = drawn.normals is None, mesh, _lines(drawn.edges), _lines(drawn.wires)
         return self._known[shape]
@@ -154,19 +172,19 @@ class Stage:
             parts.append((geometry.Mesh(mesh, self._fronts[owner % len(self._fronts)]), {"renderOrder": 1}))
         return parts
 
-    def set(self, visualizer: Any, framed: Sequence[Array]) -> None:
-        """A dark room, plain light, and a camera that sees the boxes `framed`, each (2, 3): lower and upper corner."""
+    def set(self, visualizer: Any, view: View) -> None:
+        """A dark room, plain light, and the camera of a view."""
         for name in ("Grid", "Axes", "Lights/PointLightNegativeX", "Lights/PointLightPositiveX"):
             visualizer[f"/{name}"].set_property("visible", False)
         visualizer["/Background"].set_property("top_color", list(TOP))
         visualizer["/Background"].set_property("bottom_color", list(BOTTOM))
-        center, back, distance = camera(framed)
+        center, distance = view.at, view.distance()
         # meshcat's camera circles about the page's origin; so the scene is moved there, and the camera moved with it.
         z_up = rotation_matrix(-np.pi / 2, (1, 0, 0))
         visualizer["/"].set_transform(z_up @ translation_matrix(-center))
         visualizer["/Cameras/default"].set_transform(translation_matrix(center))
         lens = visualizer["/Cameras/default/rotated/<object>"]
-        x, y, z = (distance * back).tolist()
+        x, y, z = (distance * view.back).tolist()
         lens.set_property("position", [x, z, -y])
         lens.set_property("fov", FIELD_OF_VIEW)
         lens.set_property("near", distance / 500)
@@ -214,16 +232,20 @@ class _DotMaterial(geometry.GenericMaterial):  # type: ignore[misc]
 
 
 class _Mesh(geometry.TriangularMeshGeometry):  # type: ignore[misc]
-    """meshcat's triangles, with normals."""
+    """meshcat's triangles, with normals; or with how much is seen of each vertex, from 0 to 1."""
 
-    def __init__(self, vertices: Array, faces: NDArray[Any], normals: Array | None = None) -> None:
+    def __init__(
+        self, vertices: Array, faces: NDArray[Any], normals: Array | None = None, strength: Array | None = None
+    ) -> None:
         super().__init__(vertices, faces)
-        self.normals = normals
+        self.normals, self.strength = normals, strength
 
     def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
         lowered: dict[str, Any] = super().lower(object_data)
         if self.normals is not None:
             lowered["data"]["attributes"]["normal"] = geometry.pack_numpy_array(self.normals.T)
+        if self.strength is not None:
+            lowered["data"]["attributes"]["color"] = geometry.pack_numpy_array(_faded(self.strength))
         return lowered
 
 
@@ -238,8 +260,15 @@ def _lines(segments: Array) -> geometry.PointsGeometry:
     return _points(segments.reshape(-1, 3))
 
 
-def _points(points: Array) -> geometry.PointsGeometry:
-    return geometry.PointsGeometry(np.ascontiguousarray(points.T, dtype=np.float32))
+def _points(points: Array, strength: Array | None = None) -> geometry.PointsGeometry:
+    """`strength` (n,) says how much is seen of each."""
+    faded = None if strength is None else _faded(strength)
+    return geometry.PointsGeometry(np.ascontiguousarray(points.T, dtype=np.float32), faded)
+
+
+def _faded(strength: Array) -> NDArray[np.float32]:
+    """(4, n): the material's colour, and an opacity, which three.js takes from a colour of four parts."""
+    return np.stack([*np.ones((3, len(strength))), strength]).astype(np.float32)
 
 
 def matrix(placed: Placed) -> Array:

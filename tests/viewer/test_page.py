@@ -12,6 +12,7 @@ from pages import CUP, HAND, Bodies, coloured, hand_at, looks, opened, recorded,
 
 from overlapper import Box, Placed
 from overlapper.viewer import Recording, Viewer
+from overlapper.viewer.framing import Framing
 from overlapper.viewer.look import Look
 
 
@@ -147,7 +148,11 @@ def test_the_arrow_keys_and_the_chart_go_through_time(browser, reach):
 
 @looks
 def test_a_live_view_looks_like_a_recording(browser, reach, tmp_path):
-    recording = scene(opened(browser, reach))
+    framing = Framing(hand_at(0.3))
+    framing.see(hand_at(0.3), [])  # a live view does not know yet what will move, nor overlap
+    view = framing.whole()
+    camera = [",".join(map(str, point)) for point in (view.at + view.distance() * view.back, view.at)]
+    recording = scene(opened(browser, reach, f"#t=1&from={camera[0]}&at={camera[1]}"))
     with Viewer() as viewer:
         for bodies in (hand_at(0.3), hand_at(0.12)):
             viewer.show(bodies, bodies.contacts())

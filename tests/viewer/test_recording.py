@@ -11,7 +11,6 @@ import pytest
 from numpy.testing import assert_allclose
 from pages import (
     CUP,
-    GROUND,
     HAND,
     Bodies,
     Film,
@@ -24,7 +23,7 @@ from pages import (
     recorded,
 )
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
+from overlapper import Box, Capsule, Cylinder, Hull, Placed, Sphere
 from overlapper.viewer import Recording
 from overlapper.viewer.look import Look
 
@@ -117,14 +116,6 @@ def test_the_surface_drawn_encloses_the_volume_of_the_shape(shape, tmp_path):
     assert_allclose(
         enclosed(surfaces), shape.volume, rtol=1e-2 if isinstance(shape, Sphere | Capsule | Cylinder) else 1e-6
     )
-
-
-def test_a_half_space_is_drawn_as_a_plate_in_its_plane_as_large_as_the_scene(tmp_path):
-    ground = HalfSpace([0.6, 0, 0.8], 0.5)
-    page = recorded([Bodies({GROUND: Placed(ground), CUP: Placed(Sphere(2))})], tmp_path / "ground.html")
-    ((corners, _, _),) = meshes(drawings(page)["/overlapper/bodies/ground/base/0"])
-    assert_allclose(corners @ ground.normal, ground.offset, atol=1e-6)
-    assert np.ptp(corners, axis=0)[1] >= 4
 
 
 def test_the_facets_of_each_owner_close_the_overlap_in_every_frame(tmp_path):

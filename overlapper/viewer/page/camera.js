@@ -1,8 +1,6 @@
 // Where the scene is seen from, and what is clicked upon in it.
 
-const home = [viewer.camera.position.clone(), viewer.controls.target.clone()];
-
-// In the page's own frame, where the camera moves: y is up and the middle of the scene is the origin.
+// In the page's own frame, where the camera moves: y is up and the middle of what is framed is the origin.
 function onPage(point) {
   viewer.scene.updateMatrixWorld();
   return viewer.scene.localToWorld(new THREE.Vector3(...point));
@@ -14,6 +12,14 @@ function look(from, at) {
   viewer.controls.target.copy(at);
   if (shown >= 0) drawOverlaps(shown);
   viewer.set_dirty();
+}
+
+// One of the film's views: "opening" has what moves and what overlaps, "whole" has all but grounds.
+function lookAt(name) {
+  const {at, back, distances} = film.views[name];
+  const wide = Object.keys(distances).map(Number).sort((a, b) => a - b);
+  const distance = distances[wide[Math.max(lastUpTo(wide, viewer.camera.aspect), 0)]];
+  look(onPage(at.map((part, k) => part + distance * back[k])), onPage(at));
 }
 
 // The camera keeps its direction and comes as near as the overlap deserves.

@@ -1,11 +1,7 @@
 // What is drawn, and how: the panel of controls.
 
-for (const {drawing} of actors) {
-  for (const part of drawing.children) part.userData.own = part.material.color.clone();
-  const faces = drawing.getObjectByName("faces");
-  // A half-space is a plate, seen from both sides and fainter.
-  if (faces.material.side === THREE.DoubleSide) faces.userData.endless = true;
-}
+const solid = actors.filter((_, node) => !film.grounds.includes(node)), grounds = actors.filter((_, node) => film.grounds.includes(node));
+for (const {drawing} of solid) for (const part of drawing.children) part.userData.own = part.material.color.clone();
 
 function dress(material, opacity) {
   material.opacity = opacity;
@@ -14,13 +10,16 @@ function dress(material, opacity) {
 
 function applyLooks() {
   const {bodies, overlaps: look} = looks;
-  for (const {drawing} of actors) {
+  for (const {drawing} of grounds) {
+    drawing.getObjectByName("faces").visible = bodies.faces;
+    drawing.getObjectByName("edges").visible = bodies.edges;
+  }
+  for (const {drawing} of solid) {
     const part = name => drawing.getObjectByName(name);
     const faces = part("faces");
     faces.visible = bodies.faces;
-    dress(faces.material, bodies.opacity * (faces.userData.endless ? 0.4 : 1));
+    dress(faces.material, bodies.opacity);
     faces.material.color.copy(bodies.front ? paint(bodies.front) : faces.userData.own);
-    if (faces.userData.endless) faces.material.side = bodies.back ? THREE.FrontSide : THREE.DoubleSide;
     if (bodies.back && !part("inside")) {
       const inside = new THREE.Mesh(faces.geometry, faces.material.clone());
       inside.name = "inside";

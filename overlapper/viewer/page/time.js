@@ -51,8 +51,9 @@ const keys = {
   " ": () => run(!playing),
   Escape: () => {
     choose(-1);
-    look(...home);
+    lookAt("opening");
   },
+  w: () => lookAt("whole"),
   ArrowLeft: () => pauseAt(Math.max(shown - 1, 0)),
   ArrowRight: () => pauseAt(Math.min(shown + 1, last)),
   r: () => {
@@ -79,10 +80,10 @@ document.onkeydown = event => {
 // What the address asks for; also of a page that is open already.
 function follow() {
   const wanted = new URLSearchParams(location.hash.slice(1));
-  look(...wanted.has("from") ? ["from", "at"].map(name => onPage(wanted.get(name).split(",").map(Number))) : home);
-  pauseAt(frameAt(+wanted.get("t")));
+  if (wanted.has("from")) look(...["from", "at"].map(name => onPage(wanted.get(name).split(",").map(Number))));
+  else lookAt("opening");
+  pauseAt(wanted.has("t") ? frameAt(+wanted.get("t")) : film.moment);
   choose(pairs.findIndex(pair => pair.join(",") === wanted.get("pair")));
-  run(!wanted.has("t") && last > 0);
 }
 
 renew();

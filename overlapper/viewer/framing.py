@@ -1,0 +1,182 @@
+"""What a view shows of a scene: what moves and what overlaps, from the side where most of the largest overlap is seen.
+
+Grounds are seen, but no view is made to fit them: half-spaces, and bodies of one link that dwarf all others.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from overlapper import HalfSpace, Overlap, Placed
+from overlapper.viewer.labels import Bodies, Contact
+from overlapper.viewer.look import FIELD_OF_VIEW, Array
+from overlapper.viewer.outline import triangles
+
+GROUND = 30.0  # times as large as every other body: a ground. The plane of pybullet is that beside what is under 9 m.
+BACK = np.array([0.60, -0.68, 0.42]) / np.linalg.norm([0.60, -0.68, 0.42])  # the usual way to the camera
+TURNS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180])  # of it about z, the usual ones first
+NOWHERE = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+STILL = 1e-3  # of the scene's size: less is no motion
+
+
+@dataclass(frozen=True)
+class View:
+    """Where a camera is: it looks at a point, m, and lies in the unit direction `back` from it."""
+
+    at: Array
+    back: Array
+    framed: Sequence[Array]
+
+    @classmethod
+    def of(cls, framed: Sequence[Array], back: Array = BACK) -> View:
+        """Of boxes, each (2, 3): lower and upper corner."""
+        return cls(around(framed).mean(axis=0), back, framed)
+
+    def distance(self, aspect: float = 4 / 3) -> float:
+        """How far off the camera sees all that is framed, in m; `aspect` is the picture's width over its height."""
+        corners = np.array(self.framed)
+        corners = np.array([corners[:, list(pick), range(3)] for pick in np.ndindex(2, 2, 2)]).reshape(-1, 3) - self.at
+        right = np.array([-self.back[1], self.back[0], 0.0]) / np.hypot(self.back[0], self.back[1])
+        slope = np.tan(np.deg2rad(FIELD_OF_VIEW) / 2)
+        aside = np.maximum(np.abs(corners @ np.cross(self.back, right)), np.abs(corners @ right) / aspect)
+        return float(1.15 * np.max(aside / slope + corners @ self.back))
+
+
+class Framing:
+    """Of all the moments that are seen of bodies; the first of them says which are grounds, and how large the rest is.
+
+    `center` and `size` are those of the box around the rest, in m; `largest` is the largest overlap that was seen, and
+    `moment` says when, counted from 0: -1 without any.
+    """
+
+    def __init__(self, bodies: Bodies) -> None:
+        self._ground_size = _ground_size(bodies)
+        box = around([box for _, box in self._bounded(bodies)])
+        self.center, self.size = box.mean(axis=0), float(np.linalg.norm(box[1] - box[0]))
+        self.largest: Overlap | None = None
+        self.moment = -1
+        self._moments = 0
+        self._first: dict[tuple[int, int, int], Array] = {}  # boxes, as they were seen first
+        self._then: list[tuple[int, Array]] = []  # bodies and their boxes, at that moment
+        self._taking_part: set[int] = set()  # in an overlap at that moment
+        self._moved: set[int] = set()
+        self._met: set[int] = set()
+        self._shared: dict[tuple[int, ...], Array] = {}
+
+    def is_ground(self, placed: Placed) -> bool:
+        """True of a half-space, and of what is as large as a body that is a ground."""
+        return isinstance(placed.shape, HalfSpace) or _extent(placed.bounds) >= self._ground_size
+
+    def see(self, bodies: Bodies, contacts: Iterable[Contact]) -> None:
+        """The bodies as they are at one more moment, and what they share."""
+        bounded = self._bounded(bodies)
+        for key, box in bounded:
+            if np.abs(box - self._first.setdefault(key, box)).max() > STILL * self.size:
+                self._moved.add(key[0])
+        largest = self.largest
+        overlapping = [contact for contact in contacts if contact.overlap]
+        for each in overlapping:
+            box = np.asarray(each.overlap.bounds)
+            if _extent(box) >= self._ground_size:
+                continue  # of two grounds
+            pair = each.bodyA, each.linkA, each.shapeA, each.bodyB, each.linkB, each.shapeB
+            self._met |= {each.bodyA, each.bodyB}
+            self._shared[pair] = around([self._shared.get(pair, box), box])
+            if self.largest is None or each.overlap.volume > self.largest.volume:
+                self.largest, self.moment = each.overlap, self._moments
+        if self.largest is not largest:
+            self._then = [(key[0], box) for key, box in bounded]
+            self._taking_part = {body for each in overlapping for body in (each.bodyA, each.bodyB)}
+        self._moments += 1
+
+    def opening(self) -> View:
+        """Of all that moves and all that is shared; where nothing moves, of the bodies that share something."""
+        if self._moved:
+            boxes = [box for key, box in self._first.items() if key[0] in self._moved]
+            # One that has left since does not count, one that takes part does.
+            boxes += [box for body, box in self._then if body in self._moved & self._taking_part]
+        else:
+            boxes = [box for key, box in self._first.items() if key[0] in self._met]
+        return View.of([*boxes, *self._shared.values()] or self._all(), self.side())
+
+    def whole(self) -> View:
+        """Of all but grounds."""
+        return View.of([*self._all(), *self._shared.values()], self.side())
+
+    def _all(self) -> list[Array]:
+        return list(self._first.values()) or [NOWHERE]
+
+    def side(self) -> Array:
+        """The direction to the side from which the largest overlap is seen best."""
+        return _side(self.largest, [box for _, box in self._then]) if self.largest else BACK
+
+    def _bounded(self, bodies: Bodies) -> list[tuple[tuple[int, int, int], Array]]:
+        """The shapes of all bodies that are no grounds, and the boxes around them."""
+        boxes = _boxes(bodies)
+        sizes = _sizes(boxes)
+        return [(key, box) for key, box in boxes if sizes[key[0]] < self._ground_size]
+
+
+def around(boxes: Sequence[Array]) -> Array:
+    """The box (2, 3) around boxes; of none, one about the origin."""
+    corners = np.array(boxes or [NOWHERE])
+    return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
+
+
+def _boxes(bodies: Bodies) -> list[tuple[tuple[int, int, int], Array]]:
+    return [
+        (key, np.asarray(placed.bounds))
+        for key, placed in zip(bodies.keys, bodies.placed, strict=True)
+        if not isinstance(placed.shape, HalfSpace)
+    ]
+
+
+def _sizes(boxes: Iterable[tuple[tuple[int, int, int], Array]]) -> dict[int, float]:
+    """How large each body is."""
+    of_body: dict[int, list[Array]] = defaultdict(list)
+    for key, box in boxes:
+        of_body[key[0]].append(box)
+    return {body: _extent(around(each)) for body, each in of_body.items()}
+
+
+def _ground_size(bodies: Bodies) -> float:
+    """From which size a body is a ground, m: those of one link that are so much larger than all that are smaller."""
+    jointed = {body for body, link, _ in bodies.keys if link >= 0}
+    sizes = sorted(((size, body) for body, size in _sizes(_boxes(bodies)).items()), reverse=True)
+    found = np.inf
+    for (size, body), (smaller, _) in pairwise(sizes):
+        if body in jointed:
+            break
+        if size >= GROUND * smaller > 0:
+            found = size
+    return float(found)
+
+
+def _extent(box: Array) -> float:
+    return float(np.linalg.norm(box[1] - box[0]))
+
+
+def _side(overlap: Overlap, boxes: Sequence[Array]) -> Array:
+    """The direction in which most of the overlap's surface is turned, and few of the boxes are in front of it."""
+    corners = overlap.vertices[triangles(overlap.facets)]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    centroid = np.asarray(overlap.centroid)
+    lower, upper = (np.array([box[k] for box in boxes]) - centroid for k in (0, 1))
+    elsewhere = ((lower > 0) | (upper < 0)).any(axis=1)
+    best: Array = BACK
+    most = -1.0
+    for rank, turn in enumerate(TURNS):
+        cos, sin = np.cos(turn), np.sin(turn)
+        back = np.array([cos * BACK[0] - sin * BACK[1], sin * BACK[0] + cos * BACK[1], BACK[2]])
+        enters, leaves = (np.sort([lower / back, upper / back], axis=0)[k] for k in (0, 1))
+        in_front = elsewhere & (enters.max(axis=1) < leaves.min(axis=1)) & (leaves.min(axis=1) > 0)
+        # The usual side is given up for what is seen to be better only.
+        seen = np.abs(areas @ back).sum() * 0.8 ** in_front.sum() * (1 - 0.02 * rank)
+        if seen > most:
+            best, most = back, float(seen)
+    return best
