@@ -10,6 +10,7 @@ import typer
 from overlapper import __version__
 from overlapper.cli.bench import chart, stability
 from overlapper.cli.check import check, diff
+from overlapper.cli.clashes import clashes
 from overlapper.cli.intersect import intersect
 from overlapper.cli.refusals import Interrupted, Refused, give_up, say
 from overlapper.cli.run import run
@@ -72,5 +73,5 @@ def scenes() -> None:
 
 # What stands behind a script is the script's.
 app.command(context_settings={"allow_interspersed_args": False})(watch)
-for command in (scenes, run, view, check, diff, intersect, shapes, stability, chart):
+for command in (scenes, run, view, check, diff, intersect, clashes, shapes, stability, chart):
     app.command()(command)

@@ -20,10 +20,15 @@ VOLUME_UNITS = {"m³": 1.0, "cm³": 1e-6, "mm³": 1e-9, "µm³": 1e-18}
 ROUNDED_UP = Context(prec=1, rounding=ROUND_UP)
 
 
+def volume_unit(largest: float) -> str:
+    """The unit for the volumes of a table, by the largest of them in m³."""
+    return next((unit for unit, size in VOLUME_UNITS.items() if largest >= 0.1 * size), "µm³")
+
+
 def overlaps_table(summary: Summary, limit: int = 20) -> Table:
     """The `limit` largest pairs, of which there must be one, for a reader who knows nothing of this program."""
     pairs = summary.largest()
-    unit = next((unit for unit, size in VOLUME_UNITS.items() if pairs[0].volume >= 0.1 * size), "µm³")
+    unit = volume_unit(pairs[0].volume)
     left_out = f"\nThe {limit} largest of {len(pairs)} pairs." if len(pairs) > limit else ""
     table = Table(
         title=f"Overlaps of {summary.scene} in {summary.steps} steps, {summary.seconds:.3g} s",

@@ -62,6 +62,50 @@ class Decomposition:
         return union_volume([Placed(part) for part in self.parts])[0]
 
 
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """The triangles of a mesh, each once, as `faces` (t, 3) over `vertices` (n, 3).
+
+    `open_edges` is how many edges have an odd number of them. `volume` (m³) is what they bound, None if they are open
+    or turn both ways; where it is known, they are counter-clockwise from outside, those of a hole from within it, and
+    every edge is run along once in each direction.
+    """
+
+    vertices: Vertices
+    faces: Faces
+    open_edges: int
+    volume: float | None
+
+    @classmethod
+    def of(cls, triangles: ArrayLike) -> Surface:
+        """Of (t, 3, 3) triangles; corners that are equal to the bit are one. NotDecomposed if none has an area."""
+        corners = np.asarray(triangles, dtype=float)
+        if corners.ndim != 3 or corners.shape[1:] != (3, 3):
+            raise ValueError(f"triangles must have the shape (t, 3, 3), not {corners.shape}")
+        if not np.isfinite(corners).all():
+            raise NotDecomposed("the mesh has corners that are not finite")
+        vertices, faces = _welded(corners)
+        if not len(faces):
+            raise NotDecomposed("the mesh has no triangle that has an area")
+        volume = None
+        if _turns_one_way(faces):
+            volume = _volume(vertices, faces)
+            if volume < 0:
+                faces, volume = np.ascontiguousarray(faces[:, ::-1]), -volume
+            if _a_shell_is_inside_out(vertices, faces):
+                volume = None
+        return cls(vertices, faces, _open_edges(faces), volume)
+
+    @property
+    def triangles(self) -> Vertices:
+        """(t, 3, 3)"""
+        return self.vertices[self.faces]
+
+    def convex_bodies(self) -> list[Hull] | None:
+        """The bodies that the surface consists of as hulls, if all are convex but for rounding and none is a hole."""
+        return None if self.volume is None else _convex_bodies(self.vertices, self.faces)
+
+
 def cache_folder() -> Path:
     """Where decompositions are kept: overlapper/convex_parts in $XDG_CACHE_HOME, by default in ~/.cache."""
     home = Path(os.environ.get("XDG_CACHE_HOME", ""))
@@ -88,24 +132,14 @@ def decompose(
     NotDecomposed if the surface is open, or CoACD is not installed, fails, or takes longer than `time_limit` seconds.
     """
     check_threshold(threshold)
-    corners = np.asarray(triangles, dtype=float)
-    if corners.ndim != 3 or corners.shape[1:] != (3, 3):
-        raise ValueError(f"triangles must have the shape (t, 3, 3), not {corners.shape}")
-    if not np.isfinite(corners).all():
-        raise NotDecomposed("the mesh has corners that are not finite")
-    vertices, faces = _welded(corners)
-    if not len(faces):
-        raise NotDecomposed("the mesh has no triangle that has an area")
-    open_edges = _open_edges(faces)
-    if open_edges and not enclose:
-        raise NotDecomposed(f"the concave mesh bounds no volume: its surface is open along {open_edges:,} edges")
-    volume = None
-    if _turns_one_way(faces):
-        volume = _volume(vertices, faces)
-        if volume < 0:
-            faces, volume = np.ascontiguousarray(faces[:, ::-1]), -volume
-        if convex := _convex_bodies(vertices, faces):
-            return Decomposition(tuple(convex), volume, None)
+    surface = Surface.of(triangles)
+    if surface.open_edges and not enclose:
+        raise NotDecomposed(
+            f"the concave mesh bounds no volume: its surface is open along {surface.open_edges:,} edges"
+        )
+    if convex := surface.convex_bodies():
+        return Decomposition(tuple(convex), surface.volume, None)
+    vertices, faces, volume = surface.vertices, surface.faces, surface.volume
     path, parts = _kept_or_made(vertices, faces, threshold, time_limit)
     hulls: list[Hull] = []
     for part in parts:
@@ -154,11 +188,8 @@ def _convex_bodies(vertices: Vertices, faces: Faces) -> list[Hull] | None:
 
     Faces are connected by common edges: bodies may touch at a corner.
     """
-    ends, edges = np.unique(np.sort(_edges(faces), axis=1), axis=0, return_inverse=True)
-    labels = _components(edges.reshape(3, -1).T, len(ends))[edges.reshape(3, -1)[0]]
     hulls: list[Hull] = []
-    for label in np.unique(labels):
-        shell = faces[labels == label]
+    for shell in _shells(faces):
         corners = vertices[np.unique(shell)]
         try:
             hull = Hull(corners)
@@ -171,6 +202,25 @@ def _convex_bodies(vertices: Vertices, faces: Faces) -> list[Hull] | None:
             return None
         hulls.append(hull)
     return hulls
+
+
+def _shells(faces: Faces) -> list[Faces]:
+    """The connected parts of a closed surface."""
+    ends, edges = np.unique(np.sort(_edges(faces), axis=1), axis=0, return_inverse=True)
+    labels = _components(edges.reshape(3, -1).T, len(ends))[edges.reshape(3, -1)[0]]
+    order = np.argsort(labels, kind="stable")
+    return np.split(faces[order], np.flatnonzero(np.diff(labels[order])) + 1)
+
+
+def _a_shell_is_inside_out(vertices: Vertices, faces: Faces) -> bool:
+    """Whether a connected part of a closed surface is clockwise from outside, and no hole within the box of another."""
+    shells = _shells(faces)
+    if len(shells) == 1:
+        return False
+    boxes = np.array([(vertices[shell].min(axis=(0, 1)), vertices[shell].max(axis=(0, 1))) for shell in shells])
+    holes = np.array([_volume(vertices, shell) for shell in shells]) < 0
+    solid = boxes[~holes]
+    return any(not ((solid[:, 0] <= lower) & (upper <= solid[:, 1])).all(axis=1).any() for lower, upper in boxes[holes])
 
 
 def _deepest(hull: Hull, points: Vertices) -> float:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Shape, Sphere
 
 Array = NDArray[np.float64]
+SMOOTH = np.cos(np.deg2rad(40))  # of the angle between two facets: more is an edge to be seen
 Facets = Sequence[NDArray[np.integer[Any]]]
 
 
@@ -31,9 +32,21 @@ class Outline:
     wires: Array
 
 
-def outline(shape: Shape) -> Outline:
+@dataclass(frozen=True)
+class Mesh:
+    """A closed surface, concave or not, that is drawn and never measured: triangles (t, 3, 3), counter-clockwise."""
+
+    triangles: Array
+
+
+def outline(shape: Shape | Mesh) -> Outline:
     """The surface of a bounded shape; round ones within 0.3 % of the radius, rounded hulls with bevelled edges."""
     assert not isinstance(shape, HalfSpace)
+    if isinstance(shape, Mesh):
+        vertices, faces = np.unique(shape.triangles.reshape(-1, 3), axis=0, return_inverse=True)
+        faces = faces.reshape(-1, 3)
+        lines = _mesh_creases(vertices, faces)
+        return Outline(vertices, faces, None, lines, lines)
     if isinstance(shape, RoundedHull):
         core = shape.core
         outward = [core.vertices[ring] + shape.radius * plane[:3] for ring, plane in zip(core.facets, core.halfspaces)]
@@ -166,9 +179,24 @@ def _creases(vertices: Array, facets: Facets) -> Array:
         corners = vertices[ring]
         normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
         normals.update(dict.fromkeys(zip(ring, np.roll(ring, -1), strict=True), normal / np.linalg.norm(normal)))
-    smooth = np.cos(np.deg2rad(40))
-    creases = [(i, j) for (i, j), normal in normals.items() if i < j and normal @ normals[j, i] < smooth]
+    creases = [(i, j) for (i, j), normal in normals.items() if i < j and normal @ normals[j, i] < SMOOTH]
     edges: Array = vertices[np.array(creases, dtype=int).reshape(-1, 2)]
+    return edges
+
+
+def _mesh_creases(vertices: Array, faces: NDArray[np.integer[Any]]) -> Array:
+    """As `_creases`, of many triangles, every edge of which is run along once in each direction."""
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)[:, None]
+    normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
+    start, end = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
+    there, back = start * len(vertices) + end, end * len(vertices) + start
+    order = np.argsort(there)
+    across = order[np.searchsorted(there[order], back)]
+    sharp = (normals[np.arange(len(start)) // 3] * normals[across // 3]).sum(axis=1) < SMOOTH
+    chosen = sharp & (start < end)
+    edges: Array = vertices[np.column_stack([start, end])[chosen]]
     return edges
 
 

@@ -1,6 +1,7 @@
 """Meshes of which bytes are changed, or that count more than they have, are read or refused in a sentence, and soon."""
 
 import json
+import re
 import struct
 import zipfile
 from datetime import timedelta
@@ -116,6 +117,36 @@ def test_a_mesh_that_a_scene_shows_too_often_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(mesh_file, "MOST_SHOWN", 1000)
     (tmp_path / "x.gltf").write_text(json.dumps(scene(nodes=126)))
     assert refusal(tmp_path / "x.gltf") == "it shows 1,008 corners and indices, which is more than 1,000"
+
+
+def package(path, objects, build, **files):
+    """A 3MF file of objects, and what of them is built."""
+    with zipfile.ZipFile(path, "w") as packed:
+        space = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+        text = (
+            f'<model unit="millimeter" xmlns="{space}"><resources>{objects}</resources><build>{build}</build></model>'
+        )
+        packed.writestr("3D/3dmodel.model", text)
+        for name, content in files.items():
+            packed.writestr(f"3D/{name}.model", content)
+
+
+def test_a_package_that_shows_an_object_too_often_is_refused_soon(tmp_path):
+    path = tmp_path / "x.3mf"
+    nested = '<object id="0"><mesh><vertices><vertex x="0" y="0" z="0"/></vertices></mesh></object>'
+    for k in range(1, 40):
+        twice = f'<component objectid="{k - 1}"/>' * 2
+        nested += f'<object id="{k}"><components>{twice}</components></object>'
+    package(path, nested, '<item objectid="39"/>')
+    assert re.fullmatch(r"it shows [\d,]{15,} corners and indices, which is more than 30,000,000", refusal(path))
+    round_about = '<object id="1"><components><component objectid="1"/></components></object>'
+    package(path, round_about, '<item objectid="1"/>')
+    assert "cycle" in refusal(path)
+    elsewhere = '<component objectid="7" p:path="/3D/big.model" xmlns:p="p"/>' * 1000
+    package(
+        path, f'<object id="1"><components>{elsewhere}</components></object>', '<item objectid="1"/>', big=" " * 10**6
+    )
+    assert refusal(path).startswith("it shows 125,")
 
 
 def test_what_is_packed_is_refused_or_must_not_be_too_much(tmp_path):

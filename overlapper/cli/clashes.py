@@ -1,0 +1,235 @@
+"""`overlapper clashes`: which bodies of mesh files overlap that should not."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from overlapper.cli.options import HtmlOption, ThresholdOption, refuse_out_of_range
+from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say
+from overlapper.cli.summary import ROUNDED_UP, VOLUME_UNITS, volume_unit
+from overlapper.printable import printable
+
+if TYPE_CHECKING:
+    from overlapper.scenes.clashes import Body, Clash, Clashes
+
+IN_MATRIX = 12  # bodies at most, so that a terminal holds it
+LISTED = 20  # pairs at most
+CAPTION = (
+    "Volume: of the meshes, true to within ±; of their convex parts where marked with *. Depth: the shortest way to "
+    "part the deepest two of these parts. Convex parts: how many stand for a mesh, and how much more volume they have."
+)
+
+
+def clashes(
+    sources: Annotated[
+        list[Path],
+        typer.Argument(metavar="FOLDER|FILE...", help="Meshes, or one assembly.", show_default=False),
+    ],
+    units: Annotated[
+        Literal["mm", "cm", "m", "in"], typer.Option(help="Of files that do not say theirs, as STL, OBJ and PLY.")
+    ] = "m",
+    least_depth: Annotated[
+        float, typer.Option(min=0.0, help="Depth in m below which an overlap is no clash.", show_default=False)
+    ] = 0.0,
+    expect: Annotated[
+        list[str] | None,
+        typer.Option(metavar="A,B", help="Two that may overlap; * is any text; may be repeated.", show_default=False),
+    ] = None,
+    concave: Annotated[
+        Literal["decompose", "enclose"],
+        typer.Option(help="Concave meshes as convex parts; open ones, too, with walls around them."),
+    ] = "decompose",
+    concave_threshold: ThresholdOption = 0.05,
+    out: Annotated[
+        Path | None, typer.Option(help="Table of what parts share in all pairs: .csv, .parquet, .sqlite.")
+    ] = None,
+    html: HtmlOption = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
+) -> None:
+    """Say which bodies of mesh files overlap, by how much, and how deep: for CI, and for whoever built them.
+
+    A folder or several files are a body each, an assembly (glTF, 3MF, STEP) as many as it shows. Volumes are those of
+    the meshes themselves, concave or not, if they are closed. Depths are those of convex parts, of which CoACD makes a
+    concave mesh: by how much more volume these have than the mesh is said beside every answer. The exit code is 0
+    without a clash, 1 with one, and 2 if a mesh could not be read or measured.
+
+    Examples:
+
+    [bold]overlapper clashes parts --units mm --html clashes.html[/bold]  all pairs of a folder, and a page of them
+
+    [bold]overlapper clashes gearbox.step --expect "bolt*,plate" --least-depth 1e-5[/bold]  what CI asks of an assembly
+    """
+    from overlapper.scenes.table_file import must_be_a_table
+    from overlapper.whole_file import must_be_writable
+
+    refuse_out_of_range(0.5, concave_threshold, out)
+    pairs = [_expected(each) for each in expect or ()]
+    settings: dict[str, Any] = {
+        "units": units,
+        "least_depth": least_depth,
+        "expect": expect or [],
+        "concave": concave,
+        "concave_threshold": concave_threshold,
+    }
+    written: list[Path] = []
+    try:
+        with input_refusals(), quiet():
+            from overlapper.scenes import clashes as scene
+
+            if out:
+                must_be_a_table(out)
+            if html:
+                import overlapper.viewer  # noqa: F401  # which says now what to install
+            for path in filter(None, (out, html)):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                must_be_writable(path)
+            parts, failures = scene.read(sources, units)
+            if len(parts) < 2:
+                for failure in failures:
+                    say(f"overlapper: {failure}", sys.stderr)
+                raise Refused(f"at least two bodies are needed, not {len(parts)}")
+            found = scene.clashes(parts, concave == "enclose", concave_threshold, least_depth, pairs)
+            found.failures[:0] = failures
+            if out:
+                scene.write_table(found, out, settings)
+                written.append(out)
+            if html:
+                scene.write_page(found, html)
+                written.append(html)
+    except KeyboardInterrupt as error:
+        raise Interrupted from error
+    code = 2 if found.failures else 1 if found.of_status("clash") else 0
+    if as_json:
+        files = {name: str(path) for name, path in (("out", out), ("html", html)) if path in written}
+        print(json.dumps({"settings": settings} | _facts(found) | files))
+    else:
+        _show(found, written)
+        for failure in found.failures:
+            say(f"overlapper: {failure}", sys.stderr)
+    raise typer.Exit(code)
+
+
+def _expected(text: str) -> tuple[str, str]:
+    first, comma, second = text.partition(",")
+    if not (first and comma and second):
+        raise Refused(f"--expect must be two names with a comma between them, not {text!r}")
+    return first, second
+
+
+def _facts(found: Clashes) -> dict[str, Any]:
+    return {
+        "bodies": [
+            {
+                "name": body.name,
+                "way": body.way,
+                "parts": len(body.parts),
+                "parts_volume_m3": body.parts_volume,
+                "mesh_volume_m3": body.mesh_volume,
+                "excess": body.excess,
+            }
+            for body in found.bodies
+        ],
+        "pairs": [
+            {
+                "names": pair.names,
+                "status": pair.status,
+                "volume_m3": pair.volume,
+                "volume_error_m3": pair.volume_error,
+                "volume_of": "meshes" if pair.of_meshes else "parts",
+                "parts_volume_m3": pair.parts.volume if pair.parts else None,
+                "depth_m": pair.depth,
+                "normal": pair.parts.normal.tolist() if pair.parts else None,
+            }
+            for pair in found.pairs
+        ],
+        "failures": found.failures,
+        "remarks": found.remarks,
+    }
+
+
+def _show(found: Clashes, written: list[Path]) -> None:
+    from overlapper.scenes.clashes import Status
+
+    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
+    count = len(found.bodies)
+    if found.pairs:
+        if count <= IN_MATRIX:
+            say(f"Volumes in {volume_unit(found.pairs[0].volume)} above the diagonal, depths in mm below it:")
+            console.print(_matrix(found))
+            say("")
+        console.print(_list(found))
+        say(CAPTION + (f" The {LISTED} largest of {len(found.pairs):,} pairs." if len(found.pairs) > LISTED else ""))
+    clashing, expected, shallow, touching = (len(found.of_status(status)) for status in get_args(Status))
+    words = [f"{clashing or 'none'} {'clash' if clashing > 1 else 'clashes'}"]
+    words += [f"{expected:,} {'overlap' if expected > 1 else 'overlaps'} as expected"] if expected else []
+    words += [f"{shallow:,} {'are' if shallow > 1 else 'is'} shallow"] if shallow else []
+    words += [f"{touching:,} {'touch' if touching > 1 else 'touches'}"] if touching else []
+    pairs = count * (count - 1) // 2
+    say(f"Of {pairs:,} pair{'s' * (pairs > 1)} of {count:,} bodies, {', '.join(words)}.")
+    for line in (*found.remarks, *(f"Written: {path}" for path in written)):
+        say(line)
+
+
+def _matrix(found: Clashes) -> Table:
+    """Volumes above the diagonal, depths below it."""
+    unit = volume_unit(found.pairs[0].volume)
+    table = _table()
+    table.add_column("body", overflow="fold")
+    for k in range(len(found.bodies)):
+        table.add_column(str(k + 1), justify="right", no_wrap=True)
+    cells = [["·" if i == k else "" for k in range(len(found.bodies))] for i in range(len(found.bodies))]
+    for pair in found.pairs:
+        i, k = pair.pair
+        cells[i][k] = _volume(pair, unit)
+        cells[k][i] = _depth(pair)
+    for k, (body, row) in enumerate(zip(found.bodies, cells)):
+        table.add_row(Text(f"{k + 1} {printable(body.name)}"), *row)
+    return table
+
+
+def _list(found: Clashes) -> Table:
+    """The largest pairs, two lines each."""
+    unit = volume_unit(found.pairs[0].volume)
+    table = _table("Pairs that overlap or touch")
+    table.add_column("pair", overflow="fold")
+    for header in ("", f"volume\n{unit}", f"±\n{unit}", "depth\nmm", "convex\nparts"):
+        table.add_column(header, justify="right" if header else "left", no_wrap=True)
+    for pair in found.pairs[:LISTED]:
+        first, second = (found.bodies[i] for i in pair.pair)
+        table.add_row(
+            Text(f"{printable(first.name)}\n {printable(second.name)}"),
+            pair.status,
+            _volume(pair, unit) + "*" * (not pair.of_meshes),
+            f"{ROUNDED_UP.create_decimal(pair.volume_error / VOLUME_UNITS[unit]):e}",
+            _depth(pair),
+            f"{_parts(first)}\n{_parts(second)}" if pair.parts else "",
+        )
+    return table
+
+
+def _table(title: str | None = None) -> Table:
+    return Table(title=title, box=SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
+
+
+def _volume(pair: Clash, unit: str) -> str:
+    return f"{pair.volume / VOLUME_UNITS[unit]:.4g}"
+
+
+def _depth(pair: Clash) -> str:
+    return "" if pair.depth is None else f"{1e3 * pair.depth:.3g}"
+
+
+def _parts(body: Body) -> str:
+    if body.way == "convex":
+        return "itself"
+    count = "hull" if body.way == "hull" else str(len(body.parts))
+    return f"{count}, open" if body.excess is None else f"{count}, {body.excess:+.1%}"

@@ -1,0 +1,387 @@
+"""Which bodies of mesh files clash: all pairs of a folder, of files, or of one assembly.
+
+A pair of which the convex hulls are apart is apart. What closed meshes share that are not convex is measured of the
+meshes themselves (`overlapper.polytopes.mesh_overlap`). Where they share something, convex parts stand for them
+(`overlapper.polytopes.decomposition`), which say how deep, and are what a page shows.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import Batch, Hull, Overlaps, Placed
+from overlapper.columns import MEASURES
+from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, Surface, decompose
+from overlapper.polytopes.mesh_file import ASSEMBLIES, BODIES, Part, read_parts
+from overlapper.polytopes.mesh_overlap import mesh_overlap, window
+from overlapper.printable import first_line
+from overlapper.scenes.still import Still
+from overlapper.scenes.table import Row
+from overlapper.scenes.table_file import TABLES, origin
+from overlapper.simulation.links import LinkContact, link_contacts
+from overlapper.union import union_volume
+
+Array = NDArray[np.float64]
+Status = Literal["clash", "expected", "shallow", "touching"]
+Way = Literal["convex", "decomposed", "hull", "unknown"]
+
+SHARED = "#ff4fa3"  # a colour that parts hardly ever have
+GREY = (0.62, 0.66, 0.72, 1.0)
+# Of bodies that clash, in turn: told apart, and none of them the colour of what is shared.
+COLORS = [(0.35, 0.60, 0.90, 1.0), (0.55, 0.78, 0.40, 1.0), (0.95, 0.72, 0.30, 1.0), (0.45, 0.75, 0.75, 1.0)]
+COLORS += [(0.62, 0.55, 0.85, 1.0), (0.80, 0.62, 0.48, 1.0)]
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A body as it was measured, where it stands, in m.
+
+    `triangles` (t, 3, 3) are those of a closed mesh, counter-clockwise from outside; None of a mesh that bounds no
+    volume that is known, and of one of which the hull was enough. `parts` stand for it: `way` says whether they are the
+    mesh itself ("convex"), or made by CoACD ("decomposed"), or the one of them is its convex hull ("hull"), which is
+    not enough to tell what it shares if there is no more to know ("unknown"). `parts_volume` is that of their union and
+    `mesh_volume` that of the mesh, in m³.
+    """
+
+    name: str
+    part: Part
+    triangles: Array | None
+    parts: tuple[Hull, ...]
+    way: Way
+    parts_volume: float
+    mesh_volume: float | None
+
+    @property
+    def excess(self) -> float | None:
+        """The fraction of the mesh's volume by which that of the parts is larger, None if the mesh bounds none."""
+        return self.parts_volume / self.mesh_volume - 1 if self.mesh_volume else None
+
+
+@dataclass(frozen=True, slots=True)
+class Clash:
+    """Two bodies that touch or overlap, by their places among the bodies.
+
+    They clash if nobody expects them to overlap, and not if they are "shallow", less deep than asked, or "touching": by
+    no more than the rounding of corners explains that are written with six digits.
+    `volume` (m³) is within `volume_error` of what the meshes share if `of_meshes`, and else of what their parts share,
+    which `parts` has, with depth and normal; None if these share nothing.
+    """
+
+    pair: tuple[int, int]
+    names: tuple[str, str]
+    status: Status
+    volume: float
+    volume_error: float
+    of_meshes: bool
+    parts: LinkContact | None
+
+    @property
+    def depth(self) -> float | None:
+        """m, of the deepest pair of parts: moving the first by as much along `parts.normal` separates these."""
+        return self.parts.depth if self.parts else None
+
+
+@dataclass(slots=True)
+class Clashes:
+    """The bodies; the pairs that touch or overlap, the largest volume first; and sentences, of what could not be
+    measured and of what was measured otherwise than asked."""
+
+    bodies: list[Body]
+    pairs: list[Clash]
+    failures: list[str]
+    remarks: list[str]
+
+    def of_status(self, status: Status) -> list[Clash]:
+        return [pair for pair in self.pairs if pair.status == status]
+
+
+def read(paths: Sequence[Path], units: str) -> tuple[list[tuple[str, Part]], list[str]]:
+    """The bodies of files and folders by their names, and what is wrong with files, a sentence each.
+
+    A file is named by its path from the folder that all are in, and a body of an assembly by that of its node; the
+    nodes of an only file need no file before them. ImportError without a library that a format needs.
+    """
+    files = list(dict.fromkeys(file for path in paths for file in _files(path)))
+    folder = Path(os.path.commonpath([file.absolute().parent for file in files]))
+    named: list[tuple[str, Part]] = []
+    failures: list[str] = []
+    for file in files:
+        try:
+            parts = read_parts(file, units)
+        except OSError as error:
+            failures.append(f"{file}: {error.strerror}")
+            continue
+        except ValueError as error:
+            failures.append(str(error))
+            continue
+        name = "" if len(files) == 1 and parts[0].name else file.absolute().relative_to(folder).as_posix()
+        named += [("/".join(filter(None, (name, part.name))), part) for part in parts]
+    return named, failures
+
+
+def _files(path: Path) -> list[Path]:
+    """A file, or the meshes in a folder. ValueError for a folder without any."""
+    if not path.is_dir():
+        return [path]
+    found = sorted(
+        each
+        for each in path.iterdir()
+        if each.suffix.lower() in (*BODIES, *ASSEMBLIES) and not each.name.startswith(".") and each.is_file()
+    )
+    if not found:
+        raise ValueError(f"there is no mesh in the folder {path}: {', '.join((*BODIES, *ASSEMBLIES))}")
+    return found
+
+
+def clashes(
+    parts: Sequence[tuple[str, Part]],
+    enclose: bool = False,
+    threshold: float = 0.05,
+    least_depth: float = 0.0,
+    expected: Sequence[tuple[str, str]] = (),
+) -> Clashes:
+    """What bodies share, of all pairs.
+
+    A mesh that is not convex is decomposed where it shares something; `threshold` is CoACD's, and with `enclose` it
+    lays walls around what is open. `least_depth` (m) is the least of a clash, and `expected` are pairs of names that
+    may overlap, as fnmatch has them. ValueError for one that names no body.
+    """
+    for pattern in (each for pair in expected for each in pair):
+        if not any(fnmatchcase(name, pattern) for name, _ in parts):
+            raise ValueError(f"no body is called {pattern!r}")
+    found = Clashes([], [], [], [])
+    hulls: list[Hull] = []
+    for name, part in parts:
+        try:
+            hull = Hull(part.placed(part.triangles.reshape(-1, 3)))
+        except ValueError as error:
+            found.failures.append(f"{name} is not measured: {first_line(error)}")
+        else:
+            hulls.append(hull)
+            found.bodies.append(_with_surface(Body(name, part, None, (hull,), "hull", hull.volume, None)))
+    near = [(i, j) for i, j in _overlaps(hulls).pairs.tolist()]
+    shared = {pair: _shared(*(found.bodies[i] for i in pair)) for pair in near}
+    solid = {pair for pair, each in shared.items() if each is None or each.volume > each.slight}
+    _decompose(found, {i for pair in solid for i in pair}, threshold, enclose)
+    contacts = _still(found.bodies).contacts(1e-3)
+    wanted = np.array([(a, b) in solid for a, _, _, b, _, _ in contacts.keys.tolist()], dtype=bool)
+    links = {(link.bodyA, link.bodyB): link for link in link_contacts(contacts[wanted])}
+    for pair in near:
+        measured = _clash(found.bodies, pair, shared[pair], links.get(pair), least_depth)
+        if measured:
+            found.pairs.append(_expected(measured, expected))
+    found.pairs.sort(key=lambda pair: -pair.volume)
+    return found
+
+
+def write_table(found: Clashes, path: Path, settings: Mapping[str, Any]) -> None:
+    """The pairs as a table of `overlapper run` by links, whose volumes are those of the pairs."""
+    excess = {body.name: body.excess for body in found.bodies if body.way == "decomposed"}
+    texts = {name: str(value) for name, value in settings.items()}
+    table = TABLES[path.suffix](path, origin() | texts | {"excess": json.dumps(excess)})
+    try:
+        table.write(_row(pair) for pair in found.pairs)
+    except BaseException:
+        table.leave()
+        raise
+    table.close()
+
+
+def _row(clash: Clash) -> Row:
+    row: Row = {"step": 1, "time_s": 0.0, "status": "touching" if clash.status == "touching" else "overlapping"}
+    for side, body, name in zip("AB", clash.pair, clash.names):
+        row |= {f"body{side}": body, f"link{side}": -1, f"name{side}": name}
+    row |= {"volume_m3": clash.volume, "volume_error_m3": clash.volume_error}
+    if clash.parts:
+        centroid = [None] * 3 if clash.parts.centroid is None else clash.parts.centroid.tolist()
+        measures = [*centroid, None, clash.parts.depth, *clash.parts.normal.tolist()]
+        row |= dict(zip(MEASURES[2:], measures))
+    return row
+
+
+def write_page(found: Clashes, path: Path) -> None:
+    """A page of the bodies, translucent, and of what those share that clash or may. ImportError without meshcat."""
+    from overlapper.viewer import Look, Recording
+
+    links = [pair.parts for pair in found.pairs if pair.status != "touching" and pair.parts]
+    recording = Recording(overlaps=Look(edges=False, front=SHARED, back=SHARED))
+    recording.add(_drawn(found), [contact for link in links for contact in link.contacts], 0.0)
+    recording.save(path)
+
+
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """What views ask of bodies, and of a shape where it stands."""
+
+    keys: list[tuple[int, int, int]]
+    placed: list[Placed]
+    colors: dict[tuple[int, int], tuple[float, float, float, float]]
+    names: dict[tuple[int, int], str]
+
+
+@dataclass(frozen=True, slots=True)
+class _Whole:
+    """A mesh as it is drawn, in the place of a `Placed`."""
+
+    shape: Any
+    position: Array
+    orientation: Array
+    bounds: Array
+
+
+def _drawn(found: Clashes) -> _Drawn:
+    """The bodies by their parts if they clash, as what is shared is of these, and by their meshes if they do not."""
+    from overlapper.viewer.outline import Mesh
+
+    clashing = list(dict.fromkeys(i for pair in found.pairs if pair.status != "touching" for i in pair.pair))
+    colors = {(i, -1): COLORS[k % len(COLORS)] for k, i in enumerate(clashing)}
+    keys: list[tuple[int, int, int]] = []
+    placed: list[Any] = []
+    for i, body in enumerate(found.bodies):
+        if body.triangles is not None and body.way != "convex" and i not in clashing:
+            keys.append((i, -1, 0))
+            bounds = np.array([body.triangles.min(axis=(0, 1)), body.triangles.max(axis=(0, 1))])
+            placed.append(_Whole(Mesh(body.triangles), np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), bounds))
+        else:
+            keys += [(i, -1, k) for k in range(len(body.parts))]
+            placed += [Placed(part) for part in body.parts]
+    # A slash would make two names of one, of a body and its link.
+    names = {(i, -1): body.name.replace("/", ".") for i, body in enumerate(found.bodies)}
+    return _Drawn(keys, placed, dict.fromkeys(names, GREY) | colors, names)
+
+
+@dataclass(frozen=True, slots=True)
+class _Shared:
+    """What two closed meshes share, m³, and how much the rounding of their corners explains."""
+
+    volume: float
+    error: float
+    slight: float
+
+
+def _still(bodies: Sequence[Body]) -> Still:
+    """The parts where they stand, as the shapes of a body each."""
+    keys = [(i, -1, k) for i, body in enumerate(bodies) for k in range(len(body.parts))]
+    names = {(i, -1): body.name for i, body in enumerate(bodies)}
+    return Still(keys, [part for body in bodies for part in body.parts], *_nowhere(len(keys)), names, {})
+
+
+def _nowhere(count: int) -> tuple[Array, Array]:
+    """The poses of shapes that stand where their points are."""
+    return np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
+
+
+def _overlaps(hulls: Sequence[Hull]) -> Overlaps:
+    return Batch(hulls).overlaps(*_nowhere(len(hulls)))
+
+
+def _with_surface(body: Body) -> Body:
+    """With the triangles of its mesh, if that is closed, and as convex bodies, if it consists of these."""
+    try:
+        surface = Surface.of(body.part.triangles)
+    except NotDecomposed:  # no triangle has an area
+        return body
+    if surface.volume is None:
+        return body
+    scale = float(np.linalg.det(body.part.transform[:3, :3]))
+    triangles = body.part.placed(surface.triangles.reshape(-1, 3)).reshape(-1, 3, 3)
+    body = replace(body, triangles=triangles[:, :: 1 if scale > 0 else -1], mesh_volume=abs(scale) * surface.volume)
+    convex = surface.convex_bodies()
+    return _of_parts(body, convex, "convex") if convex else body
+
+
+def _of_parts(body: Body, parts: Sequence[Hull], way: Way) -> Body:
+    placed: list[Hull] = []
+    for part in parts:
+        with suppress(ValueError):  # which the transform has made flat
+            placed.append(Hull(body.part.placed(part.vertices)))
+    volume = union_volume([Placed(part) for part in placed])[0]
+    return replace(body, parts=tuple(placed), way=way, parts_volume=volume)
+
+
+def _shared(a: Body, b: Body) -> _Shared | None:
+    """What the meshes share; None where that is for their parts to say: both are convex, or one is not closed."""
+    if a.way == b.way == "convex" or a.triangles is None or b.triangles is None:
+        return None
+    found = mesh_overlap(a.triangles, b.triangles)
+    if found is None:
+        return None
+    lower, upper = window(a.triangles, b.triangles)
+    area = sum(_area_within(triangles, lower, upper) for triangles in (a.triangles, b.triangles))
+    return _Shared(*found, found[1] + _rounding(a, b) * area)
+
+
+def _area_within(triangles: Array, lower: Array, upper: Array) -> float:
+    """No less than the area of triangles within a box, of which each has no more than the largest cut of the box."""
+    within = ((triangles.min(axis=1) <= upper) & (triangles.max(axis=1) >= lower)).all(axis=1)
+    a, b, c = triangles[within].transpose(1, 0, 2)
+    x, y, z = np.maximum(upper - lower, 0.0)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return float(np.minimum(areas, np.linalg.norm([x * y, y * z, z * x])).sum())
+
+
+def _rounding(a: Body, b: Body) -> float:
+    """m: by how much two surfaces may be nearer to each other than they were before their corners were rounded."""
+    reach = max(float(np.abs(part.bounds).max()) for body in (a, b) for part in body.parts)
+    return 2 * math.sqrt(3) * ROUNDING * reach
+
+
+def _decompose(found: Clashes, needed: set[int], threshold: float, enclose: bool) -> None:
+    """Put convex parts in the place of the hulls of what is not convex; what has none, and needs them, is a failure."""
+    for i, body in enumerate(found.bodies):
+        if body.way == "convex" or i not in needed:
+            continue
+        try:
+            # In the frame of the mesh, so that instances of one are decomposed once.
+            made = decompose(body.part.triangles, threshold, enclose=enclose)
+            found.bodies[i] = _of_parts(body, made.parts, "decomposed")
+        except NotDecomposed as error:
+            if body.triangles is None:
+                found.failures.append(f"{body.name} is not measured: {error}")
+                found.bodies[i] = replace(body, way="unknown")
+            else:
+                found.remarks.append(f"The convex hull stands for {body.name}: {error}.")
+
+
+def _clash(
+    bodies: Sequence[Body], pair: tuple[int, int], shared: _Shared | None, link: LinkContact | None, least_depth: float
+) -> Clash | None:
+    """What a pair comes to, None if it is apart or one of it could not be measured."""
+    a, b = (bodies[i] for i in pair)
+    if "unknown" in (a.way, b.way):
+        return None
+    of_meshes = shared is not None or a.way == b.way == "convex"
+    if shared:
+        if shared.volume <= shared.error:
+            return None
+        slight = shared.volume <= shared.slight
+        volume, error = shared.volume, shared.error
+    elif link:
+        slight = link.depth <= _rounding(a, b)
+        volume, error = link.volume, link.volume_error
+    else:
+        return None
+    shallow = link is not None and link.depth < least_depth
+    status: Status = "touching" if slight else "shallow" if shallow else "clash"
+    return Clash(pair, (a.name, b.name), status, volume, error, of_meshes, link)
+
+
+def _expected(clash: Clash, expected: Sequence[tuple[str, str]]) -> Clash:
+    """With its status, if somebody has said that the two may overlap."""
+    for patterns in expected:
+        if clash.status == "clash" and any(
+            all(map(fnmatchcase, names, patterns)) for names in (clash.names, clash.names[::-1])
+        ):
+            return replace(clash, status="expected")
+    return clash
