@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -26,6 +27,8 @@ MEASURES = [
     "depth_m",
     *[f"normal_{axis}" for axis in "xyz"],
 ]
+
+MOST_ROWS = 20  # that a notebook shows
 
 Columns = dict[str, NDArray[Any] | Sequence[Any]]
 
@@ -53,6 +56,24 @@ class Tabular(ABC):
         """A polars.DataFrame, columns as those of `overlapper run`. ImportError without polars."""
         frame: polars.DataFrame = _library("polars").DataFrame(self._columns(), nan_to_null=True)
         return frame
+
+    def _repr_html_(self) -> str:
+        """The first rows, as notebooks show a table."""
+        columns = self._columns()
+        count = len(next(iter(columns.values())))
+        shown = range(min(count, MOST_ROWS))
+        rows = ["".join(f"<th>{name}</th>" for name in columns)]
+        rows += ["".join(f"<td>{_cell(values[i])}</td>" for values in columns.values()) for i in shown]
+        more = f"<p>{count - MOST_ROWS:,} more</p>" if count > MOST_ROWS else ""
+        return (
+            f"<p>{type(self).__name__}, {count:,}</p><table>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>{more}"
+        )
+
+
+def _cell(value: Any) -> str:
+    if value is None or value != value:
+        return ""
+    return html.escape(f"{value:.5g}" if isinstance(value, float) else str(value))
 
 
 def _library(name: str) -> Any:

@@ -1,7 +1,15 @@
-"""What bodies share, drawn: live in a browser, or recorded as a page that needs no network."""
+"""What bodies share, drawn: live in a browser, recorded as a page that needs no network, or in a notebook."""
 
-from overlapper.viewer.live import Viewer
-from overlapper.viewer.look import Look
-from overlapper.viewer.recording import Recording
+from typing import TYPE_CHECKING
+
+from overlapper.face import lazily as _lazily
+
+if TYPE_CHECKING:
+    from overlapper.viewer.live import Viewer
+    from overlapper.viewer.look import Look
+    from overlapper.viewer.recording import Recording
 
 __all__ = ["Look", "Recording", "Viewer"]
+
+# Imported when asked for: what a notebook shows of an overlap needs numpy alone.
+__getattr__ = _lazily(__name__, {"live": ("Viewer",), "look": ("Look",), "recording": ("Recording",)})

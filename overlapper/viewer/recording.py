@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import html
 import json
 import math
 import pickle
@@ -126,6 +127,18 @@ class Recording:
 
     def save(self, path: str | Path) -> Path:
         """Write what was added so far to one HTML file, and return its path."""
+        text = self._page()
+        with beside(path) as file:
+            file.write_text(text, encoding="utf-8")
+        return Path(path)
+
+    def _repr_html_(self) -> str:
+        """The page, as notebooks show it; without a frame, a line."""
+        if not self._times:
+            return html.escape(repr(self))
+        return f'<iframe srcdoc="{html.escape(self._page())}" style="width:100%;height:600px;border:0"></iframe>'
+
+    def _page(self) -> str:
         if self._stage is None or self._framing is None:
             raise ValueError("there is nothing to save: add at least one frame first")
         tape = _Tape(list(self._tape.commands))
@@ -138,9 +151,7 @@ class Recording:
             "licences": licences(Path(VIEWER_ROOT).parent),
             "film": _packed(_film(self._heading(self._stage, self._framing), self._arrays())),
         }
-        with beside(path) as file:
-            file.write_text(filled(folder / "recording.html", texts), encoding="utf-8")
-        return Path(path)
+        return filled(folder / "recording.html", texts)
 
     def _heading(self, stage: Stage, framing: Framing) -> dict[str, Any]:
         return {

@@ -390,6 +390,10 @@ together.)");
   define_contact(cls);
   cls.def("__repr__", [](const Overlap& o) { return repr(o); });
   cls.def(
+      "_repr_html_",
+      [](nb::handle self) { return nb::module_::import_("overlapper.viewer.notebook").attr("overlap_html")(self); },
+      nb::sig("def _repr_html_(self) -> str"));
+  cls.def(
       "certificate",
       [](nb::handle self) { return nb::module_::import_("overlapper.proof.certificate").attr("certificate")(self); },
       nb::sig("def certificate(self) -> typing.Any"),
