@@ -13,8 +13,9 @@ import numpy as np
 from overlapper import HalfSpace, Overlap, Placed
 from overlapper import overlap as common_part
 from overlapper.quaternion import rotated
-from overlapper.viewer.look import BOTTOM, INK, LIGHT, MANY_FACETS, OWNER_COLORS, TOP, Array, boxes
-from overlapper.viewer.outline import outline, plate
+from overlapper.viewer.framing import around
+from overlapper.viewer.look import BOTTOM, INK, LIGHT, MANY_FACETS, OWNER_COLORS, TOP, Array
+from overlapper.viewer.outline import outline, rotation_from_z
 
 _Seen = Callable[[Array], Array]
 
@@ -25,6 +26,7 @@ ABOVE = np.deg2rad(25)  # the horizon: where the camera is
 AROUND = 48  # corners of an outline
 NEAR = 2.5  # times half the size of what is shared: how much is seen to each side
 COARSE = 0.05  # the tolerance by which what is round is drawn
+LEAST = 1e-150  # m, half the height of a picture: less cannot be divided by
 EDGES = 200  # of a body: more are a net that hides it
 
 
@@ -59,11 +61,11 @@ def turning(overlap: Overlap) -> str:
 
 def _framed(overlap: Overlap, placed: Sequence[Placed]) -> tuple[Array, float]:
     """The middle of the picture, and how far above and below it is seen, m."""
-    corners = np.array([np.asarray(overlap.bounds)] if overlap else boxes(placed))
-    lower, upper = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+    bodies = [np.asarray(each.bounds) for each in placed if not isinstance(each.shape, HalfSpace)]
+    lower, upper = around([np.asarray(overlap.bounds)] if overlap else bodies)
     reach = float(np.linalg.norm(upper - lower)) / 2
-    bodies = [float(np.linalg.norm(box[1] - box[0])) / 2 for box in boxes(placed)]
-    return (lower + upper) / 2, max(min(NEAR * reach, max(bodies)) if overlap else 1.1 * reach, 1e-150)
+    largest = max((float(np.linalg.norm(box[1] - box[0])) / 2 for box in bodies), default=reach)
+    return (lower + upper) / 2, max(min(NEAR * reach, largest) if overlap else 1.1 * reach, LEAST)
 
 
 def _views() -> Array:
@@ -78,19 +80,29 @@ def _views() -> Array:
 def _body(placed: Placed, color: Sequence[float], center: Array, reach: float, seen: _Seen) -> Iterator[str]:
     """What is seen of a body: how it stands out, and its edges."""
     if isinstance(placed.shape, HalfSpace):
-        back = np.append(-placed.orientation[:3], placed.orientation[3])
-        drawn = plate(placed.shape, rotated(back, center - placed.position), 2 * reach)
-        rings = seen(rotated(placed.orientation, drawn.vertices) + placed.position)
+        edges = np.empty((0, 3))
+        rings = seen(_disc(placed.shape, placed, center, 2 * reach))
     else:
         drawn = outline(placed.shape)
         rings = _outermost(seen(rotated(placed.orientation, drawn.vertices) + placed.position))
+        edges = rotated(placed.orientation, drawn.edges.reshape(-1, 3)) + placed.position
     paint = f'stroke="{hexadecimal(color)}" stroke-width="2"'
     faint = f'fill="{hexadecimal(color)}" fill-opacity=".16"'
     yield f"<polygon {faint} {paint} stroke-opacity='.7'>{_moving('points', map(_points, rings))}</polygon>"
-    if len(drawn.edges) <= EDGES:
-        ends = seen(rotated(placed.orientation, drawn.edges.reshape(-1, 3)) + placed.position)
+    if 0 < len(edges) <= 2 * EDGES:
+        ends = seen(edges)
         paths = ("".join(f"M{_points(line)}" for line in lines.reshape(-1, 2, 2)) for lines in ends)
         yield f'<path fill="none" {paint} stroke-opacity=".3">{_moving("d", paths)}</path>'
+
+
+def _disc(shape: HalfSpace, placed: Placed, center: Array, radius: float) -> Array:
+    """(AROUND, 3) points of a half-space's boundary plane, about the one that is nearest to `center`."""
+    normal = rotated(placed.orientation, shape.normal)
+    foot = center - (normal @ (center - placed.position) - shape.offset) * normal
+    angles = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
+    across, along = rotation_from_z(normal).T[:2]
+    points: Array = foot + radius * (np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * along)
+    return points
 
 
 def _outermost(screens: Array) -> Array:

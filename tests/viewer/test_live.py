@@ -68,6 +68,6 @@ def test_a_visualizer_passed_in_keeps_its_camera_and_its_server():
 
 
 def test_without_meshcat_one_sentence_says_what_to_install():
-    program = "import sys; sys.modules['meshcat'] = None; import overlapper.viewer"
+    program = "import sys; sys.modules['meshcat'] = None; from overlapper.viewer import Viewer"
     failed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert failed.stderr.splitlines()[-1] == "ImportError: overlapper.viewer needs meshcat: pip install meshcat"
