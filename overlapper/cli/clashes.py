@@ -125,19 +125,21 @@ def _expected(text: str) -> tuple[str, str]:
     return first, second
 
 
+def body_facts(body: Body) -> dict[str, Any]:
+    """What stands for a body, as JSON takes it."""
+    return {
+        "name": body.name,
+        "way": body.way,
+        "parts": len(body.parts),
+        "parts_volume_m3": body.parts_volume,
+        "mesh_volume_m3": body.mesh_volume,
+        "excess": body.excess,
+    }
+
+
 def _facts(found: Clashes) -> dict[str, Any]:
     return {
-        "bodies": [
-            {
-                "name": body.name,
-                "way": body.way,
-                "parts": len(body.parts),
-                "parts_volume_m3": body.parts_volume,
-                "mesh_volume_m3": body.mesh_volume,
-                "excess": body.excess,
-            }
-            for body in found.bodies
-        ],
+        "bodies": [body_facts(body) for body in found.bodies],
         "pairs": [
             {
                 "names": pair.names,
@@ -145,9 +147,9 @@ def _facts(found: Clashes) -> dict[str, Any]:
                 "volume_m3": pair.volume,
                 "volume_error_m3": pair.volume_error,
                 "volume_of": "meshes" if pair.of_meshes else "parts",
-                "parts_volume_m3": pair.parts.volume if pair.parts else None,
+                "parts_volume_m3": pair.parts.volume if pair.parts is not None else None,
                 "depth_m": pair.depth,
-                "normal": pair.parts.normal.tolist() if pair.parts else None,
+                "normal": pair.parts.normal.tolist() if pair.parts is not None else None,
             }
             for pair in found.pairs
         ],
@@ -211,7 +213,7 @@ def _list(found: Clashes) -> Table:
             _volume(pair, unit) + "*" * (not pair.of_meshes),
             f"{ROUNDED_UP.create_decimal(pair.volume_error / VOLUME_UNITS[unit]):e}",
             _depth(pair),
-            f"{_parts(first)}\n{_parts(second)}" if pair.parts else "",
+            f"{parts_text(first)}\n{parts_text(second)}" if pair.parts is not None else "",
         )
     return table
 
@@ -228,7 +230,8 @@ def _depth(pair: Clash) -> str:
     return "" if pair.depth is None else f"{1e3 * pair.depth:.3g}"
 
 
-def _parts(body: Body) -> str:
+def parts_text(body: Body) -> str:
+    """How many convex parts stand for a body, and how much more volume they have than its mesh."""
     if body.way == "convex":
         return "itself"
     count = "hull" if body.way == "hull" else str(len(body.parts))

@@ -89,7 +89,7 @@ class Clash:
     @property
     def depth(self) -> float | None:
         """m, of the deepest pair of parts: moving the first by as much along `parts.normal` separates these."""
-        return self.parts.depth if self.parts else None
+        return self.parts.depth if self.parts is not None else None
 
 
 @dataclass(slots=True)
@@ -203,7 +203,7 @@ def _row(clash: Clash) -> Row:
     for side, body, name in zip("AB", clash.pair, clash.names):
         row |= {f"body{side}": body, f"link{side}": -1, f"name{side}": name}
     row |= {"volume_m3": clash.volume, "volume_error_m3": clash.volume_error}
-    if clash.parts:
+    if clash.parts is not None:
         centroid = [None] * 3 if clash.parts.centroid is None else clash.parts.centroid.tolist()
         measures = [*centroid, None, clash.parts.depth, *clash.parts.normal.tolist()]
         row |= dict(zip(MEASURES[2:], measures))
@@ -214,7 +214,7 @@ def write_page(found: Clashes, path: Path) -> None:
     """A page of the bodies, translucent, and of what those share that clash or may. ImportError without meshcat."""
     from overlapper.viewer import Look, Recording
 
-    links = [pair.parts for pair in found.pairs if pair.status != "touching" and pair.parts]
+    links = [pair.parts for pair in found.pairs if pair.status != "touching" and pair.parts is not None]
     recording = Recording(overlaps=Look(edges=False, front=SHARED, back=SHARED))
     recording.add(_drawn(found), [contact for link in links for contact in link.contacts], 0.0)
     recording.save(path)
@@ -367,7 +367,7 @@ def _clash(
             return None
         slight = shared.volume <= shared.slight
         volume, error = shared.volume, shared.error
-    elif link:
+    elif link is not None:
         slight = link.depth <= _rounding(a, b)
         volume, error = link.volume, link.volume_error
     else:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import bearing
 import numpy as np
@@ -166,6 +167,12 @@ def test_bodies_that_touch_are_no_clash_whatever_rounding_does_to_them():
     code, found = facts("turned_0.stl", "turned_1.stl", "turned_2.stl")
     status = {tuple(name[7] for name in pair["names"]): pair["status"] for pair in found["pairs"]}
     assert (code, status["0", "1"], status["0", "2"]) == (0, "touching", "touching")
+    write_mesh("left.obj", Hull(CUBE @ turn.T))
+    write_mesh("right.obj", Hull((CUBE + [10, 0, 0]) @ turn.T))
+    code, found = facts("left.obj", "right.obj", "--out", "pairs.csv")
+    (pair,) = found["pairs"]
+    assert (code, pair["status"], pair["volume_m3"], pair["depth_m"]) == (0, "touching", 0, 0)
+    assert read_table(Path("pairs.csv"))[0]["status"] == "touching"
     assert clashes("turned_0.stl", "turned_1.stl").stdout.endswith("Of 1 pair of 2 bodies, none clashes, 1 touches.\n")
 
 
