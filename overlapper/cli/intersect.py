@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from overlapper.cli.clashes import body_facts, parts_text
 from overlapper.cli.options import MethodOption
-from overlapper.cli.refusals import Refused, input_refusals, say
+from overlapper.cli.refusals import Refused, input_refusals, quiet, say
 
 if TYPE_CHECKING:
     from overlapper import Hull, Overlap
@@ -30,12 +31,17 @@ def intersect(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Mesh of what is common: .obj, .stl, .ply.")] = None,
     method: MethodOption = "auto",
+    concave: Annotated[
+        bool, typer.Option("--concave", help="Two meshes with their dents and holes, and not their hulls.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the lines.")] = False,
 ) -> None:
     """Measure what convex polytopes have in common, all of them together, without a simulator.
 
     A mesh file gives the convex hull of its points; a database, named by its SQLAlchemy URL, every polytope that
-    --query returns, or that overlapper.write_polytopes has put there. Lengths are taken for m.
+    --query returns, or that overlapper.write_polytopes has put there. Lengths are taken for m. With --concave, volumes
+    are those of closed meshes themselves; depth, centroid and the mesh of --out are those of convex parts, of which
+    CoACD makes a concave mesh, and by how much more volume these have is said.
 
     Examples:
 
@@ -52,21 +58,24 @@ def intersect(
             from overlapper.polytopes.mesh_file import check_ending, write_mesh
 
             check_ending(out)
-        hulls = [hull for source in sources for hull in _hulls(source, query)]
-    if len(hulls) < 2:
-        raise Refused(f"at least two polytopes are needed, not {len(hulls)}")
-    common = overlap(*hulls, method=method)
-    written = out if common else None
-    if written:
-        with input_refusals():
-            write_mesh(written, common)
-    facts = _facts(common) | {"method": method, "out": str(written) if written else None}
+        if concave:
+            facts, pieces = _of_meshes(sources, method)
+        else:
+            hulls = [hull for source in sources for hull in _hulls(source, query)]
+            if len(hulls) < 2:
+                raise Refused(f"at least two polytopes are needed, not {len(hulls)}")
+            common = overlap(*hulls, method=method)
+            facts, pieces = _facts(common), [common] if common else []
+        written = out if pieces else None
+        if written:
+            write_mesh(written, pieces)
+    facts |= {"method": method, "out": str(written) if written else None}
     if as_json:
         print(json.dumps(facts))
         return
     for name, fact in facts.items():
-        if name == "volume" or (fact and name not in ("volume_error", "method", "out")):
-            error = f" ± {common.volume_error:.1g}" if name == "volume" else ""
+        if name == "volume" or (fact and name not in ("volume_error", "method", "out", "bodies")):
+            error = f" ± {facts['volume_error']:.1g}" if name == "volume" else ""
             print(f"{name:10}{_digits(fact)}{error}{UNITS.get(name, '')}")
     if out:
         say(f"Written: {out}" if written else f"Not written, as nothing is in common: {out}")
@@ -88,6 +97,42 @@ def _hulls(source: str, query: str | None) -> Iterator[Hull]:
         if issubclass(warning.category, NotConvexWarning):
             say(f"overlapper: {warning.message}", sys.stderr)
     yield hull
+
+
+def _of_meshes(sources: Sequence[str], method: str) -> tuple[dict[str, Any], list[Overlap]]:
+    """What two mesh files share, concave or not, and what pairs of their convex parts do."""
+    if method != "auto":
+        raise Refused("--concave and --method paper do not go together: that method is for polytopes")
+    if len(sources) != 2 or any("://" in source for source in sources):
+        raise Refused("--concave is of two mesh files; overlapper clashes takes all pairs of more")
+    import numpy as np
+
+    from overlapper.polytopes.mesh_file import Part, read_triangles
+    from overlapper.scenes.clashes import clashes
+
+    with quiet():
+        found = clashes([(source, Part(source, read_triangles(source), np.eye(4))) for source in sources])
+    if found.failures:
+        raise Refused(found.failures[0])
+    for remark in found.remarks:
+        say(f"overlapper: {remark}", sys.stderr)
+    pair = found.pairs[0] if found.pairs else None
+    parts = pair.parts if pair else None
+    overlapping = pair is not None and pair.volume > pair.volume_error
+    facts = {
+        "polytopes": sum(len(body.parts) for body in found.bodies),
+        "status": "overlapping" if overlapping else "touching" if pair else "separated",
+        "volume": pair.volume if pair else 0.0,
+        "volume_error": pair.volume_error if pair else 0.0,
+        "centroid": parts.centroid.tolist() if parts is not None and parts.centroid is not None else None,
+        "depth": pair.depth if pair else None,
+        "normal": parts.normal.tolist() if parts is not None else None,
+        "bodies": [body_facts(body) for body in found.bodies],
+    }
+    for body in found.bodies if parts is not None else ():
+        if body.way != "convex":
+            say(f"overlapper: convex parts of {body.name}: {parts_text(body)} of its volume", sys.stderr)
+    return facts, [contact.overlap for contact in parts.contacts if contact.overlap] if parts is not None else []
 
 
 def _facts(common: Overlap) -> dict[str, Any]:

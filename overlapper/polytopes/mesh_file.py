@@ -29,7 +29,7 @@ try:
 except ImportError as error:
     raise ImportError(f"overlapper.polytopes.mesh_file needs {hint('trimesh')}") from error
 
-__all__ = ["NotConvexWarning", "Part", "check_ending", "read_hull", "read_parts", "write_mesh"]
+__all__ = ["NotConvexWarning", "Part", "check_ending", "read_hull", "read_parts", "read_triangles", "write_mesh"]
 
 Array = NDArray[np.float64]
 
@@ -101,6 +101,25 @@ def read_parts(path: str | Path, units: str = "m") -> list[Part]:
     except Ended as ended:
         raise ValueError(f"{path} is not a mesh that can be read: the process that read it {ended}") from None
     except Exception as error:  # of many kinds, as every format has a parser of its own
+        raise ValueError(f"{path} is not a mesh that can be read: {first_line(error)}") from error
+
+
+def read_triangles(path: str | Path) -> Array:
+    """All triangles (t, 3, 3) that a mesh file shows, in the file's own frame and unit, which is taken for m.
+
+    Raises OSError if there is no such file, ValueError if it is no mesh.
+    """
+    path = Path(path)
+    path.open("rb").close()
+    try:
+        _must_fit(path)
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            mesh: Any = trimesh.load_mesh(str(path))
+        if not len(mesh.faces):
+            raise ValueError("it has no triangles")
+        return np.asarray(mesh.triangles, dtype=float)
+    except Exception as error:
         raise ValueError(f"{path} is not a mesh that can be read: {first_line(error)}") from error
 
 

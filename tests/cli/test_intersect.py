@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+import trimesh
 from numpy.testing import assert_allclose
 
 from overlapper import Hull, overlap, random_polytope, read_hull, write_mesh, write_polytopes
@@ -125,6 +126,59 @@ def test_a_mesh_that_is_not_convex_is_named_beside_the_answer():
     assert "bent.obj is not convex: it fills 85.7% of its convex hull" in done.stderr
 
 
+# Concave meshes
+
+
+def test_with_concave_the_volume_is_that_of_the_meshes_and_not_of_hulls(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    write_mesh("bar.stl", Hull(CUBE * [0.5, 2, 0.5] + [0.75, 0, 0.25]))
+    done = intersect("bent.obj", "bar.stl", "--concave", "--json", "--out", "common.obj")
+    facts = json.loads(done.stdout)
+    assert (done.returncode, facts["status"], facts["out"]) == (0, "overlapping", "common.obj")
+    assert facts["volume"] == pytest.approx(0.375, rel=1e-6) and facts["volume_error"] < 1e-12
+    bent, bar = facts["bodies"]
+    assert (bent["way"], bar["way"]) == ("decomposed", "convex") and abs(bent["excess"]) < 0.01
+    assert re.search(r"convex parts of bent\.obj: 2, [+-]0\.\d% of its volume\n$", done.stderr)
+    assert sum(each.volume for each in trimesh.load_mesh("common.obj").split()) == pytest.approx(0.375, rel=0.01)
+    lines = dict(line.split(maxsplit=1) for line in intersect("bent.obj", "bar.stl", "--concave").stdout.splitlines())
+    assert lines["volume"].startswith("0.375 ± ") and lines.keys() >= {"status", "centroid", "depth", "normal"}
+
+
+def test_an_open_mesh_and_what_is_no_mesh_are_refused_with_concave(tmp_path):
+    (tmp_path / "open.obj").write_text(without_a_facet(L_SHAPE))
+    (tmp_path / "words.stl").write_text("hello")
+    for name, reason in (
+        ("open.obj", r"not measured: .* its surface is open"),
+        ("words.stl", "not a mesh that can be"),
+    ):
+        done = intersect("one.stl", name, "--concave")
+        assert (done.returncode, done.stdout) == (2, "")
+        assert re.match(rf"overlapper: {name} is {reason}", done.stderr)
+
+
+def test_what_stands_in_the_corner_of_a_concave_mesh_shares_nothing_with_it():
+    write_mesh("in_corner.stl", Hull(CUBE / 2 + [1.25, 1.25, 0]))
+    done = intersect("bent.obj", "in_corner.stl", "--concave", "--out", "none.obj")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "status    separated" in done.stdout and "volume    0 ± 0 m³" in done.stdout
+    assert "Not written, as nothing is in common: none.obj" in done.stdout
+    turn = trimesh.transformations.rotation_matrix(0.3, [1, 2, 3])[:3, :3]
+    for name, x in (("left.obj", 0), ("right.obj", 1)):
+        write_mesh(name, Hull((CUBE + [x, 0, 0]) @ turn.T))
+    assert "status    touching" in intersect("left.obj", "right.obj", "--concave").stdout
+
+
+def test_without_coacd_the_hull_stands_for_where_and_it_is_said(tmp_path, monkeypatch):
+    (tmp_path / "fake").mkdir()
+    (tmp_path / "fake" / "coacd.py").write_text("raise RuntimeError('no luck')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "fake"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    done = intersect("one.stl", "bent.obj", "--concave")
+    assert "volume    1 ± " in done.stdout
+    assert "overlapper: The convex hull stands for bent.obj: CoACD failed" in done.stderr
+    assert "overlapper: convex parts of bent.obj: hull, +16.7% of its volume\n" in done.stderr
+
+
 @pytest.mark.parametrize(
     "query",
     [
@@ -155,6 +209,16 @@ def test_a_query_only_reads(tmp_path, query):
         (["one.stl", "two.obj", "--out", "common.step"], "a mesh must end in .obj, .stl, .ply, not 'common.step'"),
         (["sqlite:///none.db"], "there is no database none.db"),
         (["sqlite://"], "the database says: no such table: polytopes"),
+        (["one.stl", "--concave"], "--concave is of two mesh files; overlapper clashes takes all pairs of more"),
+        (
+            ["one.stl", "sqlite://", "--concave"],
+            "--concave is of two mesh files; overlapper clashes takes all pairs of more",
+        ),
+        (["one.stl", "none.stl", "--concave"], "none.stl: No such file or directory"),
+        (
+            ["one.stl", "two.obj", "--concave", "--method", "paper"],
+            "--concave and --method paper do not go together: that method is for polytopes",
+        ),
     ],
 )
 def test_what_the_user_can_mend_is_one_sentence(arguments, sentence):
