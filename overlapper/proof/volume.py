@@ -97,13 +97,23 @@ class OrBetween:
 
     def __call__(self, bits: int) -> arb:
         try:
-            return self._as_given(bits)
+            return finite(self._as_given(bits))
         except Undecided:
             if bits < TIED:
                 raise
         off = fmpq(1, 1 << bits // 4)
         thin, thick = (self.slices(replace(self.tube, square=self.tube.square * x)) for x in (1 - off, 1 + off))
-        return thin(bits).union(thick(bits))
+        between = thin(bits).union(thick(bits))
+        if not between.is_finite():
+            raise CertificateError("the common volume could not be bounded: surfaces meet all along a curve")
+        return between
+
+
+def finite(number: arb) -> arb:
+    """The number, of which something is known. Undecided if nothing is: two sides meet where an integral ends."""
+    if not number.is_finite():
+        raise Undecided
+    return number
 
 
 def dyadic(number: arb) -> Fraction:

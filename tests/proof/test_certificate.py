@@ -162,6 +162,15 @@ def test_no_volume_is_proved_of_an_ellipsoid_and_another_round_body():
             claim.verify()
 
 
+def test_where_no_digits_tell_how_surfaces_meet_no_volume_is_proved():
+    # The ball's pole lies on the cylinder, but for the rounding of its turn.
+    found = overlap(*families.make("special_poses", 3000068).placed)
+    with pytest.raises(
+        CertificateError, match=r"^the common volume could not be bounded: surfaces meet all along a curve$"
+    ):
+        found.certificate()
+
+
 def test_an_ellipsoid_within_a_box_is_proved_to_have_its_volume():
     lower, upper = proved(overlap(Placed(EGG, (0.01, 0.02, 0.03), TURN), Placed(Box([2, 2, 2]))))
     truth = Fraction(1, 6) * Fraction("3.14159265358979323846264338327950288")
