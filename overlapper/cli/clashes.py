@@ -13,9 +13,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from overlapper.cli.figures import ROUNDED_UP, VOLUME_UNITS, volume_unit
 from overlapper.cli.options import HtmlOption, ThresholdOption, refuse_out_of_range
 from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say
-from overlapper.cli.summary import ROUNDED_UP, VOLUME_UNITS, volume_unit
 from overlapper.printable import printable
 
 if TYPE_CHECKING:

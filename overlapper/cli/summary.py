@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-from decimal import ROUND_UP, Context
-
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from overlapper.cli.figures import ROUNDED_UP, VOLUME_UNITS, volume_unit
 from overlapper.printable import printable
 from overlapper.scenes.summary import Summary
 from overlapper.simulation import Decomposed
-
-# Units for the volumes of one table, in m³: the largest of them that makes the largest volume a tenth or more.
-VOLUME_UNITS = {"m³": 1.0, "cm³": 1e-6, "mm³": 1e-9, "µm³": 1e-18}
-
-
-# One digit of an error bound, which must remain one.
-ROUNDED_UP = Context(prec=1, rounding=ROUND_UP)
-
-
-def volume_unit(largest: float) -> str:
-    """The unit for the volumes of a table, by the largest of them in m³."""
-    return next((unit for unit, size in VOLUME_UNITS.items() if largest >= 0.1 * size), "µm³")
 
 
 def overlaps_table(summary: Summary, limit: int = 20) -> Table:

@@ -355,6 +355,20 @@ def test_what_a_format_needs_is_told_by_name(tmp_path, monkeypatch):
         assert (done.returncode, done.stderr) == (2, f"overlapper: {name} needs {package}: pip install {package}\n")
 
 
+def test_neither_a_simulator_nor_a_viewer_is_needed(tmp_path, monkeypatch):
+    (tmp_path / "hidden").mkdir()
+    hide = (
+        "import sys\nsys.modules.update(dict.fromkeys(['pybullet', 'pybullet_data', 'meshcat', 'matplotlib', 'fcl']))\n"
+    )
+    (tmp_path / "hidden" / "sitecustomize.py").write_text(hide)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "hidden"))
+    done = clashes("one.stl", "two.obj")
+    assert (done.returncode, done.stderr) == (1, "") and "1 clashes." in done.stdout
+    done = clashes("one.stl", "two.obj", "--html", "page.html")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "overlapper: overlapper.viewer needs meshcat: pip install meshcat\n"
+
+
 # What the user can mend
 
 

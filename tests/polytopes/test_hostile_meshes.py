@@ -1,5 +1,7 @@
 """Meshes of which bytes are changed, or that count more than they have, are read or refused in a sentence, and soon."""
 
+import contextlib
+import io
 import json
 import re
 import struct
@@ -15,6 +17,7 @@ from mutation import mutated, said_by
 
 from overlapper import Hull, read_hull
 from overlapper.polytopes import mesh_file
+from overlapper.polytopes.mesh_file import read_parts
 
 CORNERS = np.random.default_rng(0).normal(size=(12, 3))
 FORMATS = ("stl", "stl_ascii", "ply", "ply_ascii", "obj", "off", "glb")
@@ -26,6 +29,8 @@ def written():
     hull = Hull(CORNERS)
     mesh = trimesh.Trimesh(hull.vertices, [ring.tolist()[:3] for ring in hull.facets], process=False)
     texts = {name: mesh.export(file_type=name) for name in FORMATS if name != "ply_ascii"}
+    with contextlib.suppress(ImportError):  # without networkx
+        texts["3mf"] = mesh.export(file_type="3mf")
     texts["ply_ascii"] = mesh.export(file_type="ply", encoding="ascii")
     return {name: text.encode() if isinstance(text, str) else text for name, text in texts.items()}
 
@@ -48,6 +53,22 @@ def test_a_mutated_mesh_is_read_or_refused_in_one_sentence(written, tmp_path_fac
     path.write_bytes(mutated(data, written[name]))
     said = said_by(lambda: read_hull(path))
     assert said == "" or (said.startswith(f"{path} is not a mesh with a hull: ") and "\n" not in said)
+
+
+@pytest.mark.parametrize("name", ["glb", "3mf", "stl"])
+@given(data=st.data())
+@settings(max_examples=100, deadline=timedelta(seconds=20))
+def test_mutated_bodies_are_read_or_refused_in_one_sentence(written, tmp_path_factory, name, data):
+    pytest.importorskip("networkx")
+    path = tmp_path_factory.getbasetemp() / f"mutated_bodies.{name}"
+    if name == "3mf":  # its text, as hardly any package is one when a byte of it is another
+        text = zipfile.ZipFile(io.BytesIO(written[name])).read("3D/3dmodel.model")
+        with zipfile.ZipFile(path, "w") as packed:
+            packed.writestr("3D/3dmodel.model", mutated(data, text))
+    else:
+        path.write_bytes(mutated(data, written[name]))
+    said = said_by(lambda: read_parts(path))
+    assert said == "" or (said.startswith(f"{path} is not a mesh that can be read: ") and "\n" not in said)
 
 
 @pytest.mark.parametrize("name", FORMATS)
