@@ -69,6 +69,8 @@ inline constexpr double kEnough = 1e-12;
 
 /// The same of a round body by a formula, which slices take ten times as long as: they state up to as much themselves.
 inline constexpr double kEnoughOfRound = 1e-11;
+/// Relative error of a volume up to which a formula is believed where slices found no answer.
+inline constexpr double kSureOfFormula = 1e-9;
 
 /// What is known of the common set of some bodies, in world coordinates and SI units; zeros unless overlapping.
 struct Measures {

@@ -381,8 +381,11 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
   MeasuresAndInertia kept;
   auto formula = choice.tries(Way::kClosedForm) && !in_doubt ? by_formula(overlapping, finest) : std::nullopt;
   if (choice.tries(Way::kSlicing) &&
-      !(formula && error_of(formula->measures) <= kEnoughOfRound * formula->measures.volume))
+      !(formula && error_of(formula->measures) <= kEnoughOfRound * formula->measures.volume)) {
     if (const auto& sliced = overlapping.sliced()) return *sliced;
+    // Where slices give up, features lie so near each other that a formula, too, may take one for another.
+    if (formula && !(error_of(formula->measures) <= kSureOfFormula * formula->measures.volume)) formula.reset();
+  }
   if (in_doubt) return by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);
   if (formula) kept = std::move(*formula);
   else kept = by_region(overlapping.region(), overlapping.bodies, overlapping.traced ? Way::kTracing : Way::kDual);

@@ -588,6 +588,13 @@ def test_special_poses_are_measured_truly_wherever_they_are(first_seed):
     assert sum("dual" in one.way for one in overlapping) <= 0.01 * len(overlapping)
 
 
+def test_a_formula_that_is_not_sure_is_not_believed_where_slices_give_up():
+    """A corner of a hull beside the rim of a cylinder, 5e-8 deep in it."""
+    found = overlap(*make("special_poses", 3000455).placed)
+    lower, upper = found.certificate().verify()
+    assert found.volume - found.volume_error <= lower and upper <= found.volume + found.volume_error
+
+
 @pytest.mark.parametrize("margin", [1.0, 0.05, 1e-3])
 @pytest.mark.parametrize("wide", [False, True])
 def test_a_face_in_the_plane_of_a_seam_bounds_all_that_it_should(margin, wide):
