@@ -16,7 +16,7 @@ HERE = Path(__file__).parent
 
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
-        page = Path(folder, "recording.html")
+        page = Path(folder, "franka_grasp.html")
         scene = HERE.parent / "scenes" / "franka_grasp.py"
         subprocess.run([sys.executable, "-m", "overlapper", "run", str(scene), "--html", str(page)], check=True)
         screenshot(f"{page.as_uri()}#t={TIME}&{CAMERA}", HERE / "picture.png")
@@ -29,7 +29,7 @@ def screenshot(link: str, picture: Path) -> None:
         sys.exit("the pictures of the documentation need Chromium: apt-get install chromium")
     options = ["--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--no-first-run"]
     options += ["--enable-unsafe-swiftshader", "--disable-background-networking", "--virtual-time-budget=4000"]
-    options += ["--window-size=960,600", "--force-device-scale-factor=2", f"--screenshot={picture}"]
+    options += ["--window-size=1200,750", "--force-device-scale-factor=1.6", f"--screenshot={picture}"]
     with tempfile.TemporaryDirectory() as profile:
         subprocess.run([chromium, *options, f"--user-data-dir={profile}", link], check=True, capture_output=True)
     print(picture)

@@ -24,7 +24,8 @@ def save(verdict: Verdict, name: str, path: Path) -> Path:
     """Write the page of a verdict with moves to one self-contained HTML file, and return its path."""
     step = verdict.worst_step
     before, after = (stills.get(step) for stills in (verdict.before, verdict.after))
-    stills = [still for still in (_dressed(before, after), after) if still is not None and still.keys]
+    frames = (_dressed(before, after), f"step {step} as recorded"), (after, f"step {step} today")
+    stills = [(still, name) for still, name in frames if still is not None and still.keys]
     sections = verdict.causes | ({"overlaps": verdict.overlaps} if verdict.overlaps else {})
     recording = _recording(stills, verdict.expected.tolerance)
     texts = {
@@ -47,11 +48,11 @@ def _dressed(before: Still | None, after: Still | None) -> Still | None:
     return replace(before, names=before.names | after.names, colors=before.colors | after.colors)
 
 
-def _recording(stills: Sequence[Still], tolerance: float) -> bytes:
-    """The frames as a page of `overlapper.viewer`; the first at 0 s, the second at 1 s."""
+def _recording(stills: Sequence[tuple[Still, str]], tolerance: float) -> bytes:
+    """The frames, with their names, as a page of `overlapper.viewer`; the link `#t=1` opens the second."""
     recording = Recording()
-    for time, still in enumerate(stills):
-        recording.add(still, still.contacts(tolerance), float(time))
+    for time, (still, name) in enumerate(stills):
+        recording.add(still, still.contacts(tolerance), float(time), name)
     with tempfile.TemporaryDirectory() as folder:
         return recording.save(Path(folder) / "page.html").read_bytes()
 

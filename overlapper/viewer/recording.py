@@ -43,15 +43,8 @@ from meshcat import Visualizer  # isort: skip  # after the stage, which says wha
 from meshcat.servers.zmqserver import VIEWER_ROOT  # isort: skip
 from meshcat.transformations import translation_matrix  # isort: skip
 
-SCRIPTS = (
-    "film",
-    "scene",
-    "look",
-    "camera",
-    "numbers",
-    "chart",
-    "time",
-)  # of the page, in the order they need each other
+# Of the page, in the order they need each other.
+SCRIPTS = ("film", "scene", "look", "numbers", "camera", "chart", "list", "panels", "time")
 ASPECTS = (0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0)
 ARRAYS = {"float32": "Float32Array", "uint32": "Uint32Array", "int32": "Int32Array", "uint16": "Uint16Array"}
 ARRAYS |= {"int16": "Int16Array", "uint8": "Uint8Array"}
@@ -78,6 +71,7 @@ class Recording:
         self._framing: Framing | None = None
         self._start = 0.0
         self._times: list[float] = []
+        self._names: list[str] = []
         self._bodies: dict[str, tuple[bytes, str]] = {}
         self._nodes: dict[str, int] = {}
         self._grounds: list[int] = []  # nodes
@@ -90,10 +84,11 @@ class Recording:
         self._sightings: list[tuple[int, int, int]] = []  # frame, pair, polytope
         self._numbers: list[Array] = []
 
-    def add(self, bodies: Bodies, contacts: Iterable[Contact], time: float) -> None:
+    def add(self, bodies: Bodies, contacts: Iterable[Contact], time: float, name: str = "") -> None:
         """Record the bodies where they are now and the overlapping pairs among `contacts`.
 
-        `time` in seconds must increase from call to call; the page counts from the first.
+        `time` in seconds must increase from call to call; the page counts from the first. Frames with a `name` are no
+        moments of one run: the page shows their names in the place of times.
         """
         if self._stage is None or self._framing is None:
             self._framing = Framing(bodies)
@@ -104,6 +99,7 @@ class Recording:
         if self._times and not seconds > self._times[-1]:
             raise ValueError(f"time must increase from frame to frame: {time} s came no later than the frame before")
         self._times.append(seconds)
+        self._names.append(name)
         colors = bodies.colors
         places = {
             self._add_body(self._stage, path, placed, colors[key[:2]]): _pose(self._stage, placed)
@@ -127,7 +123,7 @@ class Recording:
 
     def save(self, path: str | Path) -> Path:
         """Write what was added so far to one HTML file, and return its path."""
-        text = self._page()
+        text = self._page(Path(path).stem)
         with beside(path) as file:
             file.write_text(text, encoding="utf-8")
         return Path(path)
@@ -138,7 +134,7 @@ class Recording:
             return html.escape(repr(self))
         return f'<iframe srcdoc="{html.escape(self._page())}" style="width:100%;height:600px;border:0"></iframe>'
 
-    def _page(self) -> str:
+    def _page(self, title: str = "") -> str:
         if self._stage is None or self._framing is None:
             raise ValueError("there is nothing to save: add at least one frame first")
         tape = _Tape(list(self._tape.commands))
@@ -149,13 +145,14 @@ class Recording:
             "meshcat": Path(VIEWER_ROOT, "main.min.js").read_text(encoding="utf-8"),
             "commands": _packed(f"[{','.join(tape.commands)}]".encode()),
             "licences": licences(Path(VIEWER_ROOT).parent),
-            "film": _packed(_film(self._heading(self._stage, self._framing), self._arrays())),
+            "film": _packed(_film({"title": title} | self._heading(self._stage, self._framing), self._arrays())),
         }
         return filled(folder / "recording.html", texts)
 
     def _heading(self, stage: Stage, framing: Framing) -> dict[str, Any]:
         return {
             "times": self._times,
+            "names": self._names if any(self._names) else None,
             "pairs": list(self._pairs),
             "links": list(self._links.values()),
             "nodes": list(self._nodes),

@@ -117,10 +117,10 @@ def test_a_move_is_told_by_the_figures_that_it_has(figures, cells, sentence):
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not to be had here")
 def test_one_pane_shows_what_was_recorded_and_the_other_what_is_today(verdict, tmp_path):
     page = before_after.save(verdict, "cubes", tmp_path / "page.html")
-    # A pane names its time together with its table, and after the tree of objects, which is there while both are empty.
-    panes = asyncio.run(asyncio.wait_for(texts_in_frames(page, tmp_path / "profile", until=".000 s"), timeout=120))
-    # 20 cm by 20 cm by 5 cm, and by 3 cm; the tree, which has the largest of both, comes after the table.
+    panes = asyncio.run(asyncio.wait_for(texts_in_frames(page, tmp_path / "profile", until="step 1 "), timeout=120))
+    # 20 cm by 20 cm by 5 cm, and by 3 cm. The moments have names, as they are none of one run.
     assert [re.search(r"\S+ dm³", pane)[0] for pane in panes] == ["2 dm³", "1.2 dm³"]
+    assert [re.search("step 1 .*", pane)[0] for pane in panes] == ["step 1 as recorded", "step 1 today"]
 
 
 async def texts_in_frames(page: Path, profile: Path, until: str) -> list[str]:

@@ -6,7 +6,7 @@ import base64
 import gzip
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,34 @@ class Bodies:
         self.colors = dict.fromkeys(self.names, GREEN)
 
     def contacts(self) -> list[Contact]:
+        pairs = [(i, j) for i in range(len(self.keys)) for j in range(i) if self.keys[i][0] != self.keys[j][0]]
+        return [Contact(*self.keys[j], *self.keys[i], overlap(self.placed[j], self.placed[i])) for i, j in pairs]
+
+
+@dataclass
+class Scene:
+    """Shapes by body, by body and link, or by body, link and shape; all green."""
+
+    shapes: dict
+    keys: list = field(init=False)
+
+    def __post_init__(self):
+        full = [key if isinstance(key, tuple) else (key,) for key in self.shapes]
+        self.keys = [(*key, *(-1, 0)[len(key) - 1 :]) for key in full]
+
+    @property
+    def placed(self):
+        return list(self.shapes.values())
+
+    @property
+    def names(self):
+        return {(body, link): f"body{body}/link{link}" for body, link, _ in self.keys}
+
+    @property
+    def colors(self):
+        return dict.fromkeys(self.names, GREEN)
+
+    def contacts(self):
         pairs = [(i, j) for i in range(len(self.keys)) for j in range(i) if self.keys[i][0] != self.keys[j][0]]
         return [Contact(*self.keys[j], *self.keys[i], overlap(self.placed[j], self.placed[i])) for i, j in pairs]
 
@@ -162,19 +190,41 @@ def coloured(image: np.ndarray, name: str) -> int:
 
 
 def opened(browser: Browser, page: Path, view: str = "#t=1") -> Browser:
-    """The page with a frame shown as it was first, its panel folded away."""
+    """The page with a frame shown as it was first, its panels and its legend folded away."""
     if browser.ask("location.href").partition("#")[0] == page.as_uri():
         browser.press("r")
         browser.ask("location.hash = '#'")
     else:
-        browser.open(page.as_uri(), until="document.querySelector('#time output').textContent.endsWith(' s')")
-        browser.ask("document.querySelector('#look').open = false")
+        browser.open(page.as_uri(), until="document.querySelector('#time output').textContent")
+    panel(browser, None)
+    browser.ask("document.querySelector('#legend').open = false")
     browser.ask(f"location.hash = {view!r}")
     time = float(re.search(r"t=([\d.]+)", view)[1])
     browser.wait(f"document.querySelector('#time output').textContent === '{time:.3f} s'")
     return browser
 
 
+def panel(browser: Browser, name: str | None) -> None:
+    """Unfold this panel of the page, and no other."""
+    for each in ("overlaps", "bodies", "look"):
+        if browser.ask(f"document.querySelector('#{each}').hidden") is (each == name):
+            browser.ask(f"document.querySelector('#show-{each}').click()")
+
+
 def scene(browser: Browser) -> np.ndarray:
-    """What is seen below the panels and above the bar with the time."""
-    return browser.picture()[130:680]
+    """What is seen between the heading, the panels and the bar with the time."""
+    image = browser.picture()
+    left, top, right, bottom = sides(browser, "#stage")
+    return image[top + 1 : bottom - 50, left:right]  # above the legend
+
+
+def sides(browser: Browser, selector: str) -> list[int]:
+    """Left, top, right and bottom of an element, in pixels."""
+    box = f"document.querySelector({selector!r}).getBoundingClientRect()"
+    return [round(browser.ask(f"{box}.{side}")) for side in ("left", "top", "right", "bottom")]
+
+
+def click_in_scene(browser: Browser, column: float, row: float) -> None:
+    """A click on a pixel of `scene`."""
+    left, top, _, _ = sides(browser, "#stage")
+    browser.click(left + column, top + 1 + row)

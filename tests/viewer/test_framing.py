@@ -4,49 +4,19 @@ from __future__ import annotations
 
 import base64
 import json
-from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from pages import GREEN, Film, coloured, drawings, looks, numbers, opened, scene
+from pages import Film, Scene, coloured, drawings, looks, numbers, opened, panel, scene
 from PIL import Image
 
-from overlapper import Box, HalfSpace, Hull, Placed, Sphere, overlap
-from overlapper.simulation.contacts import Contact
+from overlapper import Box, HalfSpace, Hull, Placed, Sphere
 from overlapper.viewer import Recording, Viewer, picture
 from overlapper.viewer.framing import BACK, Framing, View
 from overlapper.viewer.look import Look
 
 SLAB = Placed(Box([100, 100, 5]), (0, 0, -5))
-
-
-@dataclass
-class Scene:
-    """Shapes by body, or by body and link; all green."""
-
-    shapes: dict
-    keys: list = field(init=False)
-
-    def __post_init__(self):
-        self.shapes = {(key if isinstance(key, tuple) else (key, -1)): each for key, each in self.shapes.items()}
-        self.keys = [(body, link, 0) for body, link in self.shapes]
-
-    @property
-    def placed(self):
-        return list(self.shapes.values())
-
-    @property
-    def names(self):
-        return {(body, link): f"body{body}/link{link}" for body, link in self.shapes}
-
-    @property
-    def colors(self):
-        return dict.fromkeys(self.shapes, GREEN)
-
-    def contacts(self):
-        pairs = [(i, j) for i in range(len(self.keys)) for j in range(i) if self.keys[i][0] != self.keys[j][0]]
-        return [Contact(*self.keys[j], *self.keys[i], overlap(self.placed[j], self.placed[i])) for i, j in pairs]
 
 
 def framing(*scenes):
@@ -141,7 +111,8 @@ TIME = "document.querySelector('#time output').textContent"
 @looks
 def test_a_page_opens_at_the_largest_overlap_and_the_whole_scene_is_a_key_away(browser, fall):
     browser.open(fall.as_uri(), until=f"{TIME} === '1.000 s'")
-    browser.ask("document.querySelector('#look').open = false")
+    panel(browser, None)
+    browser.ask("document.querySelector('#legend').open = false")
     near = scene(browser)
     assert coloured(near, "green") > 10_000  # the cube, which would be less than a pixel on the slab
     assert coloured(near, "orange") > 200

@@ -10,6 +10,7 @@ function look(from, at) {
   viewer.camera.near = from.distanceTo(at) / 500;
   viewer.camera.position.copy(from);
   viewer.controls.target.copy(at);
+  seenAs = null;
   if (shown >= 0) drawOverlaps(shown);
   viewer.set_dirty();
 }
@@ -20,7 +21,53 @@ function lookAt(name) {
   const wide = Object.keys(distances).map(Number).sort((a, b) => a - b);
   const distance = distances[wide[Math.max(lastUpTo(wide, viewer.camera.aspect), 0)]];
   look(onPage(at.map((part, k) => part + distance * back[k])), onPage(at));
+  seenAs = name;
 }
+
+let seenAs = null;  // the view, as long as nobody turns the camera
+viewer.controls.addEventListener("start", () => { seenAs = null; });
+viewer.set_3d_pane_size = (size => () => {
+  if (!pane.clientWidth || !pane.clientHeight) return;
+  size(pane.clientWidth, pane.clientHeight);
+  if (seenAs) lookAt(seenAs);
+})(viewer.set_3d_pane_size.bind(viewer));
+new ResizeObserver(() => viewer.set_3d_pane_size()).observe(pane);
+viewer.set_3d_pane_size();
+
+// The link to what is seen now: moment, camera, the pair that is chosen, and what is left out.
+function linkHere() {
+  const world = point => viewer.scene.worldToLocal(point.clone()).toArray().map(part => +part.toPrecision(6)).join(",");
+  viewer.scene.updateMatrixWorld();
+  let link = `#t=${times[shown]}&from=${world(viewer.camera.position)}&at=${world(viewer.controls.target)}`;
+  if (chosen >= 0) link += `&pair=${encodeURIComponent(pairs[chosen].join(","))}`;
+  if (filter.least > 0) link += `&${filter.by}=${filter.least}`;
+  return link;
+}
+
+// Volumes beside the largest overlaps, as many as there is room for; after each picture.
+const TAGS = 5;
+function placeTags() {
+  const wanted = shown < 0 || !looks.overlaps.marks ? [] : largestFirst(sighted).slice(0, TAGS);
+  const own = shown < 0 || !looks.overlaps.marks ? -1 : sightingOf(chosen, shown);
+  if (own >= 0 && sighted.includes(own)) wanted.unshift(own);
+  const taken = [], tags = [];
+  for (const sighting of new Set(wanted)) {
+    const at = onPage(measured(sighting).centroid).project(viewer.camera);
+    const x = (1 + at.x) / 2 * pane.clientWidth + 10, y = (1 - at.y) / 2 * pane.clientHeight - 28;
+    if (at.z >= 1 || x < 0 || y < 0 || x > pane.clientWidth || y > pane.clientHeight) continue;
+    if (taken.some(([left, top]) => Math.abs(left - x) < 84 && Math.abs(top - y) < 24)) continue;
+    taken.push([x, y]);
+    const tag = element("span", {textContent: inUnit(film.numbers[sighting], units, 3).slice(0, 2).join(" ")});
+    tag.className = sighting === own ? "picked" : "";
+    tag.style.transform = `translate(${x}px, ${y}px)`;
+    tags.push(tag);
+  }
+  byId("tags").replaceChildren(...tags);
+}
+viewer.render = (render => () => {
+  render();
+  placeTags();
+})(viewer.render.bind(viewer));
 
 // The camera keeps its direction and comes as near as the overlap deserves.
 function comeTo(sighting) {
@@ -36,10 +83,10 @@ function pickAt(x, y) {
   const ray = new THREE.Raycaster();
   ray.setFromCamera(point, viewer.camera);
   const [hit] = ray.intersectObject(drawn.faces);
-  if (hit) return film.sighting_start[shown] + lastUpTo(triangles, hit.faceIndex);
+  if (hit) return sighted[lastUpTo(triangles, hit.faceIndex)];
   // A small one is hard to hit: what is nearest to the click.
   let best = -1, nearest = 14;
-  for (let s = film.sighting_start[shown]; s < film.sighting_start[shown + 1]; s++) {
+  for (const s of sighted) {
     const at = onPage(measured(s).centroid).project(viewer.camera);
     const off = Math.hypot((at.x - point.x) * box.width, (at.y - point.y) * box.height) / 2;
     if (at.z < 1 && off < nearest) [best, nearest] = [s, off];
@@ -48,8 +95,8 @@ function pickAt(x, y) {
 }
 
 let pressed = null;
-byId("meshcat-pane").addEventListener("pointerdown", event => { pressed = [event.clientX, event.clientY]; });
-byId("meshcat-pane").addEventListener("pointerup", event => {
+pane.addEventListener("pointerdown", event => { pressed = [event.clientX, event.clientY]; });
+pane.addEventListener("pointerup", event => {
   if (!pressed || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return;
   const sighting = pickAt(event.clientX, event.clientY);
   choose(sighting < 0 ? -1 : film.sighting_pair[sighting]);

@@ -1,84 +1,151 @@
-// The volume of each pair over time.
+// What is shared over time: of each pair or of all, as volume or as depth, linear or logarithmic.
 
-const EDGE = 8;  // px, the half of the slider's thumb: the chart's time is that of the slider
-const curves = pairs.map(() => []);  // [frame, volume], ...
-let largest = 0;
-for (let frame = 0; frame <= last; frame++) {
-  for (let s = film.sighting_start[frame]; s < film.sighting_start[frame + 1]; s++) {
-    curves[film.sighting_pair[s]].push([frame, film.numbers[s]]);
-    largest = Math.max(largest, film.numbers[s]);
-  }
-}
+const LEFT = 60, RIGHT = 12, TOP = 20, BOTTOM = 20;  // px; the slider's ends are at the same places
+const kind = {by: "volume", total: false, logarithmic: false};
+let curves = [], largest = 0, smallest = 0, unit = [];  // [frame, value], ... of each pair, or one of all
 const background = document.createElement("canvas");
 
-function place(frame, volume) {
-  const {width, height} = chart, edge = EDGE * devicePixelRatio;
-  return [edge + (width - 2 * edge) * (times[last] ? times[frame] / times[last] : 0), (height - 2) * (1 - 0.95 * volume / (largest || 1)) + 1];
+function traceAll() {
+  curves = kind.total ? [[]] : pairs.map(() => []);
+  for (let frame = 0; frame <= last; frame++) {
+    let all = 0;
+    for (const s of sightings(frame)) {
+      const value = measure(s, kind.by);
+      if (!kind.total) curves[film.sighting_pair[s]].push([frame, value]);
+      all = kind.by === "volume" ? all + value : Math.max(all, value);
+    }
+    if (kind.total && all) curves[0].push([frame, all]);
+  }
+  const values = curves.flatMap(curve => curve.map(([, value]) => value)).filter(Boolean);
+  largest = values.reduce((a, b) => Math.max(a, b), 0);
+  // As small as is of interest: nobody looks for a millionth of the largest.
+  smallest = 10 ** Math.floor(Math.log10(Math.max(values.reduce((a, b) => Math.min(a, b), largest), largest * 1e-6)));
+  unit = kind.by === "volume" ? inUnit(largest, units, 3).slice(1) : ["mm", 1e-3];
+  for (const curve of curves) curve.next = new Set(curve.map(([frame]) => frame));
+  sizeChart();
 }
 
-// A curve falls to zero where its pair is apart.
+function heightOf(value) {
+  if (!largest) return 0;
+  if (!kind.logarithmic) return value / largest;
+  return Math.max(0, Math.log(value / smallest) / (Math.log(largest / smallest) || 1));
+}
+
+function across(frame) {
+  return (LEFT + (chart.clientWidth - LEFT - RIGHT) * (times[last] ? times[frame] / times[last] : 0)) * devicePixelRatio;
+}
+
+function up(value) {
+  return (TOP + (chart.clientHeight - TOP - BOTTOM) * (1 - heightOf(value))) * devicePixelRatio;
+}
+
+// A curve falls to the ground where its pair is apart.
 function trace(context, curve) {
   context.beginPath();
   let before = -2;
-  for (const [frame, volume] of curve) {
-    if (frame !== before + 1) context.moveTo(...place(Math.max(frame - 1, 0), frame ? 0 : volume));
-    context.lineTo(...place(frame, volume));
-    if (last === 0) context.lineTo(chart.width, place(frame, volume)[1]);
+  for (const [frame, value] of curve) {
+    if (frame !== before + 1) context.moveTo(across(Math.max(frame - 1, 0)), up(frame ? 0 : value));
+    context.lineTo(across(frame), up(value));
+    if (last === 0) context.lineTo(chart.width - RIGHT * devicePixelRatio, up(value));
     before = frame;
-    if (frame < last && !curve.next?.has(frame + 1)) context.lineTo(...place(frame + 1, 0));
+    if (frame < last && !curve.next.has(frame + 1)) context.lineTo(across(frame + 1), up(0));
   }
   context.stroke();
 }
-for (const curve of curves) curve.next = new Set(curve.map(([frame]) => frame));
+
+// Steps of 1, 2 or 5 times a power of ten, about as many as wanted.
+function ticks(end, wanted) {
+  if (!(end > 0)) return [];
+  const rough = end / wanted, power = 10 ** Math.floor(Math.log10(rough));
+  const step = power * [1, 2, 5, 10].find(each => each * power >= rough * 0.999);
+  return Array.from({length: Math.floor(end / step * 1.000001) + 1}, (_, k) => k * step);
+}
+
+function valueTicks() {
+  if (!kind.logarithmic) return ticks(largest / unit[1], chart.clientHeight / 34).map(each => each * unit[1]);
+  const decades = Math.round(Math.log10(largest / smallest) - 0.5), every = Math.ceil((decades + 1) / (chart.clientHeight / 24));
+  return largest ? Array.from({length: Math.floor(decades / every) + 1}, (_, k) => smallest * 10 ** (k * every)) : [];
+}
 
 function sizeChart() {
-  for (const canvas of [chart, background]) [canvas.width, canvas.height] = [chart.clientWidth * devicePixelRatio, chart.clientHeight * devicePixelRatio];
+  const ratio = devicePixelRatio;
+  for (const canvas of [chart, background]) [canvas.width, canvas.height] = [chart.clientWidth * ratio, chart.clientHeight * ratio];
   const context = background.getContext("2d");
-  context.lineWidth = devicePixelRatio;
-  context.strokeStyle = "#4a5260";
-  context.beginPath();
-  context.moveTo(...place(0, 0));
-  context.lineTo(...place(last, 0));
-  context.stroke();
-  context.strokeStyle = curves.length > 20 ? "#9aa3b070" : "#9aa3b0c0";
+  context.font = `${11 * ratio}px system-ui, sans-serif`;
+  context.lineWidth = ratio;
+  context.fillStyle = "#a7b0bd";
+  context.strokeStyle = "#363d4a";
+  const line = (...points) => {
+    context.beginPath();
+    points.forEach(([x, y], k) => k ? context.lineTo(x, y) : context.moveTo(x, y));
+    context.stroke();
+  };
+  const [left, right, ground] = [LEFT * ratio, chart.width - RIGHT * ratio, chart.height - BOTTOM * ratio];
+  context.textAlign = "right";
+  context.textBaseline = "middle";
+  const levels = valueTicks();
+  for (const value of levels) {
+    line([left - 4 * ratio, up(value)], [right, up(value)]);
+    context.fillText(plain(value / unit[1], 3), left - 7 * ratio, up(value));
+  }
+  line([left, ground], [right, ground]);
+  context.textBaseline = "alphabetic";
+  const label = (text, x) => {
+    line([x, ground], [x, ground + 4 * ratio]);
+    context.fillText(text, x, chart.height - 4 * ratio);
+  };
+  context.textAlign = "center";
+  if (names) names.forEach((name, frame) => {
+    context.textAlign = frame ? "right" : "left";
+    label(name, across(frame));
+  });
+  else for (const time of ticks(times[last], Math.max(chart.clientWidth / 120, 2))) {
+    const x = left + (right - left) * time / times[last];
+    if (x < right - 58 * ratio) label(plain(time, 4), x);
+  }
+  context.textAlign = "right";
+  if (!names) context.fillText("time, s", right, chart.height - 4 * ratio);
+  const title = `${kind.by}${kind.total ? kind.by === "volume" ? " in total" : ", the deepest" : ""}, ${unit[0]}`;
+  context.textAlign = "left";
+  context.fillText(largest ? title : "nothing is shared", left, 12 * ratio);
+  chart.ariaLabel = largest ? `${title}, over time: up to ${plain(largest / unit[1], 3)}` : "nothing is shared";
+  chart.scaleText = levels.map(value => plain(value / unit[1], 3));
+  context.strokeStyle = kind.total ? "#e8ebf0" : `#a7b0bd${curves.length > 100 ? "40" : curves.length > 20 ? "80" : "d0"}`;
   for (const curve of curves) trace(context, curve);
   drawChart();
 }
 
 function drawChart() {
-  const context = chart.getContext("2d");
+  const context = chart.getContext("2d"), ratio = devicePixelRatio;
   context.clearRect(0, 0, chart.width, chart.height);
   context.drawImage(background, 0, 0);
-  context.lineWidth = 2 * devicePixelRatio;
-  for (const [pair, color] of [[hovered, "#e8ebf0"], [chosen, "#ff4fa3"]]) {
-    if (pair < 0) continue;
-    context.strokeStyle = color;
+  for (const [pair, color, width] of [[hovered, "#e8ebf0", 2], [chosen, "#ff4fa3", 3]]) {
+    if (pair < 0 || kind.total) continue;
+    [context.strokeStyle, context.lineWidth] = [color, width * ratio];
     trace(context, curves[pair]);
   }
   if (shown >= 0) {
-    const [x] = place(shown, 0);
     context.fillStyle = "#e8ebf0";
-    context.fillRect(x - devicePixelRatio / 2, 0, devicePixelRatio, chart.height);
+    context.fillRect(across(shown) - ratio / 2, 0, ratio, chart.height - BOTTOM * ratio);
   }
   const pair = hovered >= 0 ? hovered : chosen;
-  const top = document.createElement("div");
-  top.textContent = largest ? `volume, up to ${inUnit(largest, units, 3).slice(0, 2).join(" ")}` : "nothing is shared";
-  byId("caption").replaceChildren(top, ...(pair >= 0 ? named(pair) : []));
+  byId("caption").replaceChildren(...(pair >= 0 ? named(pairs[pair]) : []));
 }
 
 // The pair whose curve is nearest to a point of the chart.
 function curveAt(x, y) {
   const frame = frameAt(timeAt(x));
   let best = -1, nearest = 12 * devicePixelRatio;
-  for (let s = film.sighting_start[frame]; s < film.sighting_start[frame + 1]; s++) {
-    const off = Math.abs(place(frame, film.numbers[s])[1] - y * devicePixelRatio);
+  if (kind.total) return best;
+  for (const s of sightings(frame)) {
+    const off = Math.abs(up(measure(s, kind.by)) - y * devicePixelRatio);
     if (off < nearest) [best, nearest] = [film.sighting_pair[s], off];
   }
   return best;
 }
 
 function timeAt(x) {
-  return times[last] * Math.min(Math.max((x - EDGE) / (chart.clientWidth - 2 * EDGE), 0), 1);
+  return times[last] * Math.min(Math.max((x - LEFT) / (chart.clientWidth - LEFT - RIGHT), 0), 1);
 }
 
 chart.onpointermove = event => {
@@ -93,3 +160,16 @@ chart.onpointerdown = event => {
   pauseAt(frameAt(timeAt(event.offsetX)));
 };
 new ResizeObserver(sizeChart).observe(chart);
+
+// Pairs of buttons, of which one is pressed.
+function chartOf(change) {
+  Object.assign(kind, change);
+  const pressed = {"of-volume": kind.by === "volume", "of-depth": kind.by === "depth", "per-pair": !kind.total};
+  Object.assign(pressed, {"in-total": kind.total, linear: !kind.logarithmic, logarithmic: kind.logarithmic});
+  for (const [id, on] of Object.entries(pressed)) byId(id).ariaPressed = on;
+  byId("in-total").textContent = kind.by === "volume" ? "total" : "deepest";
+  traceAll();
+}
+const changes = {"of-volume": {by: "volume"}, "of-depth": {by: "depth"}, "per-pair": {total: false}, "in-total": {total: true}};
+Object.assign(changes, {linear: {logarithmic: false}, logarithmic: {logarithmic: true}});
+for (const [id, change] of Object.entries(changes)) byId(id).onclick = () => chartOf(change);

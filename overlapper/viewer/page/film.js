@@ -1,8 +1,15 @@
 // Reads what recording.py has packed. The files of this folder are joined to one script in the order that it names.
 const {THREE} = MeshCat;
 const byId = id => document.getElementById(id);
-const [slider, play, speed, table, numbers, chart] = ["slider", "play", "speed", "overlaps", "numbers", "chart"].map(byId);
-const output = document.querySelector("#time output");
+const [slider, play, speed, numbers, chart, pane] = ["slider", "play", "speed", "numbers", "chart", "meshcat-pane"].map(byId);
+const output = document.querySelector("#bar output");
+
+// What is told in the page's texts, which come from files of others, is always text.
+function element(kind, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(kind), properties);
+  made.append(...children);
+  return made;
+}
 
 function bytes(base64) {
   return Uint8Array.from(atob(base64), letter => letter.charCodeAt(0));
@@ -35,7 +42,8 @@ function starts(counts) {
   return sums;
 }
 
-const viewer = new MeshCat.Viewer(byId("meshcat-pane"));
+const viewer = new MeshCat.Viewer(pane);
+viewer.gui.domElement.remove();  // the panels are in its place
 const known = new Map();  // geometries by uuid: those used again come without their data
 for (const command of JSON.parse(new TextDecoder().decode(await unpacked("commands")))) {
   for (const geometry of command.object?.geometries ?? []) {
@@ -48,12 +56,8 @@ for (const command of JSON.parse(new TextDecoder().decode(await unpacked("comman
   }
   viewer.handle_command(command);
 }
-// The scene ends where the bar with the time begins.
-const wholePane = viewer.set_3d_pane_size.bind(viewer);
-viewer.set_3d_pane_size = () => wholePane(innerWidth, innerHeight - byId("time").offsetHeight);
-viewer.set_3d_pane_size();
 const film = read(await unpacked("film"));
-const {times, pairs, center, size: sceneSize} = film;
+const {times, pairs, links, names, center, size: sceneSize} = film;
 const last = times.length - 1, end = times[last] + (last ? times[last] / last : 0);
 const count = film.sighting_pair.length;
 

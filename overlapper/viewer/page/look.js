@@ -45,6 +45,7 @@ function applyLooks() {
   if (drawn.inside.material.vertexColors !== own) drawn.inside.material.needsUpdate = true;
   drawn.inside.material.vertexColors = own;
   drawn.inside.material.color.set(own ? 0x808080 : look.back);
+  for (const each of document.querySelectorAll("#legend .own")) each.hidden = look.front !== null;
   if (shown >= 0) drawOverlaps(shown);
   viewer.set_dirty();
 }
@@ -62,6 +63,7 @@ function control(kind, name) {
   if (name === "opacity") Object.assign(input, {type: "range", min: 0, max: 1, step: 0.05});
   else input.type = name === "front" || name === "back" ? "color" : "checkbox";
   input.title = `${kind}: ${name}`;
+  input.setAttribute("aria-label", input.title);
   input.oninput = () => {
     look[name] = input.type === "checkbox" ? input.checked : input.type === "range" ? +input.value : input.value;
     renew();
@@ -74,20 +76,25 @@ function control(kind, name) {
 }
 
 const details = ["faces", "edges", "vertices", "marks", "opacity", "front", "back"];
-for (const kind of ["overlaps", "bodies"]) {
+const kinds = ["overlaps", "bodies"];
+document.querySelector("#look thead").insertRow().append(element("th"), ...kinds.map(kind => element("th", {textContent: kind, scope: "col"})));
+for (const name of details) {
   const row = document.querySelector("#look tbody").insertRow();
-  row.innerHTML = `<th>${kind}</th>`;
-  for (const name of details) {
+  row.append(element("th", {textContent: name, scope: "row"}));
+  for (const kind of kinds) {
     const cell = row.insertCell();
     if (kind !== "bodies" || name !== "marks") cell.append(control(kind, name));
   }
-  const reset = document.createElement("button");
-  [reset.textContent, reset.title] = ["↺", `${kind} as they were (r: both)`];
+}
+const resets = document.querySelector("#look tbody").insertRow();
+resets.append(element("th", {textContent: "as they were"}));
+for (const kind of kinds) {
+  const reset = element("button", {textContent: "↺", title: `${kind} as they were (r: both)`});
   reset.onclick = () => {
     Object.assign(looks[kind], film.looks[kind]);
     renew();
   };
-  row.insertCell().append(reset);
+  resets.insertCell().append(reset);
 }
 
 // The controls say what the looks are, and all is drawn so.
@@ -106,9 +113,3 @@ function renew() {
   }
   applyLooks();
 }
-
-byId("tree").onclick = () => {
-  viewer.gui.domElement.classList.toggle("wanted");
-  viewer.gui.open();
-};
-byId("look").open = innerWidth >= 1000;

@@ -14,13 +14,25 @@ function plain(value, digits) {
   return text.includes("e") && Math.abs(value) >= 1 ? String(+text) : text.replace(/(\.\d*?)0+(e|$)/, "$1$2").replace(/\.(e|$)/, "$1");
 }
 
-function named(pair) {
-  const [first, second] = pairs[pair].map((name, k) => {
-    const span = document.createElement("span");
-    [span.className, span.textContent] = [["first", "second"][k], name];
-    return span;
-  });
-  return [first, " – ", second];
+function named([first, second]) {
+  return [element("span", {className: "first", textContent: first}), " – ", element("span", {className: "second", textContent: second})];
+}
+
+// What is left out of the list, the scene and the chart: overlaps with less than so much volume in m³, or depth in m.
+const filter = {by: "volume", least: 0};
+const row = {volume: 0, depth: 2};  // among the numbers of a sighting
+
+function measure(sighting, by) {
+  return film.numbers[row[by] * count + sighting];
+}
+
+function sightings(frame) {
+  const all = Array.from({length: film.sighting_start[frame + 1] - film.sighting_start[frame]}, (_, k) => film.sighting_start[frame] + k);
+  return all.filter(sighting => measure(sighting, filter.by) >= filter.least);
+}
+
+function largestFirst(some) {
+  return [...some].sort((a, b) => film.numbers[b] - film.numbers[a]);  // the first numbers are volumes
 }
 
 let chosen = -1, hovered = -1, shown = -1;  // a pair, a pair, a frame
@@ -29,25 +41,30 @@ function choose(pair) {
   chosen = pair;
   if (shown >= 0) {
     drawOverlaps(shown);
-    showTable(shown);
+    showList(shown);
     showNumbers(shown);
   }
   drawChart();
   viewer.set_dirty();
 }
 
+// What has nothing in it takes no room; where there is little, the panels on the right come before the numbers.
+function fold() {
+  const none = each => [...each.children].every(section => section.hidden);
+  byId("right").hidden = none(byId("right"));
+  byId("left").hidden = none(byId("left")) || narrow.matches && !byId("right").hidden;
+}
+
 function showNumbers(frame) {
   numbers.hidden = chosen < 0;
+  fold();
   if (chosen < 0) return;
-  const title = document.createElement("div"), close = document.createElement("button");
-  [close.textContent, close.title] = ["×", "close (escape)"];
+  const close = element("button", {textContent: "×", title: "close (escape)", ariaLabel: "close"});
   close.onclick = () => choose(-1);
-  title.append(close, ...named(chosen));
+  const title = element("div", {}, close, ...named(pairs[chosen]));
   const sighting = sightingOf(chosen, frame);
   if (sighting < 0) {
-    const none = document.createElement("div");
-    [none.className, none.textContent] = ["quiet", "share nothing at this time"];
-    numbers.replaceChildren(title, none);
+    numbers.replaceChildren(title, element("div", {className: "quiet", textContent: "share nothing at this time"}));
     return;
   }
   const {volume, error, depth, area, centroid, normal} = measured(sighting);
@@ -61,50 +78,9 @@ function showNumbers(frame) {
     ["normal", `(${normal.map(part => part.toFixed(4)).join(", ")})`],
   ]) {
     const row = list.insertRow();
-    row.append(Object.assign(document.createElement("th"), {textContent: name}));
+    row.append(element("th", {textContent: name}));
     row.insertCell().textContent = value;
   }
   numbers.replaceChildren(title, list);
 }
 
-const ROWS = 100;
-const [rows, heading] = [table.querySelector("tbody"), table.querySelector("th")];
-
-function showTable(frame) {
-  const sightings = Array.from({length: film.sighting_start[frame + 1] - film.sighting_start[frame]}, (_, k) => film.sighting_start[frame] + k);
-  sightings.sort((a, b) => film.numbers[b] - film.numbers[a]);  // the first numbers are volumes
-  const total = sightings.length;
-  heading.textContent = `${total} overlap${total === 1 ? "" : "s"}` + (looks.overlaps.front ? "" : ", facets in their owner's colour");
-  while (rows.rows.length > Math.min(total, ROWS)) rows.deleteRow(-1);
-  for (let k = 0; k < Math.min(total, ROWS); k++) {
-    const sighting = sightings[k], pair = film.sighting_pair[sighting], row = rows.rows[k] ?? newRow();
-    if (row.pair !== pair) row.cells[0].replaceChildren(...named(pair));
-    [row.pair, row.sighting] = [pair, sighting];
-    row.className = pair === chosen ? "picked" : pair === hovered ? "hovered" : "";
-    const {volume, depth} = measured(sighting);
-    [inUnit(volume, units, 3).slice(0, 2).join(" "), `${plain(1e3 * depth, 3)} mm`].forEach((text, i) => {
-      if (row.cells[i + 1].textContent !== text) row.cells[i + 1].textContent = text;
-    });
-  }
-  if (total > ROWS) heading.textContent += `; the largest ${ROWS}:`;
-}
-
-function newRow() {
-  const row = rows.insertRow();
-  for (let i = 0; i < 3; i++) row.insertCell();
-  row.title = "click for its numbers, and to come near; escape to come back";
-  row.onclick = () => {
-    choose(row.pair);
-    comeTo(row.sighting);
-  };
-  row.onmouseenter = () => hover(row.pair);
-  row.onmouseleave = () => hover(-1);
-  return row;
-}
-
-function hover(pair) {
-  if (pair === hovered) return;
-  hovered = pair;
-  for (const row of rows.rows) row.className = row.pair === chosen ? "picked" : row.pair === hovered ? "hovered" : "";
-  drawChart();
-}

@@ -71,7 +71,7 @@ const through = {color: film.colors.ink, transparent: true, depthTest: false};
 const line = {color: film.colors.line, transparent: true};
 const apart = {polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1};  // from the edges upon them
 const batches = {faces: new Batch(["position", "color"])};
-for (const name of ["edges", "vertices", "marks", "arrows", "dots", "picked"]) batches[name] = new Batch(["position"]);
+for (const name of ["edges", "vertices", "marks", "arrows", "dots", "specks", "picked"]) batches[name] = new Batch(["position"]);
 const facets = batches.faces.geometry;
 const drawn = {
   inside: new THREE.Mesh(facets, new THREE.MeshBasicMaterial({vertexColors: true, transparent: true, side: THREE.BackSide, ...apart})),
@@ -81,6 +81,7 @@ const drawn = {
   marks: new THREE.LineSegments(batches.marks.geometry, new THREE.LineBasicMaterial(through)),
   arrows: new THREE.Mesh(batches.arrows.geometry, new THREE.MeshBasicMaterial({...through, side: THREE.DoubleSide})),
   dots: new THREE.Points(batches.dots.geometry, new THREE.PointsMaterial({size: 5, sizeAttenuation: false, ...through})),
+  specks: new THREE.Points(batches.specks.geometry, new THREE.PointsMaterial({size: 3, sizeAttenuation: false, ...through, opacity: 0.5})),
   picked: new THREE.LineSegments(batches.picked.geometry, new THREE.LineBasicMaterial({...line, depthTest: false})),
 };
 const overlaps = new THREE.Group();
@@ -93,7 +94,8 @@ for (const [order, object] of Object.values(drawn).entries()) {
 viewer.set_object(["overlapper", "overlaps"], overlaps);
 
 const looks = structuredClone(film.looks);
-let triangles = [];  // the first triangle of each sighting of the frame
+let triangles = [], sighted = [];  // what is drawn in the frame, and the first triangle of each
+const PROMINENT = 12;  // the largest, which are marked: marks of hundreds would say nothing
 
 // About the point that the camera turns around, where float32 is as fine as one can come near.
 function drawOverlaps(frame) {
@@ -101,15 +103,17 @@ function drawOverlaps(frame) {
   overlaps.position.copy(origin);
   const middle = new THREE.Vector3(...center).sub(origin);
   for (const batch of Object.values(batches)) batch.length = 0;
-  triangles = [];
-  for (let s = film.sighting_start[frame]; s < film.sighting_start[frame + 1]; s++) {
+  [triangles, sighted] = [[], sightings(frame)];
+  const marked = new Set(largestFirst(sighted).slice(0, PROMINENT));
+  for (const s of sighted) {
     triangles.push(batches.faces.length / 3);
-    drawOverlap(s, middle);
+    drawOverlap(s, middle, marked.has(s) || film.sighting_pair[s] === chosen);
   }
   for (const batch of Object.values(batches)) batch.done();
+  byId("dull").hidden = marked.size === sighted.length;
 }
 
-function drawOverlap(sighting, middle) {
+function drawOverlap(sighting, middle, marked) {
   const k = film.sighting_polytope[sighting], total = film.polytope_previous.length, picked = film.sighting_pair[sighting] === chosen;
   const [x, y, z, unit] = Array.from({length: 4}, (_, part) => film.polytope_frame[part * total + k]);
   const scale = unit / 32767, points = [];
@@ -120,7 +124,7 @@ function drawOverlap(sighting, middle) {
   const ownerOf = new Map();  // of the facet to the left of an edge
   for (let f = firstFacet[k]; f < firstFacet[k + 1]; f++) {
     const ring = film.rings.subarray(firstCorner[f], firstCorner[f + 1]), owner = film.owners[f];
-    const color = shaded(ring, points, owner);
+    const color = shaded(ring, points, owner, marked);
     for (let i = 1; i < ring.length - 1; i++) for (const corner of [ring[0], ring[i], ring[i + 1]]) batches.faces.add(points[corner], color);
     for (let i = 0; i < ring.length; i++) ownerOf.set(ring[i] * 65536 + ring[(i + 1) % ring.length], owner);
   }
@@ -129,19 +133,20 @@ function drawOverlap(sighting, middle) {
     if (from > to) continue;
     const ends = [points[from], points[to]];
     if (looks.overlaps.edges) ends.forEach(point => batches.edges.add(point));
-    if (ownerOf.get(to * 65536 + from) !== owner) ends.forEach(point => batches.marks.add(point));
+    if (marked && ownerOf.get(to * 65536 + from) !== owner) ends.forEach(point => batches.marks.add(point));
     if (picked) ends.forEach(point => batches.picked.add(point));
   }
   if (looks.overlaps.vertices) points.forEach(point => batches.vertices.add(point));
   const {centroid, normal, area} = measured(sighting);
   const at = centroid.map((part, i) => part - center[i] + middle.getComponent(i));
-  if (unit < 0.0075 * sceneSize) batches.dots.add(at);
-  if (normal.some(Boolean)) drawArrow(at, normal, Math.min(Math.max(Math.sqrt(area) / 3, 0.03 * sceneSize), 0.06 * sceneSize));
+  if (unit < 0.0075 * sceneSize) (marked ? batches.dots : batches.specks).add(at);
+  if (marked && normal.some(Boolean)) drawArrow(at, normal, Math.min(Math.max(Math.sqrt(area) / 3, 0.03 * sceneSize), 0.06 * sceneSize));
 }
 
 // Flat and matt facets look the same from everywhere: mostly of their own light, so that an owner is known in shade, too.
 const skins = new Map();
-function shaded(ring, points, owner) {
+const DULL = [0.23, 0.26, 0.31];
+function shaded(ring, points, owner, marked) {
   let nx = 0, ny = 0, nz = 0;
   for (let i = 0; i < ring.length; i++) {
     const [ax, ay, az] = points[ring[i]], [bx, by, bz] = points[ring[(i + 1) % ring.length]], [ox, oy, oz] = points[ring[0]];
@@ -153,7 +158,7 @@ function shaded(ring, points, owner) {
   const light = 0.4 + 0.7 * (0.45 + 0.55 * Math.max(0, (nx * lx + ny * ly + nz * lz) / length));
   const skin = looks.overlaps.front ?? film.colors.owners[owner];
   if (!skins.has(skin)) skins.set(skin, paint(skin).toArray());
-  return skins.get(skin).map(part => Math.min(1, part * light));
+  return skins.get(skin).map((part, k) => Math.min(1, (marked ? part : 0.4 * part + 0.6 * DULL[k]) * light));
 }
 
 const turns = Array.from({length: 8}, (_, i) => [Math.cos(i * Math.PI / 4), Math.sin(i * Math.PI / 4)]);

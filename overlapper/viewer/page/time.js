@@ -11,17 +11,19 @@ function show(frame) {
   shown = frame;
   poseBodies(frame);
   drawOverlaps(frame);
-  showTable(frame);
+  showList(frame);
   showNumbers(frame);
   drawChart();
   slider.value = times[frame];
-  output.textContent = times[frame].toFixed(3) + " s";
+  output.textContent = names ? names[frame] : times[frame].toFixed(3) + " s";
+  slider.setAttribute("aria-valuetext", output.textContent);
   viewer.set_dirty();
 }
 
 function run(wanted) {
-  playing = wanted;
+  playing = wanted && !names && last > 0;
   play.textContent = playing ? "❚❚" : "▶";
+  play.ariaLabel = playing ? "pause" : "play";
 }
 
 function pauseAt(frame) {
@@ -42,50 +44,75 @@ function tick(now) {
 
 slider.max = times[last];
 slider.oninput = () => pauseAt(frameAt(+slider.value));
-play.onclick = () => {
-  play.blur();  // or the space bar would press it once more
-  run(!playing);
-};
-speed.onchange = () => speed.blur();
+play.onclick = () => run(!playing);
+play.hidden = speed.hidden = names !== null || last === 0;
+
 const keys = {
-  " ": () => run(!playing),
-  Escape: () => {
+  " ": ["play or pause", () => run(!playing)],
+  ArrowLeft: ["one frame back", () => pauseAt(Math.max(shown - 1, 0)), "←"],
+  ArrowRight: ["one frame on", () => pauseAt(Math.min(shown + 1, last)), "→"],
+  Home: ["to the first frame", () => pauseAt(0)],
+  End: ["to the last frame", () => pauseAt(last)],
+  n: ["come near the largest overlap, then the next one", () => chooseNext(1)],
+  p: ["the one before", () => chooseNext(-1)],
+  w: ["the whole scene, and back", byId("whole").onclick],
+  Escape: ["back to what moves and what overlaps, nothing chosen", () => {
     choose(-1);
     lookAt("opening");
-  },
-  w: () => lookAt("whole"),
-  ArrowLeft: () => pauseAt(Math.max(shown - 1, 0)),
-  ArrowRight: () => pauseAt(Math.min(shown + 1, last)),
-  r: () => {
-    for (const kind of ["bodies", "overlaps"]) Object.assign(looks[kind], film.looks[kind]);
+  }],
+  o: ["panel of overlaps", () => showPanel("overlaps")],
+  b: ["panel of bodies", () => showPanel("bodies")],
+  l: ["panel of looks", () => showPanel("look")],
+  d: ["chart of volumes or depths", () => chartOf({by: kind.by === "volume" ? "depth" : "volume"})],
+  t: ["chart of pairs or of all together", () => chartOf({total: !kind.total})],
+  g: ["chart linear or logarithmic", () => chartOf({logarithmic: !kind.logarithmic})],
+  c: ["copy the link to this moment, seen from here", copyLink],
+  r: ["looks as they were", () => {
+    for (const kind of kinds) Object.assign(looks[kind], film.looks[kind]);
     renew();
-  },
+  }],
+  "?": ["these keys", byId("help").onclick],
 };
 for (const name of ["faces", "edges", "vertices", "marks"]) {
   for (const [key, kind] of [[name[0], "overlaps"], [name[0].toUpperCase(), "bodies"]]) {
-    keys[key] = () => {
+    if (name === "marks" && kind === "bodies") continue;
+    keys[key] = [`${name} of ${kind}`, () => {
       looks[kind][name] = !looks[kind][name];
       renew();
-    };
+    }];
   }
 }
+for (const [key, [what, , sign]] of Object.entries(keys)) {
+  const row = document.querySelector("#keys table").insertRow();
+  row.insertCell().append(element("kbd", {textContent: sign ?? (key === " " ? "space" : key === "Escape" ? "esc" : key)}));
+  row.insertCell().textContent = what;
+}
 document.onkeydown = event => {
-  if (event.ctrlKey || event.metaKey || event.altKey || !keys[event.key]) return;
-  // The panel's own controls keep what the keyboard does with them.
-  if (event.target.closest?.("#look") && (event.key === " " || event.key.startsWith("Arrow"))) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || byId("keys").open || !Object.hasOwn(keys, event.key)) return;
+  // Controls keep what the keyboard does with them.
+  const target = event.target.closest?.("input, select, button, summary");
+  if (target?.matches("select, input[type=number]") && event.key !== "Escape") return;
+  if (target && target !== slider && (event.key === " " || target.type === "range" && /^(Arrow|Home|End)/.test(event.key))) return;
   event.preventDefault();
-  keys[event.key]();
+  keys[event.key][1]();
 };
+// What was clicked with a mouse would else be pressed once more by the space bar.
+document.addEventListener("click", event => {
+  if (event.detail) document.activeElement?.closest("button, summary, input[type=checkbox]")?.blur();
+});
 
 // What the address asks for; also of a page that is open already.
 function follow() {
   const wanted = new URLSearchParams(location.hash.slice(1));
+  const by = wanted.has("depth") ? "depth" : "volume";
+  leaveOut(by, +wanted.get(by));
   if (wanted.has("from")) look(...["from", "at"].map(name => onPage(wanted.get(name).split(",").map(Number))));
   else lookAt("opening");
   pauseAt(wanted.has("t") ? frameAt(+wanted.get("t")) : film.moment);
   choose(pairs.findIndex(pair => pair.join(",") === wanted.get("pair")));
 }
 
+chartOf({});
 renew();
 follow();
 window.onhashchange = follow;
