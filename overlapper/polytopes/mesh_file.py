@@ -9,7 +9,7 @@ import warnings
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from graphlib import TopologicalSorter
+from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -252,7 +252,11 @@ def _shown_by_3mf(packed: zipfile.ZipFile) -> int:
             elif kind == "item":
                 items.append(named["objectid"])
     shown: dict[str, int] = {}
-    for id in TopologicalSorter(made_of).static_order():
+    try:
+        order = list(TopologicalSorter(made_of).static_order())
+    except CycleError as error:
+        raise ValueError("an object in it is made of itself") from error
+    for id in order:
         shown[id] = own.get(id, 1) + sum(shown[each] for each in made_of.get(id, ()))
     return sum(shown.get(id, 1) for id in items)
 

@@ -302,10 +302,13 @@ def _with_surface(body: Body) -> Body:
 
 
 def _of_parts(body: Body, parts: Sequence[Hull], way: Way) -> Body:
+    """With these parts where they stand; as it was, if none of them has a volume there."""
     placed: list[Hull] = []
     for part in parts:
         with suppress(ValueError):  # which the transform has made flat
             placed.append(Hull(body.part.placed(part.vertices)))
+    if not placed:
+        return body
     volume = union_volume([Placed(part) for part in placed])[0]
     return replace(body, parts=tuple(placed), way=way, parts_volume=volume)
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import bearing
@@ -16,6 +17,8 @@ from pages import Film, drawings, enclosed, meshes, numbers
 from step_text import step_text
 
 from overlapper import Hull, write_mesh
+from overlapper.polytopes import mesh_overlap
+from overlapper.scenes import clashes as scene
 from overlapper.scenes.table_file import read_metadata, read_table
 
 CUBE = np.array(np.meshgrid([0, 10], [0, 10], [0, 10.0])).reshape(3, 8).T
@@ -276,6 +279,24 @@ def test_a_mesh_that_turns_both_ways_is_measured_by_its_parts(tmp_path, coacd_is
     assert (code, pair["volume_of"], pair["volume_m3"]) == (1, "parts", pytest.approx(2.5 * 5 * 5 * 1e-9))
 
 
+def test_meshes_of_too_many_triangles_are_measured_by_their_parts(monkeypatch):
+    monkeypatch.setattr(mesh_overlap, "MOST", 3)
+    bodies, failures = scene.read([Path("bent.obj"), Path("in_arm.stl")], "mm")
+    (pair,) = scene.clashes(bodies).pairs
+    assert (failures, pair.of_meshes, pair.status) == ([], False, "clash")
+    assert pair.volume == pytest.approx(2.5 * 5 * 5 * 1e-9, rel=0.01)
+
+
+def test_parts_that_a_transform_makes_flat_are_none():
+    ((_, part),), _ = scene.read([Path("one.stl")], "mm")
+    hull = Hull(part.placed(part.triangles.reshape(-1, 3)))
+    body = scene.Body("one.stl", part, None, (hull,), "hull", hull.volume, None)
+    in_file = Hull(part.triangles.reshape(-1, 3))
+    assert scene._of_parts(body, [in_file], "convex").parts_volume == pytest.approx(1e-6)
+    flat = replace(body, part=replace(part, transform=np.diag([1e-3, 1e-3, 0, 1])))
+    assert scene._of_parts(flat, [in_file], "convex") is flat
+
+
 def test_a_body_without_a_volume_is_named(tmp_path):
     (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     done = clashes("flat.obj", "one.stl", "two.obj")
@@ -341,6 +362,20 @@ def test_step_is_read_in_its_own_units(tmp_path):
     done = clashes("bad.stp", "one.stl", "two.obj")
     assert done.returncode == 2
     assert done.stderr == "overlapper: bad.stp is not a mesh that can be read: OpenCASCADE finds no shape in it\n"
+
+
+def test_a_step_file_that_crashes_its_reader_is_named_and_the_others_measured(tmp_path, monkeypatch):
+    (tmp_path / "fake").mkdir()
+    (tmp_path / "fake" / "cascadio.py").write_text("import os\ndef step_to_glb(*a, **k): os.abort()\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "fake"))
+    (tmp_path / "bad.step").write_text("ISO-10303-21;\n")
+    done = clashes("bad.step", "one.stl", "two.obj")
+    reason = "the process that read it ended with signal SIGABRT"
+    assert (done.returncode, done.stderr) == (
+        2,
+        f"overlapper: bad.step is not a mesh that can be read: {reason}\n",
+    )
+    assert "Of 1 pair of 2 bodies, 1 clashes." in done.stdout
 
 
 def test_what_a_format_needs_is_told_by_name(tmp_path, monkeypatch):
