@@ -88,7 +88,7 @@ def clashes(
             if out:
                 must_be_a_table(out)
             if html:
-                import overlapper.viewer  # noqa: F401  # which says now what to install
+                import overlapper.viewer.recording  # noqa: F401  # which says now what to install
             for path in filter(None, (out, html)):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 must_be_writable(path)

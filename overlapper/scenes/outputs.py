@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from overlapper import Overlaps
 from overlapper.scenes.summary import Summary
 from overlapper.scenes.table import Bodies, link_rows, rows
 from overlapper.scenes.table_file import TABLES, must_be_a_table, origin
@@ -110,6 +111,7 @@ def recorder(
 ) -> Iterator[Callable[[Frame[Any]], None]]:
     """Records some of the frames it is called with, and writes the page in the end.
 
+    Besides `rate` frames per second these are the first in which a pair overlaps, so that none is missing.
     After an error, what was recorded until then is beside the page, and named in `written`, as the page is else.
     Nothing is written of no frame.
     """
@@ -118,12 +120,17 @@ def recorder(
     must_be_writable(path)
     recording = Recording(*looks)
     shown = 0
+    met: set[tuple[int, ...]] = set()
 
     def record(frame: Frame[Any]) -> None:
         nonlocal shown
-        if frame.time * rate >= shown:
-            recording.add(frame.bodies, frame.contacts, frame.time)
-            shown += 1
+        found = frame.contacts
+        overlapping = set(map(tuple, found.keys[found.overlaps.status == Overlaps.OVERLAPPING].tolist()))
+        due = frame.time * rate >= shown
+        if due or not overlapping <= met:
+            recording.add(frame.bodies, found, frame.time)
+            met.update(overlapping)
+            shown += due
 
     try:
         yield record

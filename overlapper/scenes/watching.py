@@ -291,7 +291,7 @@ def can_be_written(out: Path | None, html: Path | None) -> None:
     if html:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # of meshcat's imports, and no business of the user's
-            import overlapper.viewer  # noqa: F401
+            import overlapper.viewer.recording  # noqa: F401
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import Film
 from PIL import Image
 
 from overlapper import Box, HalfSpace, Placed, RoundedHull, Sphere, overlap
@@ -233,3 +234,12 @@ def test_a_ball_in_the_ground_is_pictured_with_the_plane_around_it(tmp_path):
 def test_a_playback_without_views_has_nothing_to_see():
     with pytest.raises(ValueError, match=r"^there is nothing to see: no step was simulated or recorded$"):
         largest(iter(()))
+
+
+def test_the_first_step_in_which_a_pair_overlaps_is_on_the_page_at_any_rate(scene_file, tmp_path):
+    late = scene_file.read_text().replace("abs(i - 6)", "(0 if i == 10 else 9)")
+    (tmp_path / "late.py").write_text(late)
+    overlapper("view", "late.py", "--html", "late.html")
+    found = Film.of(tmp_path / "late.html")
+    assert [round(240 * time) for time in found.heading["times"]] == [0, 7, 10]  # steps 1, 8 and 11
+    assert len(found.heading["pairs"]) == 1
