@@ -98,7 +98,7 @@ def test_a_few_overlaps_are_not_folded(browser, tmp_path):
     page = recorded([Scene({0: Placed(HalfSpace([0, 0, 1], 0))} | robot)], tmp_path / "few.html")
     panel(opened(browser, page, "#t=0"), "overlaps")
     assert len(rows(browser)) == 4
-    assert browser.ask("document.querySelector('#play').hidden")  # there is one moment
+    assert browser.ask("document.querySelector('#time').hidden")  # there is one moment, and nothing over time
 
 
 def test_a_filter_leaves_out_small_and_shallow_overlaps_everywhere(browser, piled):
@@ -112,7 +112,7 @@ def test_a_filter_leaves_out_small_and_shallow_overlaps_everywhere(browser, pile
     seen = browser.picture()
     assert 0 < coloured(seen, "pink") < 0.7 * coloured(whole, "pink")
     browser.press("t")
-    assert "in total, dm³, over time: up to 2.48" in browser.ask("document.querySelector('#chart').ariaLabel")
+    browser.wait("document.querySelector('#chart').ariaLabel === 'volume in total, dm³, over time: up to 2.48'")
     browser.press("t")
     put(browser, "document.querySelector('#by')", "depth")
     put(browser, "document.querySelector('#least')", "19")
@@ -121,7 +121,7 @@ def test_a_filter_leaves_out_small_and_shallow_overlaps_everywhere(browser, pile
     assert browser.ask("location.hash").endswith("&depth=0.019")
     put(browser, "document.querySelector('#least')", "")
     assert text(browser, "#list th") == "19 overlaps"
-    assert browser.ask("document.querySelector('#chart').ariaLabel") == before
+    browser.wait(f"document.querySelector('#chart').ariaLabel === {json.dumps(before)}")
     # A letter that is typed there is none of the page's keys.
     browser.ask("document.querySelector('#least').focus()")
     browser.press("w")
@@ -149,16 +149,21 @@ def test_the_largest_of_many_are_marked_and_labelled(browser, piled, tmp_path):
 
 def test_more_rows_than_can_be_read_are_counted(browser, tmp_path):
     balls = {1 + k: Placed(Sphere(0.1), (0.3 * (k % 15), 0.3 * (k // 15), 0.05)) for k in range(205)}
-    page = recorded([Scene({0: Placed(HalfSpace([0, 0, 1], 0))} | balls)], tmp_path / "many.html")
+    page = recorded([Scene({0: Placed(HalfSpace([0, 0, 1], 0))} | balls)] * 2, tmp_path / "many.html")
     panel(opened(browser, page, "#t=0"), "overlaps")
     assert len(rows(browser)) == 200
     assert text(browser, "#more") == "and 5 more rows: the filter leaves the larger ones"
+    chart = "document.querySelector('#chart').ariaLabel"
+    assert ", the 200 largest of 205 pairs, over time" in browser.ask(chart)
+    browser.press("t")
+    browser.wait(f"!{chart}.includes('205')")
 
 
 def test_the_chart_has_axes_with_units_for_volume_and_depth_of_pairs_and_of_all(browser, piled):
     opened(browser, piled, "#t=0")
 
     def chart():
+        browser.picture()  # before which it is drawn
         return browser.ask("document.querySelector('#chart').ariaLabel"), browser.ask(
             "document.querySelector('#chart').scaleText"
         )
@@ -303,11 +308,14 @@ def test_what_is_pink_is_told_and_colours_of_their_own_have_no_legend(browser, r
     said = text(browser, "#legend")
     for word in ("pink line", "pink arrow", "pink dot", "surface of the first", "surface of the second"):
         assert word in said
+    assert "what two bodies share" not in said
     recording = Recording(overlaps=Look(front="#ff0000"))
     recording.add(hand_at(0.12), hand_at(0.12).contacts(), 0.0)
     opened(browser, recording.save(tmp_path / "red.html"), "#t=0")
     browser.ask("document.querySelector('#legend').open = true")
-    assert "surface of" not in text(browser, "#legend") and "pink line" in text(browser, "#legend")
+    said = text(browser, "#legend")
+    assert "surface of" not in said and "pink line" in said and "what two bodies share" in said
+    assert browser.ask("getComputedStyle(document.querySelector('#shared rect')).fill") == "rgb(255, 0, 0)"
 
 
 def test_frames_with_names_are_shown_by_them(browser, tmp_path):

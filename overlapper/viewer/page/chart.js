@@ -1,8 +1,9 @@
 // What is shared over time: of each pair or of all, as volume or as depth, linear or logarithmic.
 
 const LEFT = 60, RIGHT = 12, TOP = 20, BOTTOM = 20;  // px; the slider's ends are at the same places
+const CURVES = 200;  // the largest; among more, none would be told from another
 const kind = {by: "volume", total: false, logarithmic: false};
-let curves = [], largest = 0, smallest = 0, unit = [];  // [frame, value], ... of each pair, or one of all
+let curves = [], drawnCurves = [], largest = 0, smallest = 0, unit = [];  // [frame, value], ... of each pair, or one of all
 const background = document.createElement("canvas");
 
 function traceAll() {
@@ -21,8 +22,16 @@ function traceAll() {
   // As small as is of interest: nobody looks for a millionth of the largest.
   smallest = 10 ** Math.floor(Math.log10(Math.max(values.reduce((a, b) => Math.min(a, b), largest), largest * 1e-6)));
   unit = kind.by === "volume" ? inUnit(largest, units, 3).slice(1) : ["mm", 1e-3];
-  for (const curve of curves) curve.next = new Set(curve.map(([frame]) => frame));
-  sizeChart();
+  for (const curve of curves) curve.peak = curve.reduce((peak, [, value]) => Math.max(peak, value), 0);
+  drawnCurves = curves.filter(curve => curve.length).sort((a, b) => b.peak - a.peak);
+  awaitChart();
+}
+
+// Once before the next picture, however much has changed.
+let awaited = false;
+function awaitChart() {
+  if (!awaited) requestAnimationFrame(sizeChart);
+  awaited = true;
 }
 
 function heightOf(value) {
@@ -31,24 +40,24 @@ function heightOf(value) {
   return Math.max(0, Math.log(value / smallest) / (Math.log(largest / smallest) || 1));
 }
 
+const inner = {wide: 0, high: 0};  // of the axes, px
 function across(frame) {
-  return (LEFT + (chart.clientWidth - LEFT - RIGHT) * (times[last] ? times[frame] / times[last] : 0)) * devicePixelRatio;
+  return (LEFT + inner.wide * (times[last] ? times[frame] / times[last] : 0)) * devicePixelRatio;
 }
 
 function up(value) {
-  return (TOP + (chart.clientHeight - TOP - BOTTOM) * (1 - heightOf(value))) * devicePixelRatio;
+  return (TOP + inner.high * (1 - heightOf(value))) * devicePixelRatio;
 }
 
 // A curve falls to the ground where its pair is apart.
 function trace(context, curve) {
   context.beginPath();
   let before = -2;
-  for (const [frame, value] of curve) {
+  for (const [k, [frame, value]] of curve.entries()) {
     if (frame !== before + 1) context.moveTo(across(Math.max(frame - 1, 0)), up(frame ? 0 : value));
     context.lineTo(across(frame), up(value));
-    if (last === 0) context.lineTo(chart.width - RIGHT * devicePixelRatio, up(value));
     before = frame;
-    if (frame < last && !curve.next.has(frame + 1)) context.lineTo(across(frame + 1), up(0));
+    if (frame < last && curve[k + 1]?.[0] !== frame + 1) context.lineTo(across(frame + 1), up(0));
   }
   context.stroke();
 }
@@ -62,15 +71,18 @@ function ticks(end, wanted) {
 }
 
 function valueTicks() {
-  if (!kind.logarithmic) return ticks(largest / unit[1], chart.clientHeight / 34).map(each => each * unit[1]);
+  if (!kind.logarithmic) return ticks(largest / unit[1], Math.max(chart.clientHeight / 34, 3)).map(each => each * unit[1]);
   const decades = Math.round(Math.log10(largest / smallest) - 0.5), every = Math.ceil((decades + 1) / (chart.clientHeight / 24));
   return largest ? Array.from({length: Math.floor(decades / every) + 1}, (_, k) => smallest * 10 ** (k * every)) : [];
 }
 
 function sizeChart() {
+  awaited = false;
+  if (!chart.clientWidth) return;
+  [inner.wide, inner.high] = [chart.clientWidth - LEFT - RIGHT, chart.clientHeight - TOP - BOTTOM];
   const ratio = devicePixelRatio;
   for (const canvas of [chart, background]) [canvas.width, canvas.height] = [chart.clientWidth * ratio, chart.clientHeight * ratio];
-  const context = background.getContext("2d");
+  const context = background.getContext("2d", {willReadFrequently: true});  // thousands of lines are faster so
   context.font = `${11 * ratio}px system-ui, sans-serif`;
   context.lineWidth = ratio;
   context.fillStyle = "#a7b0bd";
@@ -105,17 +117,19 @@ function sizeChart() {
   }
   context.textAlign = "right";
   if (!names) context.fillText("time, s", right, chart.height - 4 * ratio);
-  const title = `${kind.by}${kind.total ? kind.by === "volume" ? " in total" : ", the deepest" : ""}, ${unit[0]}`;
+  const title = `${kind.by}${kind.total ? kind.by === "volume" ? " in total" : ", the deepest" : ""}, ${unit[0]}`
+    + (drawnCurves.length > CURVES ? `, the ${CURVES} largest of ${drawnCurves.length.toLocaleString("en")} pairs` : "");
   context.textAlign = "left";
   context.fillText(largest ? title : "nothing is shared", left, 12 * ratio);
   chart.ariaLabel = largest ? `${title}, over time: up to ${plain(largest / unit[1], 3)}` : "nothing is shared";
   chart.scaleText = levels.map(value => plain(value / unit[1], 3));
-  context.strokeStyle = kind.total ? "#e8ebf0" : `#a7b0bd${curves.length > 100 ? "40" : curves.length > 20 ? "80" : "d0"}`;
-  for (const curve of curves) trace(context, curve);
+  context.strokeStyle = kind.total ? "#e8ebf0" : `#a7b0bd${drawnCurves.length > 100 ? "40" : drawnCurves.length > 20 ? "80" : "d0"}`;
+  for (const curve of drawnCurves.slice(0, CURVES)) trace(context, curve);
   drawChart();
 }
 
 function drawChart() {
+  if (!chart.clientWidth) return;
   const context = chart.getContext("2d"), ratio = devicePixelRatio;
   context.clearRect(0, 0, chart.width, chart.height);
   context.drawImage(background, 0, 0);
@@ -159,7 +173,7 @@ chart.onpointerdown = event => {
   if (pair >= 0) choose(pair);
   pauseAt(frameAt(timeAt(event.offsetX)));
 };
-new ResizeObserver(sizeChart).observe(chart);
+new ResizeObserver(awaitChart).observe(chart);
 
 // Pairs of buttons, of which one is pressed.
 function chartOf(change) {

@@ -10,11 +10,11 @@ function isOpen(key) {
   return opened.get(key) ?? most <= FEW;
 }
 
-// Lists of sightings by key, those with most volume in sum first.
-function grouped(some, keyOf) {
+// Lists of sightings by the keys of their pairs, those with most volume in sum first.
+function grouped(some, keys) {
   const groups = new Map();
   for (const sighting of some) {
-    const key = keyOf(film.sighting_pair[sighting]);
+    const key = keys[film.sighting_pair[sighting]];
     if (!groups.has(key)) groups.set(key, {key, sightings: [], volume: 0, depth: 0});
     const group = groups.get(key);
     group.sightings.push(sighting);
@@ -30,6 +30,7 @@ function within(name, whole) {
   return /^\d+$/.test(rest) ? `part ${rest}` : rest;
 }
 
+const linkKeys = links.map(pair => JSON.stringify(pair)), bodyKeys = links.map(pair => JSON.stringify(pair.map(([body]) => body)));
 function rowsOf(some) {
   const wanted = [];
   const leaf = (sighting, level, wholes, own = wholes) => {
@@ -37,8 +38,7 @@ function rowsOf(some) {
     const called = wholes ? pairs[pair].map((name, k) => name === wholes[k] ? own[k] : within(name, wholes[k])) : pairs[pair];
     wanted.push({level, pair, sighting, called, full: pairs[pair], volume: measure(sighting, "volume"), depth: measure(sighting, "depth")});
   };
-  const linkKey = pair => JSON.stringify(links[pair]), bodyKey = pair => JSON.stringify(links[pair].map(([body]) => body));
-  for (const bodies of grouped(some, bodyKey)) {
+  for (const bodies of grouped(some, bodyKeys)) {
     if (bodies.sightings.length === 1) {
       leaf(bodies.sightings[0], 0);
       continue;
@@ -46,7 +46,7 @@ function rowsOf(some) {
     const called = JSON.parse(bodies.key);
     wanted.push({level: 0, group: bodies, called, full: called, ...bodies});
     if (!isOpen(bodies.key)) continue;
-    const byLink = grouped(bodies.sightings, linkKey);
+    const byLink = grouped(bodies.sightings, linkKeys);
     for (const inner of byLink) {
       const names = JSON.parse(inner.key).map(([body, link]) => link ? `${body}.${link}` : body);
       if (inner.sightings.length === 1) {

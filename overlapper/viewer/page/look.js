@@ -46,6 +46,8 @@ function applyLooks() {
   drawn.inside.material.vertexColors = own;
   drawn.inside.material.color.set(own ? 0x808080 : look.back);
   for (const each of document.querySelectorAll("#legend .own")) each.hidden = look.front !== null;
+  byId("shared").hidden = look.front === null;
+  byId("shared").querySelector("rect").style.fill = look.front ?? "";
   if (shown >= 0) drawOverlaps(shown);
   viewer.set_dirty();
 }

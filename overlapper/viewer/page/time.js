@@ -45,7 +45,8 @@ function tick(now) {
 slider.max = times[last];
 slider.oninput = () => pauseAt(frameAt(+slider.value));
 play.onclick = () => run(!playing);
-play.hidden = speed.hidden = names !== null || last === 0;
+play.hidden = speed.hidden = names !== null;
+byId("time").hidden = last === 0;  // there is one moment, and nothing over time
 
 const keys = {
   " ": ["play or pause", () => run(!playing)],
