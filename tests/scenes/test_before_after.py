@@ -11,6 +11,7 @@ import urllib.request
 from pathlib import Path
 
 import pytest
+from browser import Browser
 from tornado.websocket import websocket_connect
 
 from overlapper import scenes
@@ -121,6 +122,21 @@ def test_one_pane_shows_what_was_recorded_and_the_other_what_is_today(verdict, t
     # 20 cm by 20 cm by 5 cm, and by 3 cm. The moments have names, as they are none of one run.
     assert [re.search(r"\S+ dm³", pane)[0] for pane in panes] == ["2 dm³", "1.2 dm³"]
     assert [re.search("step 1 .*", pane)[0] for pane in panes] == ["step 1 as recorded", "step 1 today"]
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not to be had here")
+def test_the_panes_are_side_by_side_on_a_desk_and_one_below_the_other_on_a_phone(verdict, tmp_path):
+    page = before_after.save(verdict, "cubes", tmp_path / "page.html")
+    browser = Browser(tmp_path / "profile", (1200, 800))
+    try:
+        browser.open(page.as_uri(), until="document.querySelectorAll('iframe').length === 2")
+        boxes = "[...document.querySelectorAll('iframe')].map(each => each.getBoundingClientRect())"
+        assert browser.ask(f"(([a, b]) => a.top === b.top && a.right <= b.left)({boxes})")
+        browser("Emulation.setDeviceMetricsOverride", width=390, height=844, deviceScaleFactor=1, mobile=True)
+        browser.wait("innerWidth === 390")
+        assert browser.ask(f"(([a, b]) => a.bottom <= b.top && a.left === b.left && a.height > 700)({boxes})")
+    finally:
+        browser.close()
 
 
 async def texts_in_frames(page: Path, profile: Path, until: str) -> list[str]:

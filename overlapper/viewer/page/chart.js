@@ -120,7 +120,7 @@ function sizeChart() {
   const title = `${kind.by}${kind.total ? kind.by === "volume" ? " in total" : ", the deepest" : ""}, ${unit[0]}`
     + (drawnCurves.length > CURVES ? `, the ${CURVES} largest of ${drawnCurves.length.toLocaleString("en")} pairs` : "");
   context.textAlign = "left";
-  context.fillText(largest ? title : "nothing is shared", left, 12 * ratio);
+  context.fillText(largest ? title : "nothing is shared", left + 5 * ratio, 12 * ratio);
   chart.ariaLabel = largest ? `${title}, over time: up to ${plain(largest / unit[1], 3)}` : "nothing is shared";
   chart.scaleText = levels.map(value => plain(value / unit[1], 3));
   context.strokeStyle = kind.total ? "#e8ebf0" : `#a7b0bd${drawnCurves.length > 100 ? "40" : drawnCurves.length > 20 ? "80" : "d0"}`;

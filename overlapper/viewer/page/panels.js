@@ -16,7 +16,7 @@ for (const name of Object.keys(panels)) byId(`show-${name}`).onclick = () => sho
 function follows() {
   for (const name of ["bodies", "look"]) showPanel(name, false);
   showPanel("overlaps", !narrow.matches || innerHeight >= 1000);
-  byId("legend").open = !narrow.matches;
+  byId("legend").open = !narrow.matches && innerHeight >= 700;
 }
 narrow.onchange = follows;
 follows();
