@@ -72,8 +72,8 @@ def triple(u: Exact, v: Exact, w: Exact) -> Exact:
 
 
 def root(square: Fraction) -> tuple[Fraction, Fraction]:
-    """(lower, upper) around the square root, equal where it is short, else apart by 1e-19 of it or less."""
-    shift = 64 - (square.numerator.bit_length() - square.denominator.bit_length()) // 2
+    """(lower, upper) around the square root, equal where it is short, else apart by 1e-38 of it or less."""
+    shift = 128 - (square.numerator.bit_length() - square.denominator.bit_length()) // 2
     scaled = square * (Fraction(4) ** shift)
     floor = math.isqrt(scaled.numerator // scaled.denominator)
     unit = Fraction(2) ** -shift

@@ -162,6 +162,13 @@ def test_no_volume_is_proved_of_an_ellipsoid_and_another_round_body():
             claim.verify()
 
 
+@pytest.mark.parametrize("seed", [2000064, 3000207, 3000557])
+def test_touching_round_bodies_are_proved_to_share_no_more_than_is_stated(seed):
+    found = overlap(*families.make("special_poses", seed).placed)
+    lower, upper = found.certificate().verify()
+    assert found.status == "touching" and lower == 0 and upper <= found.volume_error
+
+
 def test_where_no_digits_tell_how_surfaces_meet_no_volume_is_proved():
     # The ball's pole lies on the cylinder, but for the rounding of its turn.
     found = overlap(*families.make("special_poses", 3000068).placed)
