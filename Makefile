@@ -15,7 +15,7 @@ COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_out_of_memory python/test_stub
 
-.PHONY: help run test record coverage coverage-python coverage-core mutants growth fuzz lint format hooks ci clean
+.PHONY: help run test record coverage coverage-python coverage-core mutants growth fuzz pictures lint format hooks ci clean
 
 help: ## this list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -55,6 +55,9 @@ fuzz: build/sanitized/dev ## give the sanitized core inputs that reach new place
 	@mkdir -p build/fuzz/corpus
 	@build/sanitized/native/fuzz_overlap $(FUZZ) -timeout=20 -max_len=600 -len_control=0 -print_final_stats=1 \
 	  -verbosity=0 -artifact_prefix=build/fuzz/ build/fuzz/corpus overlapper/native/fuzz/corpus
+
+pictures: $(VENV)/dev ## make the pictures of README and docs again, of which something has changed
+	@$(VENV)/bin/python docs/pictures.py
 
 lint: $(VENV)/dev ## check style and types
 	@$(VENV)/bin/ruff check

@@ -8,15 +8,14 @@ import sys
 import tempfile
 from pathlib import Path
 
-from picture import HERE, screenshot
-
-CAMERA = "from=-0.14,-0.36,0.22&at=-0.05,0,0.03"
+from photograph import ROOT, photograph
 
 
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([sys.executable, HERE.parent / "examples" / "chain_links.py"], cwd=folder, check=True)
-        screenshot(f"{Path(folder, 'chain_links.html').as_uri()}#t=0&{CAMERA}", HERE / "concave.png")
+        subprocess.run([sys.executable, ROOT / "examples" / "chain_links.py"], cwd=folder, check=True)
+        link = Path(folder, "chain_links.html").as_uri()
+        photograph(link, ROOT / "docs" / "concave.png")
 
 
 if __name__ == "__main__":

@@ -10,11 +10,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from picture import HERE, screenshot
+from photograph import ROOT, photograph  # which also finds what supports the tests
 
-sys.path.insert(0, str(HERE.parent / "tests" / "support"))
-
-import bearing
+import bearing  # isort: skip
 
 
 def main() -> None:
@@ -27,7 +25,7 @@ def main() -> None:
         print(f"with a clash, CoACD asked: {seconds(parts):.1f} s")
         print(f"once more: {seconds(parts):.1f} s")
         print(f"and a page: {seconds(parts, '--html', page):.1f} s")
-        screenshot(page.as_uri(), HERE / "meshes.png")
+        photograph(page.as_uri(), ROOT / "docs" / "meshes.png")
 
 
 def seconds(*arguments: object) -> float:

@@ -8,7 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from picture import HERE, screenshot
+from photograph import ROOT, photograph
 
 LOOK = "t=1.24&from=0.765,-0.125,0.235&at=0.545,0,0.2&pair=duck.1,panda.panda_rightfinger"
 
@@ -16,9 +16,9 @@ LOOK = "t=1.24&from=0.765,-0.125,0.235&at=0.545,0,0.2&pair=duck.1,panda.panda_ri
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder, "franka_grasp.html")
-        scene = HERE.parent / "scenes" / "franka_grasp.py"
+        scene = ROOT / "scenes" / "franka_grasp.py"
         subprocess.run([sys.executable, "-m", "overlapper", "view", str(scene), "--html", str(page)], check=True)
-        screenshot(f"{page.as_uri()}#{LOOK}", HERE / "view.png")
+        photograph(f"{page.as_uri()}#{LOOK}", ROOT / "docs" / "view.png")
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ EMPTY = {"base", "body", "collision", "cube", "description", "dump", "dumpurdf",
 EMPTY |= {"object", "part", "physics", "robot", "scene", "sdf", "untitled", "urdf", "visual", "world", "xml"}
 IN_FILE_NAMES = EMPTY - {"cube"}  # robots are called so by whoever copied one, files only if they are of one
 # Words that are left out at the end of a name: duck_vhacd is a duck.
-OF_TOOLS = {"coacd", "description", "urdf", "vhacd"}
+OF_TOOLS = {"coacd", "description", "textured", "urdf", "vhacd"}
 
 
 def body_name(own: str, file: str | None, alone: bool, meshes: Sequence[str], kind: str | None) -> str:

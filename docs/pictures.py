@@ -1,0 +1,139 @@
+"""Makes the pictures of README and docs again: those of which something has changed that they are made from.
+
+python docs/pictures.py [--all | --check]
+
+Beside each picture, docs/pictures.csv has a digest of it, and one of all that it was made from.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import hashlib
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[1]
+TABLE = ROOT / "docs" / "pictures.csv"
+PAGE = ("overlapper/viewer/**/*", "docs/photograph.py")  # what a picture of a page is made by
+
+
+class Maker(NamedTuple):
+    """A command, the pictures in docs/ that it makes, and what they are made from, beside the script itself."""
+
+    command: str
+    pictures: tuple[str, ...]
+    sources: tuple[str, ...] = ()
+
+
+def of_results(script: str, results: str, *pictures: str, sources: tuple[str, ...] = ()) -> Maker:
+    """Drawn from what was measured; what measures it is no source of the picture."""
+    return Maker(f"benchmarks/{script} --page", pictures, (f"benchmarks/results/{results}", *sources))
+
+
+MAKERS = (
+    Maker("docs/picture.py", ("picture.webp",), (*PAGE, "scenes/franka_grasp.py")),
+    Maker("docs/view.py", ("view.png",), (*PAGE, "scenes/franka_grasp.py")),
+    Maker("docs/concave.py", ("concave.png",), (*PAGE, "examples/chain_links.py")),
+    Maker("docs/regression.py", ("regression.png",), (*PAGE, "examples/ci/**/*")),
+    Maker("docs/meshes.py", ("meshes.png",), PAGE),
+    Maker("docs/extraction.py", ("extraction.png",), ("overlapper/viewer/outline.py",)),
+    Maker("docs/how.py", ("how.png", "how_frame.png", "how_slices.png", "how_ways.png")),
+    Maker("docs/polytopes.py", ("polytopes.png",), ("overlapper/viewer/picture.py",)),
+    Maker("docs/results.py", ("results.png",), ("scenes/franka_grasp.py",)),
+    of_results("round_bodies.py", "*/round.csv", "round.png"),
+    of_results("scene_steps.py", "*/steps.csv", "steps.png"),
+    of_results(
+        "chart.py",
+        "*/[cs][lp]*.csv",
+        *("speed.png", "speed_sizes.png", "speed_claims.png", "speed_families.png"),
+        sources=("benchmarks/speed/speed_figures.py",),
+    ),
+    of_results(
+        "stability.py",
+        "stability.csv",
+        *("stability.png", "stability_degeneracy.png", "stability_distances.png"),
+        *("stability_distances_degeneracy.png", "stability_planes.png", "stability_shifts.png"),
+        sources=("benchmarks/stability_page.py", "benchmarks/paper/paper_pictures.py"),
+    ),
+)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--all", action="store_true", help="also those of which nothing has changed")
+    which.add_argument("--check", action="store_true", help="make none; say which are not as they would be made")
+    asked = parser.parse_args()
+    if asked.check:
+        complaints = list(check())
+        print("\n".join(complaints) or "All pictures are as they would be made.")
+        sys.exit(bool(complaints))
+    known = read()
+    for maker in MAKERS:
+        if asked.all or any(known.get(each) != digests(maker, each) for each in maker.pictures):
+            print(f"python {maker.command}", flush=True)
+            subprocess.run([sys.executable, *maker.command.split()], cwd=ROOT, check=True)
+            known |= {each: digests(maker, each) for each in maker.pictures}
+            write(known)
+
+
+def check() -> Iterator[str]:
+    """What is to be said of pictures that are not as they would be made."""
+    known = read()
+    for maker in MAKERS:
+        for picture in maker.pictures:
+            made, sources = digests(maker, picture)
+            if picture not in known:
+                yield f"docs/{picture} was never made: make pictures"
+            elif known[picture][1] != sources:
+                yield f"docs/{picture} is older than what it is made from: make pictures"
+            elif known[picture][0] != made:
+                yield f"docs/{picture} is not what {maker.command} made: make pictures"
+
+
+def digests(maker: Maker, picture: str) -> tuple[str, str]:
+    """Of the picture, empty if there is none, and of what it is made from."""
+    path = ROOT / "docs" / picture
+    made = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+    return made, _digest(sorted(_sources(maker)))
+
+
+def _sources(maker: Maker) -> Iterator[Path]:
+    for pattern in (maker.command.split()[0], *maker.sources):
+        found = [path for path in ROOT.glob(pattern) if path.is_file() and "__pycache__" not in path.parts]
+        if not found:
+            raise FileNotFoundError(f"{maker.command} is said to be made from {pattern}, which is not there")
+        yield from found
+
+
+def _digest(paths: list[Path]) -> str:
+    """Of names and texts; line ends are those of the repository whatever the checkout has."""
+    digest = hashlib.sha256()
+    for path in paths:
+        text = path.read_bytes().replace(b"\r\n", b"\n")
+        digest.update(f"{path.relative_to(ROOT).as_posix()} {len(text)}\n".encode())
+        digest.update(text)
+    return digest.hexdigest()
+
+
+def read() -> dict[str, tuple[str, str]]:
+    """By picture: its digest, and that of what it was made from."""
+    if not TABLE.is_file():
+        return {}
+    with TABLE.open(encoding="utf-8", newline="") as file:
+        return {row["picture"]: (row["sha256"], row["made_from"]) for row in csv.DictReader(file)}
+
+
+def write(known: dict[str, tuple[str, str]]) -> None:
+    current = [picture for maker in MAKERS for picture in maker.pictures if picture in known]
+    with TABLE.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerows([("picture", "sha256", "made_from"), *((each, *known[each]) for each in current)])
+
+
+if __name__ == "__main__":
+    main()
