@@ -15,7 +15,7 @@ COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_out_of_memory python/test_stub
 
-.PHONY: help run test record coverage coverage-python coverage-core mutants growth fuzz pictures lint format hooks ci clean
+.PHONY: help run test record docs coverage coverage-python coverage-core mutants growth fuzz pictures lint format hooks ci clean
 
 help: ## this list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -28,6 +28,10 @@ test: $(VENV)/dev ## build, pass all tests
 
 record: $(VENV)/dev ## write anew what is expected of the scenes and recorded of the core's answers
 	@$(PYTEST) --numprocesses=auto --overlapper-record scenes tests/native/test_recorded_answers.py
+
+docs: $(VENV)/dev ## write the site of the documentation to build/docs
+	@$(VENV)/bin/python -m sphinx --fresh-env --fail-on-warning --quiet docs build/docs
+	@echo "The site begins at build/docs/index.html"
 
 coverage: coverage-python coverage-core ## report what the tests reach of Python and of the core
 
