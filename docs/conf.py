@@ -3,6 +3,7 @@
 import inspect
 import os
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -21,7 +22,6 @@ html_theme = "furo"
 html_title = f"overlapper {release}"
 html_copy_source = False
 html_show_sourcelink = False
-html_extra_path = sorted(str(path) for ending in ("html", "svg") for path in DOCS.glob(f"*.{ending}"))
 myst_heading_anchors = 4
 autodoc_default_options = {"members": True, "undoc-members": True, "member-order": "bysource"}
 autodoc_typehints = "signature"
@@ -32,6 +32,9 @@ toc_object_entries_show_parents = "hide"
 # Where files that are no page are to be read, as https://host/owner/name/blob/commit. A site that is built at home
 # links to the files beside it.
 repository = os.environ.get("OVERLAPPER_REPOSITORY", "")
+
+# Files for a browser come along, in a folder of their own: docs/speed.html is not what is made of docs/speed.md.
+SHOWN = {file for ending in ("html", "svg") for file in DOCS.glob(f"*.{ending}")}
 
 LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|!\[[^\]]*\]\([^)]*\))+)\]\(([^()\s]+)\)")
 FENCED = re.compile(r"^(```.*?^```$)", re.MULTILINE | re.DOTALL)
@@ -58,8 +61,8 @@ def mapped(text, base, page):
             raise FileNotFoundError(f"{page} links to {link}, which does not exist")
         if file.suffix == ".md" and file.parent == DOCS:
             return f"[{words}]({os.path.relpath(file, DOCS / Path(page).parent)}{anchor and '#' + anchor})"
-        if str(file) in html_extra_path:
-            return f'<a href="{file.name}">{words}</a>'
+        if file in SHOWN:
+            return f'<a href="{os.path.relpath("files", Path(page).parent)}/{file.name}">{words}</a>'
         return f'<a href="{in_repository(file.relative_to(ROOT), page)}{anchor and "#" + anchor}">{words}</a>'
 
     parts = FENCED.split(text)
@@ -73,6 +76,12 @@ def read_source(app, docname, source):
     source[0] = mapped(source[0], (DOCS / docname).parent, docname)
     if docname == "index":
         source[0] = mapped((ROOT / "README.md").read_text(encoding="utf-8"), ROOT, docname) + source[0]
+
+
+def bring_files(app, error):
+    (Path(app.outdir) / "files").mkdir(exist_ok=True)
+    for file in SHOWN:
+        shutil.copy(file, Path(app.outdir) / "files")
 
 
 def as_rst(lines):
@@ -139,5 +148,6 @@ def linkcode_resolve(domain, info):
 
 def setup(app):
     app.connect("source-read", read_source)
+    app.connect("build-finished", bring_files)
     app.connect("autodoc-process-docstring", process_docstring)
     app.connect("autodoc-process-signature", process_signature)
