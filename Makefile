@@ -20,7 +20,7 @@ UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_o
 help: ## this list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
 
-run: $(VENV)/all ## build, run SCENE=franka_grasp, write out/franka_grasp.csv and .html
+run: $(VENV)/run ## build, run SCENE=franka_grasp, write out/franka_grasp.csv and .html
 	@$(VENV)/bin/overlapper run $(SCENE) --out out/$(SCENE).csv --html out/$(SCENE).html
 
 test: $(VENV)/dev ## build, pass all tests
@@ -82,12 +82,23 @@ ci: ## all that a change must pass (a quarter of an hour on 2 cores)
 clean: ## remove environments, builds and what was written to out/
 	@rm -rf $(VENV) build out
 
-# The stamps stand for the package with the extra they are named after; `dev` includes `all`. The installation is
-# editable, so only the native sources need another one.
-$(VENV)/all $(VENV)/dev: pyproject.toml $(NATIVE) | $(VENV)/bin/python
-	@echo "Building overlapper and installing it with the extra '$(@F)' (a few minutes the first time)"
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[$(@F)]'
-	@touch $@ $(VENV)/all
+# The package is installed as editable, so only the native sources and what it depends on need it built again.
+$(VENV)/built: pyproject.toml $(NATIVE) | $(VENV)/bin/python
+	@echo "Building overlapper in $(VENV) (some minutes the first time, seconds after a change)"
+	@start=$$(date +%s); \
+	  $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --editable . && \
+	  echo "Built in $$(($$(date +%s) - start)) s"
+	@touch $@
+
+# What it needs beside numpy, by the package's extras: pip finds it installed, and builds nothing.
+$(VENV)/run: EXTRAS := sim,check,view,cli,frames
+$(VENV)/dev: EXTRAS := dev
+$(VENV)/run $(VENV)/dev: pyproject.toml | $(VENV)/built
+	@echo "Installing the packages of overlapper[$(EXTRAS)]"
+	@start=$$(date +%s); \
+	  $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check 'overlapper[$(EXTRAS)]' && \
+	  echo "Installed in $$(($$(date +%s) - start)) s"
+	@touch $@
 
 # Another build of the core in an environment of its own, by the name of its CMake option. All but the package is that of
 # $(VENV): what a .pth names is on the path, but its own .pth, of which one is for the package, are not read. Only clang
@@ -95,7 +106,7 @@ $(VENV)/all $(VENV)/dev: pyproject.toml $(NATIVE) | $(VENV)/bin/python
 build/coverage/dev: OPTION := OVERLAPPER_COVERAGE
 build/sanitized/dev: OPTION := OVERLAPPER_SANITIZE
 build/sanitized/dev: COMPILER := CC=clang CXX=clang++
-build/coverage/dev build/sanitized/dev: build/%/dev: $(VENV)/dev
+build/coverage/dev build/sanitized/dev: build/%/dev: $(VENV)/dev $(VENV)/built
 	@$(VENV)/bin/python -m venv build/$*/venv
 	@$(VENV)/bin/python -c 'import sys; print(*(path for path in sys.path if path.endswith("site-packages")), sep="\n")' \
 	  >"$$(build/$*/venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/others.pth"

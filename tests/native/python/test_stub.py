@@ -1,6 +1,8 @@
 """The public surface of the native core is a text under version control: a change of it is a line in a diff."""
 
 import difflib
+import subprocess
+import sys
 from pathlib import Path
 
 import overlapper._core
@@ -17,5 +19,8 @@ def test_the_native_surface_is_the_committed_one():
     assert not changes, f"{changes}\nIf the change is meant: cp {built} {COMMITTED}"
 
 
-def test_the_package_says_that_it_is_typed():
-    assert Path(overlapper.__file__).with_name("py.typed").is_file()
+def test_programs_of_others_are_checked_against_it(tmp_path):
+    program = "from overlapper import Sphere, overlap; reveal_type(overlap(Sphere(1.0), Sphere(2.0)).volume)"
+    mypy = [sys.executable, "-m", "mypy", "--cache-dir", tmp_path, "-c", program]
+    checked = subprocess.run(mypy, cwd=tmp_path, capture_output=True, text=True)
+    assert 'Revealed type is "float"' in checked.stdout, checked.stdout
