@@ -156,6 +156,8 @@ def test_a_repository_of_ones_own_is_guarded_by_what_its_workflow_runs(tmp_path)
     repository = shutil.copytree(EXAMPLES / "ci", tmp_path / "mine", ignore=shutil.ignore_patterns("out"))
     workflow = (repository / ".github" / "workflows" / "scenes.yml").read_text(encoding="utf-8")
     (command,) = re.findall(r"- run: (pytest .*)", workflow)
+    (install,) = re.findall(r"- run: (pip .*)", workflow)
+    assert f"\n{install}\n" in (repository / "README.md").read_text(encoding="utf-8")  # which .ci/run follows
 
     def guard():
         python = [sys.executable, "-m", *command.split(), "-p", "no:cacheprovider"]
