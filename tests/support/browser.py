@@ -99,9 +99,13 @@ class Browser:
         self("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
         self("Input.dispatchKeyEvent", type="keyUp", key=key)
 
-    def picture(self) -> np.ndarray:
-        """(height, width, 3), as it looks once two more frames are drawn."""
+    def settle(self) -> None:
+        """Wait until two more frames are drawn: what observes sizes, or draws before the next frame, has done so."""
         self.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+    def picture(self) -> np.ndarray:
+        """(height, width, 3), as it looks once it has settled."""
+        self.settle()
         shot = base64.b64decode(self("Page.captureScreenshot")["data"])
         return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"), dtype=int)
 

@@ -219,7 +219,8 @@ def scene(browser: Browser) -> np.ndarray:
 
 
 def sides(browser: Browser, selector: str) -> list[int]:
-    """Left, top, right and bottom of an element, in pixels."""
+    """Left, top, right and bottom of an element, in pixels, once the page has settled."""
+    browser.settle()
     box = f"document.querySelector({selector!r}).getBoundingClientRect()"
     return [round(browser.ask(f"{box}.{side}")) for side in ("left", "top", "right", "bottom")]
 
