@@ -13,8 +13,8 @@ STEPS = 200
 KINDS = ("jenga/jenga.urdf", "block.urdf", "domino/domino.urdf", "cube_small.urdf", "lego/lego.urdf")
 
 
-def build(client: int) -> None:
-    chance = random.Random(200)
+def build(client: int, *, seed: int = 200) -> None:
+    chance = random.Random(seed)
     p.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
     p.setGravity(0, 0, -9.81, physicsClientId=client)
     p.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=client)

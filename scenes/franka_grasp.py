@@ -15,7 +15,7 @@ FINGERS, GRASP_POINT = (9, 10), 11
 READY = [0.0, 0.35, 0.0, -2.2, 0.0, 2.55, math.pi / 4]
 
 
-def build(client: int):
+def build(client: int, *, mass: float = 0.1, friction: float = 1.0):
     p.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
     p.setGravity(0, 0, -9.81, physicsClientId=client)
     p.loadURDF("tray/traybox.urdf", [0.55, 0, 0], physicsClientId=client)
@@ -23,6 +23,15 @@ def build(client: int):
         "duck_vhacd.urdf", [0.55, 0, 0.03], p.getQuaternionFromEuler([math.pi / 2, 0, 0]), physicsClientId=client
     )
     p.changeDynamics(duck, -1, contactStiffness=800, contactDamping=20, physicsClientId=client)  # rubber
+    weighed, inertia = (p.getDynamicsInfo(duck, -1, physicsClientId=client)[k] for k in (0, 2))
+    p.changeDynamics(
+        duck,
+        -1,
+        mass=mass,
+        localInertiaDiagonal=[each * mass / weighed for each in inertia],
+        lateralFriction=friction,
+        physicsClientId=client,
+    )
     arm = p.loadURDF("franka_panda/panda.urdf", useFixedBase=True, physicsClientId=client)
     for joint, angle in enumerate(READY):
         p.resetJointState(arm, joint, angle, physicsClientId=client)

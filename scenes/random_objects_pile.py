@@ -12,8 +12,8 @@ import pybullet_data
 STEPS = 240
 
 
-def build(client: int) -> None:
-    chance = random.Random(30)
+def build(client: int, *, seed: int = 30) -> None:
+    chance = random.Random(seed)
     p.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
     p.setGravity(0, 0, -9.81, physicsClientId=client)
     p.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=client)

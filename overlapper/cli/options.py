@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -40,6 +41,24 @@ ConcaveOption = Annotated[
 ThresholdOption = Annotated[
     float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
 ]
+
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the scene; may be repeated.", show_default=False),
+]
+
+
+def given_parameters(settings: Sequence[str] | None) -> dict[str, str]:
+    """What --set says, by name; Refused if it says nothing, or one thing twice."""
+    given: dict[str, str] = {}
+    for each in settings or ():
+        name, sign, text = each.partition("=")
+        if not (name and sign):
+            raise Refused(f"--set must be NAME=VALUE, not {each!r}")
+        if name in given:
+            raise Refused(f"--set says {name} twice")
+        given[name] = text
+    return given
 
 
 def refuse_out_of_range(tolerance: float, concave_threshold: float, out: Path | None) -> None:

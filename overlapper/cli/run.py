@@ -19,14 +19,17 @@ from overlapper.cli.options import (
     MethodOption,
     OutOption,
     PerOption,
+    SetOption,
     SurfaceOption,
     ThresholdOption,
     ToleranceOption,
+    given_parameters,
     refuse_out_of_range,
 )
 from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Refused, quiet, say, scene_refusals, without_banner
-from overlapper.scenes.scene import load_scene
+from overlapper.scenes.parameters import heading_of
+from overlapper.scenes.scene import Scene, load_scene
 
 if TYPE_CHECKING:
     from overlapper.scenes.summary import Summary
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
 
 def run(
     scene: Annotated[str, typer.Argument(help="Name of a scene, or path of a scene file (.py).", show_default=False)],
+    given: SetOption = None,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Steps to simulate; by default as many as the scene says.")
     ] = None,
@@ -56,6 +60,7 @@ def run(
 
     A scene is a Python file with STEPS, the number of steps, and build(client), which fills a pybullet client and may
     return a function step(i) that is called before each step. PAIRS in it may be "all", or a list of pairs of bodies.
+    What build takes beside the client, as build(client, *, mass=1.0, seed=0), are parameters that --set sets.
 
     Examples:
 
@@ -65,9 +70,12 @@ def run(
 
     [bold]overlapper run my_scene.py --html my_scene.html[/bold]  and a recording with a time slider
 
+    [bold]overlapper run franka_grasp --set mass=0.3 --set friction=0.4[/bold]  with other parameters
+
     [bold]overlapper run kuka_jenga --check fcl --json[/bold]  compared with FCL, for a program to read
     """
     refuse_out_of_range(tolerance, concave_threshold, out)
+    parameters = given_parameters(given)
     geometry = {
         "tolerance": tolerance,
         "method": method,
@@ -78,22 +86,25 @@ def run(
     }
     written: list[Path] = []
     try:
-        summary, finished = _measure(scene, steps, out, html, check is not None, per, geometry, written)
+        chosen, summary, finished = _measure(
+            scene, parameters, steps, out, html, check is not None, per, geometry, written
+        )
     except Refused as refused:
         kept = f"; what came before is in {' and '.join(map(str, written))}" if written else ""
         raise Refused(f"{refused}{kept}") from refused
     if as_json:
         files = {name: str(path) for name, path in (("out", out), ("html", html)) if path in written}
-        settings = {"settings": {**geometry, "per": per, "check": check}}
+        settings = {"settings": {**geometry, "per": per, "check": check}, "parameters": chosen.parameters}
         print(json.dumps(settings | summary.as_dict() | {"finished": finished} | files))
     else:
-        _show(summary, finished, written)
+        _show(chosen.title, summary, finished, written)
     if not finished:
         raise typer.Exit(130)
 
 
 def _measure(
     name: str,
+    parameters: Mapping[str, str],
     steps: int | None,
     out: Path | None,
     html: Path | None,
@@ -101,8 +112,8 @@ def _measure(
     per: Literal["shape", "link"],
     geometry: Mapping[str, Any],
     written: list[Path],
-) -> tuple[Summary, bool]:
-    """The run, with its files; False if it was interrupted, and then both have what was done until then.
+) -> tuple[Scene, Summary, bool]:
+    """The scene, and the run, with its files; False if it was interrupted, and then both have what was done until then.
 
     `written` gets the files that there are in the end: in their place, or, if the run fails, beside it.
     """
@@ -113,9 +124,9 @@ def _measure(
         from overlapper.scenes.outputs import outputs
         from overlapper.scenes.summary import Summary
 
-        scene = load_scene(name)
+        scene = load_scene(name, parameters)
         fcl = stack.enter_context(Fcl()) if check else None
-        settings = {"scene": scene.name, "steps": steps or scene.steps, **geometry}
+        settings = {"scene": scene.name, "steps": steps or scene.steps, **geometry, **heading_of(scene.parameters)}
         summary = Summary(scene.name)
         take = stack.enter_context(outputs(summary, settings, written, out, html, per, fcl))
         frames = stack.enter_context(closing(frames_of(scene, steps, **geometry)))
@@ -125,15 +136,17 @@ def _measure(
         except KeyboardInterrupt:
             if not summary.steps:
                 raise
-            return summary, False
-    return summary, True
+            return scene, summary, False
+    return scene, summary, True
 
 
-def _show(summary: Summary, finished: bool, written: Sequence[Path]) -> None:
+def _show(title: str, summary: Summary, finished: bool, written: Sequence[Path]) -> None:
     from overlapper.cli.summary import overlaps_table, remarks
 
     console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
-    console.print(overlaps_table(summary) if summary.pairs else f"Nothing overlaps in {summary.steps} steps.")
+    console.print(
+        overlaps_table(summary, title=title) if summary.pairs else f"Nothing overlaps in {summary.steps} steps."
+    )
     for line in remarks(summary):
         say(line)
     if not finished:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rich.box import SIMPLE_HEAD
+from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
@@ -12,13 +13,17 @@ from overlapper.scenes.summary import Summary
 from overlapper.simulation import Decomposed
 
 
-def overlaps_table(summary: Summary, limit: int = 20) -> Table:
-    """The `limit` largest pairs, of which there must be one, for a reader who knows nothing of this program."""
+def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
+    """The `limit` largest pairs, of which there must be one, for a reader who knows nothing of this program.
+
+    `title` is that of the scene, by default its name.
+    """
     pairs = summary.largest()
     unit = volume_unit(pairs[0].volume)
     left_out = f"\nThe {limit} largest of {len(pairs)} pairs." if len(pairs) > limit else ""
+    name = escape(printable(title or summary.scene))
     table = Table(
-        title=f"Overlaps of {summary.scene} in {summary.steps} steps, {summary.seconds:.3g} s",
+        title=f"Overlaps of {name} in {summary.steps} steps, {summary.seconds:.3g} s",
         caption="Volume: the largest in any step, true to within ±. Depth: the shortest way to part the two, or the "
         "deepest of their shapes, in the step where that is longest. Normal: that way, for the first of them."
         + left_out,

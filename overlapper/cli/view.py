@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from overlapper.cli.options import SetOption, given_parameters
 from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
 
@@ -34,6 +35,7 @@ def view(
     scene: Annotated[
         str | None, typer.Option(help="The scene of a table that has no shapes, by name or path: it is run again.")
     ] = None,
+    given: SetOption = None,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Steps of a scene at most; by default as many as it says.")
     ] = None,
@@ -61,6 +63,8 @@ def view(
 
     [bold]overlapper view franka_grasp[/bold]  a page to play, click and measure in: out/franka_grasp.html
 
+    [bold]overlapper view franka_grasp --set mass=0.3[/bold]  with a parameter of the scene that is not its default
+
     [bold]overlapper view scenes/expected/box_pile.csv --png pile.png --close[/bold]  a picture for a report
 
     [bold]overlapper view run.csv --scene my_scene.py[/bold]
@@ -79,7 +83,7 @@ def view(
     with quiet() as noise, scene_refusals(noise), input_refusals():
         with without_banner():
             from overlapper.scenes.playback import play
-        playback = play(source, steps, scene)
+        playback = play(source, steps, scene, given_parameters(given))
         with closing(playback.views):
             if live:
                 _live(playback, looks, host)

@@ -7,7 +7,7 @@ alone: its scene is run again with the table's settings, and held against the ta
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 from overlapper.printable import printable
 from overlapper.scenes.comparison import compare_measures
 from overlapper.scenes.expected import HUNDREDTHS, read_expected
+from overlapper.scenes.parameters import read_heading
 from overlapper.scenes.run import Frame, run
 from overlapper.scenes.scene import Scene, load_scene
 from overlapper.scenes.still import Still
@@ -42,8 +43,10 @@ class Playback:
     remarks: list[str] = field(default_factory=list)
 
 
-def play(source: str, steps: int | None = None, scene: str | None = None) -> Playback:
-    """The playback of a scene, by name or path, or of a table; of a scene, `steps` of it.
+def play(
+    source: str, steps: int | None = None, scene: str | None = None, given: Mapping[str, str] | None = None
+) -> Playback:
+    """The playback of a scene, by name or path, or of a table; of a scene, `steps` of it with the parameters `given`.
 
     A table without shapes is of the `scene` given: what a table names is not run, as tables come from anywhere. Nor is
     a scene run for longer than it says, or than `steps`, because a table goes on.
@@ -54,8 +57,10 @@ def play(source: str, steps: int | None = None, scene: str | None = None) -> Pla
     if path.suffix not in TABLES:
         if scene is not None:
             raise ValueError(f"--scene is for tables, and {source} is none")
-        chosen = load_scene(source)
-        return Playback(chosen.name, steps or chosen.steps, _run(chosen, steps or chosen.steps, {}))
+        chosen = load_scene(source, given)
+        return Playback(chosen.title, steps or chosen.steps, _run(chosen, steps or chosen.steps, {}))
+    if given:
+        raise ValueError(f"--set is for scenes, and {source} is a table, which says its own parameters")
     metadata = read_metadata(path)
     if path.suffix == ".csv" and re.search(r"^# shapes ", csv_text(path), re.MULTILINE):
         expected = read_expected(path)
@@ -65,7 +70,7 @@ def play(source: str, steps: int | None = None, scene: str | None = None) -> Pla
         said = metadata.get("scene")
         named = f" (it says {printable(said)!r})" if said else ""
         raise ValueError(f"{path} has no shapes to show: give the scene that it is of with --scene{named}")
-    recorded, chosen = read_table(path), load_scene(scene)
+    recorded, chosen = read_table(path), load_scene(scene, read_heading(metadata))
     last = max((int(row["step"] or 0) for row in recorded), default=1)
     playback = Playback(path.stem, min(last, steps or chosen.steps), _nothing())
     if playback.total < last:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from overlapper.scenes.comparison import compare_measures
 from overlapper.scenes.expected import DRIFT, MEASURES, ROUNDING, Budget, Expected, read_expected
+from overlapper.scenes.parameters import heading_of
 from overlapper.scenes.run import stills
 from overlapper.scenes.scene import Scene
 from overlapper.scenes.still import Still
@@ -29,7 +30,7 @@ def record(scene: Scene) -> None:
         steps = sorted({max(scene.steps * quarter // 4, 1) for quarter in (1, 2, 3, 4)})
         made = _observed(scene, Expected(steps, 1e-3, ROUNDING | DRIFT))
         made.budgets.update(_needed(made))
-    made.write(scene.expected, origin())
+    made.write(scene.expected, origin() | heading_of(scene.parameters))
 
 
 def _observed(scene: Scene, wanted: Expected) -> Expected:

@@ -86,7 +86,7 @@ def run(
 def _built(scene: Scene, client: int) -> Step | None:
     scene.names.clear()
     try:
-        step = scene.build(client)
+        step = scene.build(client, **scene.parameters)
     except Exception as error:
         raise broken(scene.path, "cannot be built", error) from error
     try:

@@ -1,7 +1,8 @@
 """What a scene is, and how it is found: by name or by path.
 
 A scene is a Python file with a docstring that says what is hard about it, `STEPS`, and `build(client)`, which fills the
-pybullet client and may return `step(i)`, called before every stepSimulation. `PAIRS`, if it is there, says which pairs
+pybullet client and may return `step(i)`, called before every stepSimulation. What `build` takes beside the client,
+`build(client, *, mass=1.0, seed=0)`, are the scene's parameters. `PAIRS`, if it is there, says which pairs
 are looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
 apart. `NAMES`, a dictionary that `build` fills, has names of bodies by their numbers, as `simulation.Bodies` takes
 them.
@@ -13,11 +14,13 @@ import ast
 import difflib
 import re
 import traceback
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+
+from overlapper.scenes.parameters import Parameter, described, parameters_of, values_of
 
 Step = Callable[[int], object]
 
@@ -28,20 +31,29 @@ class SceneError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A simulation that can be built again and again, and how many steps of it are worth looking at."""
+    """A simulation that can be built again and again, and how many steps of it are worth looking at.
+
+    `parameters` are what `build` is given beside the client, by name.
+    """
 
     name: str
     path: Path
     difficulty: str
     steps: int
-    build: Callable[[int], Step | None]
+    build: Callable[..., Step | None]
     pairs: Any = "simulated"
     names: dict[int, str] = field(default_factory=dict)
+    parameters: dict[str, Parameter] = field(default_factory=dict)
 
     @property
     def expected(self) -> Path:
         """Where its expected file is or would be."""
         return self.path.parent / "expected" / f"{self.name}.csv"
+
+    @property
+    def title(self) -> str:
+        """Its name, with its parameters if it has any."""
+        return f"{self.name} ({described(self.parameters)})" if self.parameters else self.name
 
 
 def scene_paths() -> dict[str, Path]:
@@ -90,10 +102,22 @@ def headline(path: Path) -> str:
     return (docstring or "").partition("\n")[0]
 
 
-def load_scene(name_or_path: str | Path) -> Scene:
-    """The scene of that name, or of that file (a path ends in .py). SceneError says what is wrong with it."""
-    path = _find(name_or_path)
-    module = _imported(path)
+def load_scene(name_or_path: str | Path, given: Mapping[str, str] | None = None) -> Scene:
+    """The scene of that name, or of that file (a path ends in .py), with the parameters `given`, as text.
+
+    SceneError says what is wrong with it, or with a parameter.
+    """
+    path = find_scene(name_or_path)
+    scene = scene_of(path, path.read_bytes())
+    try:
+        return replace(scene, parameters=values_of(given or {}, scene.parameters, scene.name))
+    except ValueError as error:
+        raise SceneError(str(error)) from error
+
+
+def scene_of(path: Path, source: bytes) -> Scene:
+    """The scene that the text of a file is. SceneError says what is wrong with it."""
+    module = _imported(path, source)
     steps, build = getattr(module, "STEPS", None), getattr(module, "build", None)
     if not isinstance(steps, int) or steps < 1:
         raise SceneError(f"{path} must have STEPS, a whole number of steps from 1, but STEPS is {steps!r}")
@@ -105,10 +129,12 @@ def load_scene(name_or_path: str | Path) -> Scene:
     names = getattr(module, "NAMES", {})
     if not isinstance(names, dict):
         raise SceneError(f"{path} has NAMES = {names!r}, which must be a dictionary of names by the numbers of bodies")
-    return Scene(path.stem, path, (module.__doc__ or "").strip(), steps, build, pairs, names)
+    difficulty = (module.__doc__ or "").strip()
+    return Scene(path.stem, path, difficulty, steps, build, pairs, names, parameters_of(build))
 
 
-def _find(name_or_path: str | Path) -> Path:
+def find_scene(name_or_path: str | Path) -> Path:
+    """The file of the scene of that name, or that file. SceneError if there is none."""
     path = Path(name_or_path)
     if path.suffix == ".py":
         if not path.is_file():
@@ -123,12 +149,12 @@ def _find(name_or_path: str | Path) -> Path:
     return known[name]
 
 
-def _imported(path: Path) -> ModuleType:
+def _imported(path: Path, source: bytes) -> ModuleType:
     module = ModuleType(path.stem)
     module.__file__ = str(path)
     try:
         # Bytecode on disk is taken for that of a source of the same size that was written in the same second.
-        exec(compile(path.read_bytes(), path, "exec"), module.__dict__)
+        exec(compile(source, path, "exec"), module.__dict__)
     except Exception as error:
         raise broken(path, "cannot be loaded", error) from error
     return module

@@ -1,0 +1,94 @@
+"""The parameters of a scene: what `build(client, *, mass=1.0, seed=0)` may be told beside the client.
+
+A parameter has a default that is a number, a text or True or False, and takes values of that kind.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+Parameter = bool | int | float | str
+
+TRUTHS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+
+
+def _whole(text: str) -> int:
+    """Of those that a table can hold."""
+    if not -(2**63) <= (value := int(text)) < 2**63:
+        raise ValueError
+    return value
+
+
+def _finite(text: str) -> float:
+    if not math.isfinite(value := float(text)):
+        raise ValueError
+    return value
+
+
+# What values of each kind are called, and how they are read: by KeyError or ValueError they are none.
+READERS: dict[type, tuple[str, Callable[[str], Parameter]]] = {
+    bool: ("true or false", lambda text: TRUTHS[text.strip().lower()]),
+    int: ("a whole number of 64 bits", _whole),
+    float: ("a finite number", _finite),
+}
+
+# Of the heading of a table: "set mass: 2.0".
+HEADING = "set "
+
+
+def parameters_of(build: Callable[..., Any]) -> dict[str, Parameter]:
+    """The defaults of what `build` takes behind the client, by name; of none but numbers, texts, True and False."""
+    try:
+        taken = [*inspect.signature(build).parameters.values()][1:]
+    except (TypeError, ValueError):  # which C functions may raise
+        return {}
+    named = [each for each in taken if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]
+    return {each.name: each.default for each in named if type(each.default) in (bool, int, float, str)}
+
+
+def known(name: str, defaults: Mapping[str, Parameter], scene: str) -> None:
+    """ValueError if the scene has no parameter of that name."""
+    if name in defaults:
+        return
+    if not defaults:
+        raise ValueError(f"the scene {scene} has no parameters, and so no {name!r}")
+    nearest = difflib.get_close_matches(name, defaults, n=1)
+    hint = f"; the nearest is {nearest[0]!r}" if nearest else ""
+    raise ValueError(f"the scene {scene} has no parameter {name!r}{hint} (it has {described(defaults)})")
+
+
+def value_of(name: str, text: str, default: Parameter) -> Parameter:
+    """The value that a text is for a parameter with that default. ValueError if it is none of its kind."""
+    if isinstance(default, str):
+        return text
+    words, read = READERS[type(default)]
+    try:
+        return read(text)
+    except (ValueError, KeyError):
+        raise ValueError(f"{name} must be {words}, as its default {default} is, not {text!r}") from None
+
+
+def values_of(given: Mapping[str, str], defaults: Mapping[str, Parameter], scene: str) -> dict[str, Parameter]:
+    """All parameters, those given as text and the rest as they are by default. ValueError names one that is none."""
+    for name in given:
+        known(name, defaults, scene)
+    return {**defaults, **{name: value_of(name, text, defaults[name]) for name, text in given.items()}}
+
+
+def described(parameters: Mapping[str, Parameter]) -> str:
+    """As text, "mass=2.0, seed=7"."""
+    return ", ".join(f"{name}={value}" for name, value in parameters.items())
+
+
+def heading_of(parameters: Mapping[str, Parameter]) -> dict[str, str]:
+    """What the heading of a table says of them."""
+    return {f"{HEADING}{name}": str(value) for name, value in parameters.items()}
+
+
+def read_heading(metadata: Mapping[str, str]) -> dict[str, str]:
+    """The parameters in the heading of a table, as text."""
+    return {name.removeprefix(HEADING): text for name, text in metadata.items() if name.startswith(HEADING)}
