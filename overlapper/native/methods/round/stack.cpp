@@ -6,6 +6,8 @@
 namespace overlapper::slicing {
 namespace {
 
+/// The sine between two axes up to which double-doubles make them one direction.
+constexpr double kOneDirection = 1e-24;
 /// A plane this nearly parallel to the slices ends the stack, and what it is tilted counts to first order.
 constexpr double kParallel = 1e-11;
 /// Planes between that and this would make slices whose border rushes across.
@@ -93,7 +95,7 @@ Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double a
   if (two) {
     const WideVector both = cross(one->axis, two->axis);
     const DoubleDouble sine = norm(both);
-    if (sine.head > 1e-24) {
+    if (sine.head > kOneDirection) {
       const WideVector n = unit(both);
       const std::array<WayOut, 2> ways = nearest(rounds, walls);
       const WideVector out = ways[0].normal, flat = across(out, n);
@@ -131,11 +133,12 @@ bool even(const Axes& axes, std::span<const Wall> walls) {
   });
 }
 
-/// Of the ways to turn them, the one after so many that suit; the first of all where none does. Slices orthogonal to
-/// two axes leave no choice.
+/// Of the ways to turn them, the one after so many that suit; the first of all where none does. Slices along two axes
+/// that are not parallel leave no choice.
 std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall> walls, int way) {
   const Axes first = choose(rounds, walls, 0);
-  const bool fixed = rounds.size() == 2 && !rounds[0].ball && !rounds[1].ball;
+  const bool fixed = rounds.size() == 2 && !rounds[0].ball && !rounds[1].ball &&
+                     norm(cross(rounds[0].axis, rounds[1].axis)).head > kOneDirection;
   int suit = 0;
   for (const double angle : kTurns) {
     const Axes axes = angle == 0 ? first : choose(rounds, walls, angle);
