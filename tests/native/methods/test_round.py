@@ -759,6 +759,14 @@ def test_of_planes_of_one_direction_the_nearer_bounds_a_slice(seed):
     assert not a_turn_keeps_the_measures_of_round_bodies(case, overlap(*case.placed))
 
 
+@pytest.mark.parametrize("seed", [3000461, 2000219])
+def test_where_a_facet_that_rounding_folds_bends_is_known_to_more_digits_than_doubles_have(seed):
+    """Of 1e-12 deep caps, the angle of 1e-16 between the two triangles of a facet is a trillionth."""
+    found = overlap(*make("round_contacts", seed).placed)
+    lower, upper = found.certificate().verify()
+    assert max(abs(found.volume - lower), abs(found.volume - upper)) <= found.volume_error <= 1e-13 * found.volume
+
+
 def test_a_corner_far_along_a_slice_lies_on_the_line_that_is_near():
     # Along the capsule's side, the shallow wedge between an edge's planes is a million times as long as thick.
     quaternions = (

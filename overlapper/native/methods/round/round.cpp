@@ -40,6 +40,11 @@ constexpr double kTold = 1e-6;
 /// Sums of area vectors are right to this fraction of the area.
 constexpr double kSummation = 16 * DBL_EPSILON;
 
+/// The sine between two walls up to which lines that doubles hold leave too much open of where they cross, and to how
+/// many pairs of such what they bound is cut there: each makes two of a piece.
+constexpr double kFolded = 1e-10;
+constexpr size_t kMostFolds = 3;
+
 /// Whether slices are to have so many walls: of more, they take long, by the cube of their number.
 bool sliceable(size_t walls) { return walls <= 28; }
 
@@ -91,6 +96,8 @@ class Measuring {
     }
     if (flat()) return true;
     drop_repeated();
+    if (folded_)
+      if (const std::optional<Fold> fold = find_fold()) return add_beside(*fold);
     drop_around();
     if (rounds_.size() == 1 && rounds_[0].ball && walls_.size() <= 1) {
       add_cap(rounds_[0], walls_.empty() ? nullptr : &walls_[0]);
@@ -222,17 +229,84 @@ class Measuring {
   /// flat, and of two faces by the inner one, or that of the first body.
   void find_repeated() {
     instead_.assign(walls_.size(), kItself);
+    folded_ = false;
     any_two(1, [&](Wall& wall, const Wall& other) {
       if (wall.owner == kSuperseded || other.owner == kSuperseded) return false;
       const bool cut = wall.owner == slicing::kCut, other_is_cut = other.owner == slicing::kCut;
-      const double outer = (wall.slack - other.slack).head;
+      const double outer = (wall.slack - other.slack).head, tilt = norm(rounded(other.normal - wall.normal));
       const bool first = std::abs(outer) > 1e-24 * extent ? outer > 0 : &other < &wall;
-      if ((cut == other_is_cut ? first : cut) && coincide(std::abs(outer), norm(rounded(other.normal - wall.normal)))) {
+      if (!(cut == other_is_cut ? first : cut)) return false;
+      if (coincide(std::abs(outer), tilt)) {
         wall.owner = kSuperseded;
         instead_[&wall - walls_.data()] = static_cast<int>(&other - walls_.data());
+      } else {
+        folded_ = folded_ || tilt < kFolded;
       }
       return false;
     });
+  }
+
+  /// Two walls of nearly one direction, and the cut on whose inner side the first of them is the nearer.
+  struct Fold {
+    size_t first, second;
+    Wall nearer;
+  };
+
+  /// Drops walls of nearly one direction as another that is nearer all over, and finds two of which neither is; nothing
+  /// where there are too many.
+  std::optional<Fold> find_fold() {
+    std::optional<Fold> found;
+    size_t folds = 0;
+    for (size_t i = 0; i < walls_.size(); ++i)
+      for (size_t j = i + 1; j < walls_.size(); ++j) {
+        const Wall &a = walls_[i], &b = walls_[j];
+        const WideVector apart = b.normal - a.normal;
+        const DoubleDouble tilt = norm(apart);
+        if (!(tilt.head > 1e-24 && tilt.head < kFolded) || (a.owner == slicing::kCut && b.owner == slicing::kCut))
+          continue;
+        const Fold fold{i, j, {apart / tilt, (b.slack - a.slack) / tilt, slicing::kCut}};
+        if (const int nearer = nearer_all_over(fold); nearer != 0) {
+          walls_.erase(walls_.begin() + static_cast<std::ptrdiff_t>(nearer > 0 ? j : i));
+          return find_fold();
+        }
+        if (!found) found = fold;
+        ++folds;
+      }
+    return folds <= kMostFolds ? found : std::nullopt;
+  }
+
+  /// 1 if of all that the first of two walls leaves it is the nearer, -1 if nowhere, 0 if that is not sure.
+  int nearer_all_over(const Fold& fold) const {
+    const Vec3 g = rounded(fold.nearer.normal), n = rounded(walls_[fold.first].normal);
+    const double slack = fold.nearer.slack.head;
+    double most = extent, least = -extent;
+    for (const Round& r : rounds_) {
+      if (!r.ball) continue;
+      // Of the cap that the wall leaves, the rim reaches farthest, but where the ball itself does.
+      const Vec3 c = rounded(r.centre);
+      const double level = (walls_[fold.first].slack - dot(walls_[fold.first].normal, r.centre)).head, up = dot(g, n);
+      const double rim = std::sqrt(std::max(0.0, (r.radius - level) * (r.radius + level)));
+      const double across = std::sqrt(std::max(0.0, 1 - up * up)), middle = dot(g, c);
+      const auto reach = [&](double side) {
+        return side * up * r.radius <= level ? r.radius : side * up * level + rim * across;
+      };
+      most = std::min(most, middle + reach(1)), least = std::max(least, middle - reach(-1));
+    }
+    const double margin = 1e-9 * (most - least) + 1e-13 * extent;
+    return slack > most + margin ? 1 : slack < least - margin ? -1 : 0;
+  }
+
+  /// What two walls leave is what the one leaves where it is the nearer, and what the other leaves on the rest.
+  bool add_beside(const Fold& fold) {
+    const std::vector<Round> rounds = rounds_;
+    const std::vector<Wall> walls = walls_;
+    for (const bool first : {true, false}) {
+      std::vector<Wall> with = walls;
+      with[first ? fold.second : fold.first] =
+          first ? fold.nearer : Wall{-fold.nearer.normal, -fold.nearer.slack, slicing::kCut};
+      if (!add(rounds, with)) return false;
+    }
+    return true;
   }
 
   int owner_at(int wall) const { return wall == slicing::kNoWall ? kNobody : walls_[telling(wall)].owner; }
@@ -739,6 +813,7 @@ class Measuring {
   std::vector<Wall> walls_, with_radical_;
   std::vector<std::pair<double, int>> by_length_;  ///< walls, by what their normals are along a line
   std::vector<int> instead_;                       ///< per wall, the one that supersedes it
+  bool folded_ = false;                            ///< whether there are two of nearly one direction
   quadric::Rings rings_;
   std::vector<Vec3> corners_;
   std::vector<Plane> planes_;
