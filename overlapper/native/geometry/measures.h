@@ -92,6 +92,7 @@ struct Measures {
 struct MeasuresAndInertia {
   Measures measures;
   std::optional<Mat3> inertia;  ///< about the centroid, at unit density
+  double inertia_error = 0;     ///< m⁵: of each entry, where it is more than what the error of the volume makes of it
 };
 
 /// Three times the mean of the area on the way, over the area at its beginning, while the planes of a polytope move out

@@ -340,7 +340,7 @@ std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping) {
     m.pulls[body] =
         about({side * round->pull.force, side * round->pull.moment}, at.reference, overlapping.bodies[body].position);
   }
-  answer.inertia = round->inertia;
+  answer.inertia = round->inertia, answer.inertia_error = round->inertia_error;
   return answer;
 }
 

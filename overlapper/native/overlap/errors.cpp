@@ -447,7 +447,8 @@ Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, 
 double error_of_integrated_inertia(const MeasuresAndInertia& values, const Spread& spread) {
   const Mat3& i = *values.inertia;
   const double trace = i.row0.x + i.row1.y + i.row2.z;
-  return (4 * values.measures.volume_error + spread.volume) / values.measures.volume * 45 / 4 * trace;
+  return (4 * values.measures.volume_error + spread.volume) / values.measures.volume * 45 / 4 * trace +
+         values.inertia_error;
 }
 
 double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b) {

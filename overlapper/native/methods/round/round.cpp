@@ -54,6 +54,7 @@ struct Totals : Moments {
   double first_area = 0;  ///< m²: of the first body's surface
   double border = 0;      ///< m²: the area of all that area vectors are the sums of
   double open = 0;        ///< m³: what may be missing of pieces whose area vectors do not sum to zero
+  Moments sizes;          ///< of the terms of an ellipsoid's moments
   Vec3 pull, moment;
   Vec3 unbalanced;  ///< the sum of both bodies' area vectors: zero if no piece is missing
 
@@ -365,12 +366,27 @@ class Measuring {
     if (wall) own(wall->owner, stretch ? stretch->area(disc * n) : disc);
     totals.border += 2 * pi * r * height + disc;
     totals.first += volume * tip + first * n;
-    const auto second = [&](double p, double q, double u, double v) {
+    // What a shallow cap is along its axis is far less than across.
+    const auto square = [&](double p, double u, double v, double w) {
+      return volume * p * p + 2 * first * p * u + along * u * u + across * (v * v + w * w);
+    };
+    const auto product = [&](double p, double q, double u, double v) {
       return volume * p * q + first * (p * v + q * u) + (along - across) * u * v;
     };
-    totals.squares += {second(tip.x, tip.x, n.x, n.x) + across, second(tip.y, tip.y, n.y, n.y) + across,
-                       second(tip.z, tip.z, n.z, n.z) + across};
-    totals.products += {second(tip.y, tip.z, n.y, n.z), second(tip.z, tip.x, n.z, n.x), second(tip.x, tip.y, n.x, n.y)};
+    totals.squares += {square(tip.x, n.x, n.y, n.z), square(tip.y, n.y, n.z, n.x), square(tip.z, n.z, n.x, n.y)};
+    totals.products +=
+        {product(tip.y, tip.z, n.y, n.z), product(tip.z, tip.x, n.z, n.x), product(tip.x, tip.y, n.x, n.y)};
+    if (stretch) {
+      const Vec3 p = abs(tip), u = abs(n), diagonal = scaled(u, u);
+      const Vec3 other{diagonal.y + diagonal.z, diagonal.z + diagonal.x, diagonal.x + diagonal.y};
+      Moments sizes{volume, first * u + volume * p, {}, {}};
+      sizes.squares = volume * scaled(p, p) + 2 * first * scaled(p, u) + along * diagonal + across * other;
+      const auto size = [&](double a, double b, double v, double w) {
+        return volume * a * b + first * (a * w + b * v) + (along + across) * v * w;
+      };
+      sizes.products = {size(p.y, p.z, u.y, u.z), size(p.z, p.x, u.z, u.x), size(p.x, p.y, u.x, u.y)};
+      totals.sizes += sizes;
+    }
     // The force on the ball acts along a line through its centre and the tip.
     const Vec3 force = disc * n, moment = stretch ? stretch->moment(tip + height * n, force) : cross(tip, force);
     const auto act = [&](int body, double side) {
@@ -794,6 +810,10 @@ class Measuring {
     const slicing::Integrals& s = sum.integrals;
     const auto turned = [&](Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.n; };
     totals += s.along({stack.l, stack.m, stack.t}).seen_from(offset_);
+    if (stretch)
+      totals.sizes += Moments{s.volume, abs(s.first), s.squares, abs(s.products)}
+                          .along({abs(stack.l), abs(stack.m), abs(stack.t)})
+                          .seen_from(abs(offset_));
     totals.volume += s.correction;
     totals.error += sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
     totals.area += s.area, totals.first_area += s.first_area, totals.area_error += sum.area_error;
@@ -1024,6 +1044,13 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
                       stretch.volume * scaled(scaled(h, h), totals.squares),
                       stretch.volume * scaled(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, totals.products)};
   result.inertia = turn * whole.inertia_about_centroid() * transposed(turn);
+  // Half axes may differ by as much as a cap is shallow, so that what rounding leaves of one term counts for all.
+  const Moments& sizes = totals.sizes;
+  const Vec3 mean = sizes.first / volume, f = sizes.first;
+  const Vec3 squares = sizes.squares + scaled(f, mean);
+  const Vec3 products = sizes.products + Vec3{f.y * mean.z, f.z * mean.x, f.x * mean.y};
+  result.inertia_error = 64 * DBL_EPSILON * stretch.volume *
+                         (dot(scaled(h, h), squares) + dot(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, products));
   result.rounding = rounding_of_surfaces(sum(whole.squares) / result.volume + norm2(scaled(h, moved)));
   const double side = swapped ? -1 : 1;
   const Pull pull{side * (turn * stretch.normal(totals.pull)), side * (turn * totals.moment)};

@@ -13,13 +13,14 @@ namespace overlapper {
 /// The measures of the common set of two bodies of which at least one is round, of the round shapes themselves.
 struct RoundMeasures {
   double volume = 0, volume_error = 0, area = 0;
-  double first_area = 0;   ///< m²: of the surface, what is the first body's
-  double area_error = 0;   ///< what rules leave open of the area
-  double rounding = 0;     ///< m: how far it may have moved surfaces
-  Vec3 centroid;           ///< about the reference
-  Mat3 inertia;            ///< about the centroid, unit density
-  Pull pull;               ///< on the first body, about the reference; that on the second is the opposite
-  int facets_touched = 0;  ///< planes of the bodies that took part
+  double first_area = 0;     ///< m²: of the surface, what is the first body's
+  double area_error = 0;     ///< what rules leave open of the area
+  double rounding = 0;       ///< m: how far it may have moved surfaces
+  Vec3 centroid;             ///< about the reference
+  Mat3 inertia;              ///< about the centroid, unit density
+  double inertia_error = 0;  ///< m⁵: what rounding leaves of an ellipsoid's, of each entry
+  Pull pull;                 ///< on the first body, about the reference; that on the second is the opposite
+  int facets_touched = 0;    ///< planes of the bodies that took part
 };
 
 /// Measures a pair that overlaps: pairs of spheres, capsules, cylinders and rounded hulls with each other and with
