@@ -48,8 +48,8 @@ Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method 
     std::optional<Measures> at_once = measure_at_once(a, b);
     if (at_once && at_once->status == Status::kSeparated) return {};
     if (at_once && at_once->measured) {
-      const auto [depth, normal] = penetration_in_order(a, b);
-      return {std::move(*at_once), depth, normal, nullptr};
+      const Penetration way = penetration_in_order(a, b);
+      return {std::move(*at_once), way.depth, way.normal, nullptr};
     }
   }
   return row_of(Overlap(a, b, tolerance, method));

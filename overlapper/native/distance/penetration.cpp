@@ -148,9 +148,11 @@ Penetration penetration(const Placed& a, const Placed& b) {
   }
   const double radius = core_radius(a.shape) + core_radius(b.shape);
   const Separation cores = separate_cores(a, b);
-  if (!cores.origin_inside && cores.gap > 0) return {radius - cores.distance, cores.normal};
+  if (!cores.origin_inside && cores.gap > 0) return {radius - cores.distance, cores.normal, cores.distance - cores.gap};
   if (box_a && box_b) return of_boxes;
   Penetration result = DepthSearch(a, b).run();
+  // Of cores that have nothing in common after all, the way along a facet's normal may be the wrong one.
+  if (!(result.depth > 0) && radius > 0) result.open = std::numeric_limits<double>::infinity();
   result.depth += radius;
   return result;
 }

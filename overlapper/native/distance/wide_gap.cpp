@@ -42,8 +42,11 @@ WideGap wide_gap(const WideBody& a, const WideBody& b, double rounding) {
   result.most = (norm(cores.simplex.witness_a() - cores.simplex.witness_b()) - radii).head;
   result.certified = cores_apart ? (dot(support(-normal).difference(), normal) - radii).head : -radii.head;
   if (cores_apart) result.normal = rounded(normal);
-  result.witness_a = cores.simplex.witness_a() - DoubleDouble{radius_a} * normal;
-  result.witness_b = cores.simplex.witness_b() + DoubleDouble{radius_b} * normal;
+  // Along the line of the witness points of the cores, those of the bodies are as far apart as the bodies are: on a
+  // rim, the direction that proves the most is off by half of the digits.
+  const WideVector along = cores_apart ? unit(cores.simplex.nearest) : normal;
+  result.witness_a = cores.simplex.witness_a() - DoubleDouble{radius_a} * along;
+  result.witness_b = cores.simplex.witness_b() + DoubleDouble{radius_b} * along;
   return result;
 }
 

@@ -32,6 +32,12 @@ double extent(const Shape& shape) {
   return std::visit(Visitor{}, shape);
 }
 
+/// What doubles may lose of a depth or distance, of bodies in coordinates about one of them.
+double rounding_between(const Placed& a, const Placed& b) {
+  const double between = extent(a.shape) + extent(b.shape) + sum(abs(a.pose.translation - b.pose.translation));
+  return rounding(reach(a, reach(b, between)));
+}
+
 Penetration parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint) {
   const WideParting way = wide_parting(a, b, reference, hint);
   return {way.depth, way.normal};
@@ -56,10 +62,7 @@ Vec3 reversed(Vec3 v) { return Vec3{} - v; }
 
 }  // namespace
 
-bool in_doubt(double length, const Placed& a, const Placed& b) {
-  const double between = extent(a.shape) + extent(b.shape) + sum(abs(a.pose.translation - b.pose.translation));
-  return rounding(reach(a, reach(b, between))) > kClear * length;
-}
+bool in_doubt(double length, const Placed& a, const Placed& b) { return rounding_between(a, b) > kClear * length; }
 
 bool has_curved_core(const Placed& a, const Placed& b) {
   return (has_curved_core(a.shape) || has_curved_core(b.shape)) && bounded(a.shape) && bounded(b.shape);
@@ -81,7 +84,9 @@ Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool 
   Contact contact;
   if (status == Status::kOverlapping) {
     Penetration p = penetration(a, b);
-    if (doubtful || has_curved_core(a, b) || in_doubt(p.depth, a, b)) p = parting(a, b, at.reference, p.normal);
+    // Cores that all but meet leave the direction open, and with it the way, by more than rounding.
+    const bool open = in_doubt(p.depth, a, b) || p.open > rounding_between(a, b);
+    if (doubtful || has_curved_core(a, b) || open) p = parting(a, b, at.reference, p.normal);
     contact.depth = p.depth;
     contact.normal = p.normal;
   } else {

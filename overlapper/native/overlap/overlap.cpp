@@ -254,8 +254,8 @@ const Contact& Overlap::contact() const {
   assert(pair());
   return lazy().contact.get([this] {
     if (measured_at_once()) {
-      const auto [depth, normal] = penetration_in_order(two_[0], two_[1]);
-      return Contact{0, depth, normal, {}, {}, {}};
+      const Penetration way = penetration_in_order(two_[0], two_[1]);
+      return Contact{0, way.depth, way.normal, {}, {}, {}};
     }
     const bool searched = method_ == Method::kAuto && !at_once_;
     const bool doubtful = searched && search().inside && search().inside->wide_ball;

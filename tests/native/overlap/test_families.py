@@ -16,7 +16,11 @@ SEED = 2026
 AFFORDABLE = {  # seeds whose exact truth takes less than half a second, and such as were hard
     "combined": (*range(SEED, SEED + 5), 300168, 400034),  # witnesses of needles, and needles that touch
     "flush_round": (*range(SEED, SEED + 5), 41, 44, 500354),  # a half ball, lids, a cylinder in a box that it fills
-    "round_contacts": (*range(SEED, SEED + 5), 300076, 400019, 500146),  # over the diagonal that is no edge
+    "round_contacts": (
+        *range(SEED, SEED + 5),
+        *(300076, 400019, 500146, 2000219),  # over the diagonal that is no edge
+    ),
+    "ellipsoids": (*range(SEED, SEED + 5), 2000020),  # a cap of a needle, far wider than deep
     "fine_round_hulls": (2026, 2027),
     "finest_round_hulls": (2027,),
     "prisms": (2026, 2029, 2031, 2033, 2034, 2036, 2037),
@@ -26,8 +30,14 @@ AFFORDABLE = {  # seeds whose exact truth takes less than half a second, and suc
         *range(SEED, SEED + 5),
         *(56, 100, 794, 1098, 1305),  # tangent cylinders and planes
         *(700001, 700003),  # a hull apart from a round body, and within one
+        *(2000111, 4000055, 4000287),  # cores that all but meet
+        3000178,  # a capsule that touches a rim
     ),
-    "rounded_hulls": (*range(SEED, SEED + 5), 710251, 710528),  # slabs thinner than a closed form in doubles tells
+    "rounded_hulls": (
+        *range(SEED, SEED + 5),
+        *(710251, 710528),  # slabs thinner than a closed form in doubles tells
+        *(2000121, 3000461, 4000213),  # wedges between parallel cylinders, whose seams are nearly across the way out
+    ),
     "dual_pairs": (*range(SEED, SEED + 5), 300221),  # among its planes the simplex method goes round in circles
 }
 
