@@ -15,6 +15,7 @@ from overlapper.cli.intersect import intersect
 from overlapper.cli.refusals import Interrupted, Refused, give_up, say
 from overlapper.cli.run import run
 from overlapper.cli.shapes import shapes
+from overlapper.cli.sweep import sweep
 from overlapper.cli.view import view
 from overlapper.cli.watch import watch
 from overlapper.scenes.scene import headline, scene_paths
@@ -73,5 +74,5 @@ def scenes() -> None:
 
 # What stands behind a script is the script's.
 app.command(context_settings={"allow_interspersed_args": False})(watch)
-for command in (scenes, run, view, check, diff, intersect, clashes, shapes, stability, chart):
+for command in (scenes, run, sweep, view, check, diff, intersect, clashes, shapes, stability, chart):
     app.command()(command)

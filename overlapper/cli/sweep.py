@@ -1,0 +1,277 @@
+"""`overlapper sweep`: a scene run with many parameters, on all cores or on a cluster."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from overlapper.cli.options import (
+    ConcaveOption,
+    MethodOption,
+    SetOption,
+    SurfaceOption,
+    ThresholdOption,
+    ToleranceOption,
+    given_parameters,
+    refuse_out_of_range,
+)
+from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
+
+if TYPE_CHECKING:
+    from overlapper.sweep.engines import Engine
+    from overlapper.sweep.points import Point, Space
+    from overlapper.sweep.store import Store
+    from overlapper.sweep.sweep import Progress as Reached
+    from overlapper.sweep.sweep import Sweep
+
+FAILURES_SHOWN = 5
+
+
+def sweep(
+    scene: Annotated[str, typer.Argument(help="Name of a scene, or path of a scene file (.py).", show_default=False)],
+    out: Annotated[
+        Path, typer.Option(help="Folder of the sweep; what is there is not done again.", show_default=False)
+    ],
+    grid: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=FROM:TO:COUNT[:log]|NAME=A,B,...",
+            help="Values of a parameter; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    seeds: Annotated[
+        int | None, typer.Option(min=1, help="So many seeds, from 0 on, for the parameter `seed`.", show_default=False)
+    ] = None,
+    points: Annotated[
+        Path | None, typer.Option(help="A CSV table with a column for each parameter.", show_default=False)
+    ] = None,
+    sample: Annotated[
+        int | None, typer.Option(min=1, help="So many points of a Latin hypercube of the ranges.", show_default=False)
+    ] = None,
+    ranges: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--range", metavar="NAME=FROM:TO[:log]", help="What --sample draws; may be repeated.", show_default=False
+        ),
+    ] = None,
+    sample_seed: Annotated[int, typer.Option(min=0, help="Another one draws other points.")] = 0,
+    given: SetOption = None,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Steps of each task; by default as many as the scene says.")
+    ] = None,
+    steps_kept: Annotated[
+        str, typer.Option(metavar='summary|"every N"|all', help="Steps of which all pairs are kept, too.")
+    ] = "summary",
+    limit: Annotated[
+        float | None, typer.Option(min=0.001, help="Seconds that a task may take; then it has failed.")
+    ] = None,
+    retry: Annotated[bool, typer.Option("--retry", help="Do tasks again that have failed.")] = False,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Tasks at a time; by default one on each core.", show_default=False)
+    ] = None,
+    engine: Annotated[
+        Literal["processes", "ray"], typer.Option(help="Who does it: processes of this machine, or a Ray cluster.")
+    ] = "processes",
+    address: Annotated[
+        str | None, typer.Option(help="Of the Ray cluster, host:port or auto; by default one of this machine.")
+    ] = None,
+    pages: Annotated[int, typer.Option(min=0, help="Pages of so many of the worst tasks, beside the summary.")] = 0,
+    method: MethodOption = "auto",
+    tolerance: ToleranceOption = 1e-3,
+    concave: ConcaveOption = "decompose",
+    concave_threshold: ThresholdOption = 0.05,
+    surface: SurfaceOption = "nominal",
+    pairs: Annotated[
+        Literal["simulated", "all"] | None,
+        typer.Option(help="Pairs that the simulator lets collide, or all of different bodies; by default PAIRS."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the text.")] = False,
+) -> None:
+    """Run a scene with many parameters, and keep what each run came to.
+
+    The parameters of a scene are what its build takes beside the client, as build(client, *, mass=1.0, seed=0). What
+    --grid, --seeds, --points and --sample give is crossed; --set holds for all. A task is a row of OUT/tasks.parquet,
+    and one that failed a row of OUT/failures.parquet. Started again, a sweep does what is missing. The exit code is 0
+    if all tasks are done, 1 if any has failed, and 2 if none could be run.
+
+    Examples:
+
+    [bold]overlapper sweep franka_grasp --grid mass=0.1:10:20:log --grid friction=0.3,0.5 --out runs[/bold]
+
+    [bold]overlapper sweep box_pile --seeds 50 --steps-kept "every 10" --limit 60 --out piles[/bold]
+
+    [bold]overlapper sweep franka_grasp --sample 1000 --range mass=0.1:10:log --range friction=0.1:1 --out runs[/bold]
+    """
+    refuse_out_of_range(tolerance, concave_threshold, None)
+    parameters = given_parameters(given)
+    kept = _kept(steps_kept)
+    if address and engine != "ray":
+        raise Refused("--address is for --engine ray")
+    if ranges and not sample:
+        raise Refused("--range says what --sample draws, and there is no --sample")
+    settings: dict[str, Any] = {
+        "steps": steps,
+        "tolerance": tolerance,
+        "method": method,
+        "concave": concave,
+        "concave_threshold": concave_threshold,
+        "surface": surface,
+        "pairs": pairs,
+    }
+    with ExitStack() as stack:
+        noise = stack.enter_context(quiet())
+        stack.enter_context(scene_refusals(noise))
+        stack.enter_context(input_refusals())
+        with without_banner():
+            import overlapper.simulation.bodies  # noqa: F401  # which says now what to install
+        from overlapper.scenes.scene import find_scene, load_scene
+        from overlapper.sweep import page
+        from overlapper.sweep.part import must_be_no_columns
+        from overlapper.sweep.points import Space
+        from overlapper.sweep.study import Study
+        from overlapper.sweep.sweep import Sweep
+
+        chosen = load_scene(scene, parameters)
+        must_be_no_columns(chosen.parameters)
+        space = Space(chosen.name, chosen.parameters)
+        settings["steps"] = steps or chosen.steps
+        study = Study.of(find_scene(scene), settings, kept)
+        todo = Sweep(study, space.crossed(_axes(space, grid, seeds, points, sample, ranges, sample_seed)))
+        store = stack.enter_context(todo.opened(out))
+        working = stack.enter_context(_engine(engine, address, workers))
+        reached, finished = _run(todo, store, working, limit, retry, as_json)
+        shown = page.write(todo, store, scene, pages) if store.done else None
+        failures = store.rows("failures")
+    _tell(todo, store, reached, finished, failures, shown, as_json)
+
+
+def _kept(text: str) -> int:
+    """The number of steps from one whose pairs are kept to the next; 0 for none."""
+    every = re.fullmatch(r"every (\d+)", text.strip())
+    if text in ("summary", "all"):
+        return int(text == "all")
+    if every and int(every[1]):
+        return int(every[1])
+    raise Refused(f"--steps-kept must be summary, 'every N' or all, not {text!r}")
+
+
+def _axes(
+    space: Space,
+    grid: list[str] | None,
+    seeds: int | None,
+    points: Path | None,
+    sample: int | None,
+    ranges: list[str] | None,
+    sample_seed: int,
+) -> list[list[Point]]:
+    """What is to be crossed, seeds last."""
+    axes = [space.read(points)] if points else []
+    axes += [space.samples(sample, ranges or [], sample_seed)] if sample else []
+    axes += [space.grid(each) for each in grid or ()]
+    return axes + ([space.seeds(seeds)] if seeds else [])
+
+
+@contextmanager
+def _engine(name: str, address: str | None, workers: int | None) -> Iterator[Engine]:
+    if name == "processes":
+        from overlapper.sweep.processes import Processes
+
+        yield Processes(workers)
+        return
+    from overlapper.sweep.cluster import Cluster
+
+    cluster = Cluster(address, workers)
+    try:
+        yield cluster
+    finally:
+        cluster.close()
+
+
+def _run(
+    todo: Sweep, store: Store, engine: Engine, limit: float | None, retry: bool, as_json: bool
+) -> tuple[Reached, bool]:
+    """How far it came; False if it was interrupted."""
+    from overlapper.sweep.sweep import Progress as Reached
+
+    console = Console(stderr=True)
+    reached = Reached(len(todo.tasks))
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        bar = progress.add_task(todo.study.scene, total=len(todo.tasks), rate="")
+
+        def heard(now: Reached) -> None:
+            nonlocal reached
+            reached = now
+            speed = progress.tasks[0].speed
+            failed = f", {now.failed:,} failed" if now.failed else ""
+            rate = f"{speed:,.3g}/s{failed}" if speed else ""
+            progress.update(bar, completed=now.total - now.missing, rate=rate)
+
+        try:
+            todo.run(store, engine, limit, retry, heard)
+        except KeyboardInterrupt:
+            return reached, False
+    return reached, True
+
+
+def _tell(
+    todo: Sweep,
+    store: Store,
+    reached: Reached,
+    finished: bool,
+    failures: list[dict[str, Any]],
+    page: Path | None,
+    as_json: bool,
+) -> None:
+    """What became of it, and the exit code."""
+    failures = [row for row in failures if row["task"] in todo.tasks]
+    if as_json:
+        told = {
+            "scene": todo.study.scene,
+            "settings": todo.study.settings,
+            "versions": todo.study.versions,
+            "out": str(store.folder),
+            "page": str(page) if page else None,
+            "tasks": reached.total,
+            "there_before": reached.before,
+            "done": reached.done,
+            "missing": reached.missing,
+            "failed": [{name: row[name] for name in row if name != "traceback"} for row in failures],
+            "finished": finished,
+        }
+        print(json.dumps(told))
+    else:
+        before = f", {reached.before:,} of them before" if reached.before else ""
+        say(f"{todo.study.scene}: {reached.before + reached.done:,} of {reached.total:,} tasks are done{before}.")
+        for row in failures[:FAILURES_SHOWN]:
+            say(f"Failed: {_point(todo, row)}: {row['sentence']}")
+        if len(failures) > FAILURES_SHOWN:
+            say(f"and {len(failures) - FAILURES_SHOWN:,} more")
+        if failures:
+            say(f"Tracebacks: {store.path('failures')}; --retry does them again")
+        if not finished:
+            say("Interrupted; the same command goes on with what is missing.")
+        for path in filter(None, (store.path("tasks") if store.done else None, page)):
+            say(f"Written: {path}")
+    raise typer.Exit(130 if not finished else 1 if failures else 0)
+
+
+def _point(todo: Sweep, row: dict[str, Any]) -> str:
+    from overlapper.scenes.parameters import described
+
+    return described(todo.tasks[row["task"]].parameters) or todo.study.scene

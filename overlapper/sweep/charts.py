@@ -1,0 +1,139 @@
+"""What a sweep came to, over its parameters: lines and heat maps, as SVG to stand in a page."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper.install import hint
+
+Values = NDArray[np.float64]
+
+# Values of a parameter that are told apart; more of them, as of a sample, are put into so many bins.
+APART = 24
+BINS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """A column to draw, with what it is called and a factor to its unit."""
+
+    column: str
+    label: str
+    factor: float
+
+
+MEASURES = (
+    Measure("largest_volume_m3", "largest volume, cm³", 1e6),
+    Measure("largest_depth_m", "largest depth, mm", 1e3),
+    Measure("contact_time_s", "time in contact, s", 1.0),
+    Measure("mean_force_m2", "mean force per pressure, mm²", 1e6),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A parameter: the tasks' values put into groups, each with its middle and its edges."""
+
+    name: str
+    group: NDArray[np.intp]
+    middles: Values
+    edges: Values
+    labels: list[str] | None = None
+    log: bool = False
+
+
+def axis(name: str, values: Sequence[Any]) -> Axis:
+    """The axis of a parameter with these values, of which there are at least two."""
+    kinds = sorted(set(values))
+    if not isinstance(kinds[0], float | int) or isinstance(kinds[0], bool):
+        at = {value: k for k, value in enumerate(kinds)}
+        middles = np.arange(len(kinds), dtype=float)
+        return Axis(name, np.array([at[value] for value in values]), middles, _edges(middles), list(map(str, kinds)))
+    found = np.array(values, dtype=float)
+    # Ten times from the least to the largest, in steps that grow: this was meant by factors.
+    log = bool(found.min() > 0 and found.max() >= 10 * found.min() and type(kinds[0]) is float)
+    scaled = np.log(found) if log else found
+    middles = np.unique(scaled)
+    if len(middles) > APART:
+        edges = np.linspace(scaled.min(), scaled.max(), BINS + 1)
+        group = np.clip(np.searchsorted(edges, scaled, side="right") - 1, 0, BINS - 1)
+        middles = (edges[:-1] + edges[1:]) / 2
+    else:
+        edges, group = _edges(middles), np.searchsorted(middles, scaled)
+    back = np.exp if log else np.asarray
+    return Axis(name, group, back(middles), back(edges), log=log)
+
+
+def _edges(middles: Values) -> Values:
+    between = (middles[:-1] + middles[1:]) / 2
+    return np.concatenate([[2 * middles[0] - between[0]], between, [2 * middles[-1] - between[-1]]])
+
+
+def lines(across: Axis, measured: Sequence[tuple[Measure, Values]]) -> str:
+    """Each measure over a parameter: the median of the tasks with a value, and the band that holds all of them."""
+    figure = _figure(3.1 * len(measured), 2.5)
+    for axes, (measure, values) in zip(np.atleast_1d(figure.subplots(1, len(measured))), measured):
+        groups = [values[across.group == k] * measure.factor for k in range(len(across.middles))]
+        there = [k for k, group in enumerate(groups) if len(group)]
+        x = across.middles[there]
+        medians, least, most = ([of(groups[k]) for k in there] for of in (np.median, np.min, np.max))
+        axes.fill_between(x, least, most, alpha=0.2, linewidth=0)
+        axes.plot(x, medians, ".-", markersize=4, linewidth=1.2)
+        axes.set(xlabel=across.name, title=measure.label)
+        _scaled(axes.xaxis, axes.set_xscale, across)
+        axes.grid(alpha=0.3)
+    return _svg(figure)
+
+
+def heat_map(across: Axis, up: Axis, measured: Sequence[tuple[Measure, Values]]) -> str:
+    """The median of each measure for each pair of values of two parameters; what no task has is left white."""
+    figure = _figure(4.2 * len(measured), 3.1)
+    for axes, (measure, values) in zip(np.atleast_1d(figure.subplots(1, len(measured))), measured):
+        cells = np.full((len(up.middles), len(across.middles)), np.nan)
+        for i, j in set(zip(up.group.tolist(), across.group.tolist())):
+            cells[i, j] = np.median(values[(up.group == i) & (across.group == j)]) * measure.factor
+        drawn = axes.pcolormesh(across.edges, up.edges, cells, cmap="viridis", edgecolors="face", linewidth=0.2)
+        figure.colorbar(drawn, ax=axes)
+        axes.set(xlabel=across.name, ylabel=up.name, title=measure.label)
+        _scaled(axes.xaxis, axes.set_xscale, across)
+        _scaled(axes.yaxis, axes.set_yscale, up)
+    return _svg(figure)
+
+
+def _scaled(ticks: Any, set_scale: Any, axis: Axis) -> None:
+    if axis.log:
+        set_scale("log")
+    if axis.labels:
+        ticks.set_ticks(axis.middles, axis.labels)
+
+
+def must_be_there() -> None:
+    """ImportError without matplotlib."""
+    try:
+        import matplotlib.figure  # noqa: F401
+    except ImportError as error:
+        raise ImportError(f"the summary of a sweep needs {hint('matplotlib')}") from error
+
+
+def _figure(width: float, height: float) -> Any:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _svg(figure: Any) -> str:
+    """As an element of a page, of which equal figures are equal."""
+    import matplotlib
+
+    file = io.StringIO()
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "overlapper", "font.size": 8}):
+        figure.savefig(file, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+    svg = file.getvalue()
+    return re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)

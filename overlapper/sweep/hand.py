@@ -1,0 +1,198 @@
+"""A process that does items one after the other, and may raise, hang or die of one without harm to the others.
+
+What is done is a `Job`, and nothing here knows of scenes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import faulthandler
+import os
+import re
+import signal
+import sys
+import time
+import traceback
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any, Literal
+
+from overlapper.printable import first_line
+from overlapper.process import START_LIMIT, Ended, NotStarted, Worker
+
+DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
+
+# s that a process has beyond the limit to end itself, which it does with a traceback.
+GRACE = 10.0
+
+# How often an item may be under way when its process dies: somebody else may have killed it the first time.
+TRIES = 2
+
+TIMED_OUT = re.compile(r"^Timeout \(\d", re.MULTILINE)  # of faulthandler
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is done with every item: `prepare`, a function of a module by names, makes it of `setup` in each process.
+
+    It must find the same bits of an item in whatever process, after whatever others. Paths are meant from `folder`,
+    where there is such a folder.
+    """
+
+    module: str
+    prepare: str
+    setup: Any
+    folder: str = field(default_factory=os.getcwd)
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What was found of an item, in so many seconds."""
+
+    value: Any
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """What became of an item instead, with a sentence and all that is known of where it happened."""
+
+    what: Literal["raised", "hung", "died"]
+    sentence: str
+    traceback: str
+
+
+Outcome = Done | Failed
+
+
+@dataclass(frozen=True, slots=True)
+class _Work:
+    items: tuple[Any, ...]
+    limit: float | None
+
+
+_call: Callable[[Any], Any] | None = None
+
+
+def answers(request: Job | _Work) -> Iterator[Outcome | str]:
+    """The process: what is wrong with a job, or nothing; an outcome for each item of some work."""
+    global _call
+    if isinstance(request, Job):
+        yield _begun(request)
+    else:
+        assert _call
+        for item in request.items:
+            yield _outcome(_call, item, request.limit)
+
+
+def _begun(job: Job) -> str:
+    global _call
+    # Whoever asks may be killed while this process hangs in an item. It is asked for by the thread that reads its
+    # replies, which lives as long.
+    ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
+    faulthandler.enable()
+    warnings.simplefilter("ignore")
+    with contextlib.suppress(OSError):
+        os.chdir(job.folder)
+    try:
+        _call = getattr(import_module(job.module), job.prepare)(job.setup)
+    except Exception as error:
+        return first_line(error)
+    return ""
+
+
+def _outcome(call: Callable[[Any], Any], item: Any, limit: float | None) -> Outcome:
+
+    # What the process has written of earlier items would be taken for words about this one.
+    sys.stderr.flush()
+    os.ftruncate(2, 0)
+    os.lseek(2, 0, os.SEEK_SET)
+    start = time.monotonic()
+    if limit:
+        faulthandler.dump_traceback_later(limit, exit=True)  # also where C does not let Python have a turn
+    try:
+        return Done(call(item), time.monotonic() - start)
+    except Exception as error:
+        return Failed("raised", f"{type(error).__name__}: {first_line(error)}", traceback.format_exc())
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+
+
+class Hand:
+    """Does items in a process of its own, which is started anew when it has ended.
+
+    `limit` is the number of seconds that an item may take. NotStarted if there can be no process for the job.
+    """
+
+    def __init__(self, job: Job, limit: float | None = None) -> None:
+        self._job, self._limit = job, limit
+        self._worker: Worker | None = None
+        self._closed = False
+
+    def work(self, items: Sequence[Any]) -> Iterator[Outcome]:
+        """What becomes of each item, in their order; of the first ones if the hand is closed meanwhile."""
+        left = deque(items)
+        tries = 0
+        while left and not self._closed:
+            try:
+                worker = self._worker = self._worker or self._started()
+                if self._closed:
+                    worker.process.kill()
+                worker.send(_Work(tuple(left), self._limit))
+                while left:
+                    outcome = worker.receive(self._limit and self._limit + GRACE)
+                    left.popleft()
+                    tries = 0
+                    yield outcome
+            except Ended as ended:
+                self._forget()
+                tries += 1
+                failed = _told(ended, self._limit)
+                if not self._closed and (failed.what == "hung" or tries == TRIES):
+                    left.popleft()
+                    tries = 0
+                    yield failed
+
+    def _started(self) -> Worker:
+        try:
+            worker = Worker(answers)
+            worker.send(self._job)
+            complaint = worker.receive(START_LIMIT)
+        except Ended as ended:
+            raise NotStarted(f"a process for the sweep {ended}") from ended
+        if complaint:
+            worker.close()
+            raise NotStarted(f"a process for the sweep could not be prepared: {complaint}")
+        return worker
+
+    def _forget(self) -> None:
+        if self._worker:
+            self._worker.close()
+            self._worker = None
+
+    @property
+    def closed(self) -> bool:
+        """Whether it does no more."""
+        return self._closed
+
+    def stop(self) -> None:
+        """End the process from another thread than that which works, which then ends, too."""
+        self._closed = True
+        if worker := self._worker:
+            worker.process.kill()
+
+    def close(self) -> None:
+        """End the process."""
+        self._closed = True
+        self._forget()
+
+
+def _told(ended: Ended, limit: float | None) -> Failed:
+    words = ended.words.strip()
+    if ended.limit or (limit and TIMED_OUT.search(words)):
+        return Failed("hung", f"it took longer than {limit:g} s", words)
+    return Failed("died", f"its process {ended}", words)

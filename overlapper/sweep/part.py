@@ -1,0 +1,69 @@
+"""A task as the bytes of Parquet files: a row of what it came to, and the rows of the steps that are kept."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from overlapper.install import hint
+from overlapper.scenes.table import COLUMNS
+from overlapper.sweep.measures import MEASURES
+
+if TYPE_CHECKING:
+    from overlapper.scenes.parameters import Parameter
+    from overlapper.scenes.table import Row
+
+# The name of the task, and of the tables in which tasks are.
+TASK = "task"
+TASKS, STEPS, FAILURES = "tasks", "steps", "failures"
+
+# What is said of a task that failed: in how many words of ours, and in its own.
+FAILED: dict[str, type] = {"what": str, "sentence": str, "traceback": str}
+
+OF: dict[str, Mapping[str, type]] = {TASKS: MEASURES, STEPS: COLUMNS, FAILURES: FAILED}
+
+
+def arrow() -> Any:
+    """pyarrow with its Parquet; ImportError without it."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise ImportError(f"a sweep needs {hint('pyarrow')}") from error
+    return pyarrow
+
+
+def must_be_no_columns(defaults: Mapping[str, Parameter]) -> None:
+    """ValueError if a parameter has the name of a column of ours."""
+    for table, columns in OF.items():
+        if taken := defaults.keys() & {TASK, *columns}:
+            raise ValueError(f"the parameter {min(taken)!r} has the name of a column of the table of {table}")
+
+
+def part(
+    table: str,
+    name: str,
+    parameters: Mapping[str, Parameter],
+    rows: Iterable[Row],
+    heading: Mapping[str, str],
+) -> bytes:
+    """A Parquet file with the name and the parameters of a task in every row; equal rows are equal bytes."""
+    pyarrow = arrow()
+    kinds = {int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string(), bool: pyarrow.bool_()}
+    columns = {TASK: str, **{each: type(value) for each, value in parameters.items()}, **OF[table]}
+    schema = pyarrow.schema([(column, kinds[kind]) for column, kind in columns.items()], dict(heading))
+    which = {TASK: name, **parameters}
+    filled = pyarrow.Table.from_pylist([{**which, **row} for row in rows], schema=schema)
+    file = io.BytesIO()
+    many = len(filled) > 1
+    pyarrow.parquet.write_table(
+        filled,
+        file,
+        # Of a single row, all that makes a table small makes it larger, and takes a millisecond.
+        compression="zstd" if many else "none",
+        use_dictionary=many,
+        write_statistics=many,
+        write_page_checksum=True,
+    )
+    return file.getvalue()

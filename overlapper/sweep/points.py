@@ -1,0 +1,139 @@
+"""Where in the space of its parameters a scene is run: grids, seeds, samples and tables of points, crossed."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections import ChainMap
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from overlapper.install import hint
+from overlapper.scenes.parameters import Parameter, known, value_of
+
+Point = dict[str, Parameter]
+
+MOST = 10_000_000  # tasks of a sweep; beyond, somebody has mistyped
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """The parameters of a scene: their defaults, by name."""
+
+    scene: str
+    defaults: Mapping[str, Parameter]
+
+    def grid(self, text: str) -> list[Point]:
+        """A parameter with its values: "friction=0.3,0.5", or so many from one number to another, "mass=0.1:10:20",
+        in equal steps or, with ":log", by equal factors."""
+        name, values = self._named(text, "--grid")
+        default = self.defaults[name]
+        parts = values.split(":")
+        if len(parts) == 1 or isinstance(default, (str, bool)):
+            return [{name: value_of(name, each, default)} for each in values.split(",")]
+        log = parts[-1] == "log"
+        if len(parts) != 3 + log:
+            raise ValueError(f"--grid {text} must be {name}=FROM:TO:COUNT, {name}=FROM:TO:COUNT:log or {name}=A,B,...")
+        low, high = self._bounds(name, parts[:2], log, f"--grid {text}")
+        if not (parts[2].isdecimal() and 0 < (count := int(parts[2])) <= MOST):
+            raise ValueError(f"--grid {text}: the count must be a whole number from 1 to {MOST:,}, not {parts[2]!r}")
+        found = (np.geomspace if log else np.linspace)(low, high, count).tolist()
+        return [{name: round(each) if type(default) is int else each} for each in found]
+
+    def seeds(self, count: int) -> list[Point]:
+        """The parameter `seed` from 0 on."""
+        if type(self.defaults.get("seed")) is not int:
+            raise ValueError(f"--seeds is for scenes with a parameter `seed`, a whole number; {self.scene} has none")
+        return [{"seed": seed} for seed in range(count)]
+
+    def samples(self, count: int, ranges: Sequence[str], seed: int) -> list[Point]:
+        """A Latin hypercube of the ranges, "mass=0.1:10" or, with equal chances by factors, "mass=0.1:10:log"."""
+        if not ranges:
+            raise ValueError("--sample needs a --range NAME=FROM:TO for each parameter that it draws")
+        asked = [self._range(text) for text in ranges]
+        names = [name for name, *_ in asked]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise ValueError(f"--range says {min(twice)} twice")
+        try:
+            from scipy.stats import qmc
+        except ImportError as error:
+            raise ImportError(f"--sample needs {hint('scipy')}") from error
+        drawn = qmc.LatinHypercube(len(asked), seed=seed).random(count)
+        return [dict(zip(names, map(self._drawn, asked, each))) for each in drawn.tolist()]
+
+    def _range(self, text: str) -> tuple[str, float, float, bool]:
+        name, bounds = self._named(text, "--range")
+        parts = bounds.split(":")
+        log = parts[-1] == "log"
+        if isinstance(self.defaults[name], (str, bool)) or len(parts) != 2 + log:
+            raise ValueError(f"--range {text} must be {name}=FROM:TO or {name}=FROM:TO:log, of a number")
+        return name, *self._bounds(name, parts[:2], log, f"--range {text}"), log
+
+    def _drawn(self, asked: tuple[str, float, float, bool], part: float) -> Parameter:
+        name, low, high, log = asked
+        if type(self.defaults[name]) is int:  # of which the first and the last have as much room as the others
+            low, high = low - 0.5 + log * 0.5, high + 0.5
+        value = math.exp(math.log(low) + part * math.log(high / low)) if log else low + part * (high - low)
+        if type(self.defaults[name]) is int:
+            return min(max(round(value), math.ceil(low)), math.floor(high))
+        return min(max(value, low), high)
+
+    def read(self, path: Path) -> list[Point]:
+        """The points of a CSV table: a column for each parameter that is not to be its default."""
+        with path.open(encoding="utf-8", newline="") as file:
+            reader = csv.reader(file)
+            rows = (cells for cells in reader if cells and not cells[0].startswith("#"))
+            names = [name.strip() for name in next(rows, [])]
+            for name in names:
+                known(name, self.defaults, self.scene)
+            if not names or len(set(names)) < len(names):
+                raise ValueError(f"{path} must have the names of parameters in its first line, each once")
+            points: list[Point] = []
+            for cells in rows:
+                if len(cells) != len(names):
+                    raise ValueError(f"{path}, line {reader.line_num}: it has {len(cells)} cells and not {len(names)}")
+                try:
+                    points.append({name: value_of(name, cell, self.defaults[name]) for name, cell in zip(names, cells)})
+                except ValueError as error:
+                    raise ValueError(f"{path}, line {reader.line_num}: {error}") from error
+        if not points:
+            raise ValueError(f"{path} has no points")
+        return points
+
+    def crossed(self, axes: Iterable[Sequence[Point]]) -> list[Point]:
+        """All parameters of each point of the product of the axes, the last one moving fastest; none of them twice."""
+        axes = [*axes]
+        taken: set[str] = set()
+        for axis in axes:
+            if twice := taken & axis[0].keys():
+                raise ValueError(f"{min(twice)} is given by two of --grid, --seeds, --points and --range")
+            taken |= axis[0].keys()
+        if (count := math.prod(map(len, axes))) > MOST:
+            raise ValueError(f"that would be {count:,} tasks, more than {MOST:,}")
+        start = dict(self.defaults)
+        points = ([dict(start, **dict(ChainMap(*parts)))[name] for name in start] for parts in product(*axes))
+        return [dict(zip(start, each)) for each in dict.fromkeys(map(tuple, points))]
+
+    def _named(self, text: str, option: str) -> tuple[str, str]:
+        name, sign, values = text.partition("=")
+        if not (name and sign and values):
+            raise ValueError(f"{option} must be NAME=VALUES, not {text!r}")
+        known(name, self.defaults, self.scene)
+        return name, values
+
+    def _bounds(self, name: str, parts: Sequence[str], log: bool, option: str) -> tuple[float, float]:
+        default = self.defaults[name]
+        try:
+            low, high = (float(value_of(name, part, default)) for part in parts)
+        except ValueError as error:
+            raise ValueError(f"{option}: {error}") from error
+        if not low <= high or (log and low <= 0):
+            above = " above 0" if log else ""
+            raise ValueError(
+                f"{option} must go from a number{above} to a larger one, not from {parts[0]} to {parts[1]}"
+            )
+        return low, high

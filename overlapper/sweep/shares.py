@@ -1,0 +1,44 @@
+"""Items handed out in shares: many at once of those that take milliseconds, and one by one near the end."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Sequence
+
+
+class Shares:
+    """Numbers of items, to be taken by several threads in shares of about `seconds`; each is in one share only."""
+
+    def __init__(self, count: int, takers: int, seconds: float) -> None:
+        self._next, self._count, self._seconds = 0, count, seconds
+        self._takers = takers
+        self._back: deque[int] = deque()
+        self._done, self._spent = 0, 0.0
+        self._lock = threading.Lock()
+
+    def take(self) -> list[int]:
+        """The next share, empty if there is no more."""
+        with self._lock:
+            left = self._count - self._next + len(self._back)
+            # Nobody is to work long when all others are through; before anything is known, a share is one item.
+            fair = max(left // (2 * self._takers), 1)
+            most = int(self._seconds * self._done / self._spent) if self._spent else 1
+            share = []
+            for _ in range(min(left, max(1, min(fair, most)))):
+                if self._back:
+                    share.append(self._back.popleft())
+                else:
+                    share.append(self._next)
+                    self._next += 1
+            return share
+
+    def give_back(self, numbers: Sequence[int]) -> None:
+        """What was taken and not done."""
+        with self._lock:
+            self._back.extend(numbers)
+
+    def learn(self, items: int, seconds: float) -> None:
+        """So many items took so many seconds."""
+        with self._lock:
+            self._done, self._spent = self._done + items, self._spent + seconds

@@ -1,0 +1,133 @@
+"""The folder of a sweep: a part for each task, so that what is there is done, and nothing is there twice.
+
+`tasks.parquet`, `steps.parquet` and `failures.parquet` are folders, which readers take for one table each. A part is
+named by its task and takes its place whole. `sweep.json` says what all of them are of.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from overlapper.sweep.part import FAILURES, STEPS, TASKS
+from overlapper.whole_file import beside
+
+TABLES = (TASKS, STEPS, FAILURES)
+
+MAGIC = b"PAR1"  # with which a Parquet file begins and ends
+
+
+class Store:
+    """The parts in a folder, for one sweep at a time.
+
+    `identity` is what a sweep must have in common with one that is there already. OSError if there can be no such
+    folder, ValueError if it is that of another sweep, or if one is at work in it.
+    """
+
+    def __init__(self, folder: Path, identity: Mapping[str, str]) -> None:
+        self.folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+        # Beside the tables, whose every file readers take for a part.
+        self._begun = folder / ".begun.parquet"
+        self._lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            try:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise ValueError(f"another sweep is at work in {folder}") from error
+            self._belong(identity)
+            self.done, self.failed = (self._names(table) for table in (TASKS, FAILURES))
+            for task in self.done & self.failed:  # a kill came between the two
+                self._recovered(task)
+        except BaseException:
+            os.close(self._lock)
+            raise
+
+    def _belong(self, identity: Mapping[str, str]) -> None:
+        there = self.folder / "sweep.json"
+        try:
+            known = json.loads(there.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            with beside(there) as begun:
+                begun.write_text(json.dumps(dict(identity), indent=1), encoding="utf-8")
+            return
+        except ValueError as error:
+            raise ValueError(f"{there} does not say what is in {self.folder}: give another --out") from error
+        if known == dict(identity):
+            return
+        name = next((each for each in identity if known.get(each) != identity[each]), "scene")
+        if name == "scene file":
+            raise ValueError(f"the scene file is not that of the sweep in {self.folder} any more: give another --out")
+        was, now = known.get(name), identity.get(name)
+        raise ValueError(f"the sweep in {self.folder} is of {name} {was}, not {now}: give another --out")
+
+    def path(self, table: str) -> Path:
+        """Where a table is, if it has any rows."""
+        return self.folder / f"{table}.parquet"
+
+    def _names(self, table: str) -> set[str]:
+        return {part.stem for part in self.path(table).glob("*.parquet") if _whole(part)}
+
+    def keep(self, task: str, parts: Mapping[str, bytes]) -> None:
+        """Put the parts of a task in their places; it is done when the last one is in its own, and failed no more."""
+        for table in sorted(parts, key=TABLES.index, reverse=True):
+            folder = self.path(table)
+            folder.mkdir(exist_ok=True)
+            self._put(parts[table], folder / f"{task}.parquet")
+        if TASKS in parts:
+            self.done.add(task)
+            if task in self.failed:
+                self._recovered(task)
+        else:
+            self.failed.add(task)
+
+    def _recovered(self, task: str) -> None:
+        (self.path(FAILURES) / f"{task}.parquet").unlink()
+        self.failed.discard(task)
+        with suppress(OSError):  # if it has others
+            self.path(FAILURES).rmdir()
+
+    def _put(self, data: bytes, place: Path) -> None:
+        """Without waiting for the disk, which takes longer than many a task: a power cut may leave half of what is
+        seconds old, as a kill does not, and then it is done again."""
+        self._begun.write_bytes(data)
+        os.replace(self._begun, place)
+
+    def rows(self, table: str) -> list[dict[str, Any]]:
+        """All rows of a table, by the names of their tasks; none if there is no such table."""
+        from overlapper.sweep.part import arrow
+
+        if not self.path(table).is_dir():
+            return []
+        rows = arrow().parquet.read_table(self.path(table)).to_pylist()
+        return sorted(rows, key=lambda row: str(row["task"]))
+
+    def close(self) -> None:
+        """Let another sweep at it."""
+        self._begun.unlink(missing_ok=True)
+        os.close(self._lock)
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _whole(part: Path) -> bool:
+    """Whether a part has its end; one that has not is taken away."""
+    with part.open("rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(size - len(MAGIC), 0))
+        if size > 2 * len(MAGIC) and file.read() == MAGIC:
+            return True
+    part.unlink()
+    return False

@@ -1,0 +1,43 @@
+"""A task done, in the process of a hand: the scene is run and its parts are made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import closing
+
+from overlapper.scenes.run import run
+from overlapper.scenes.table import Row, rows
+from overlapper.scenes.table_file import origin
+from overlapper.sweep.measures import Measures
+from overlapper.sweep.part import STEPS, TASKS, part
+from overlapper.sweep.study import Study, Task
+
+Parts = dict[str, bytes]
+
+
+def prepared(study: Study) -> Callable[[Task], Parts]:
+    """What runs the tasks of a study. ValueError where this package or pybullet is of another version."""
+    here = origin()
+    if here != dict(study.versions):
+        raise ValueError(f"the sweep is of {_said(study.versions)}, but here is {_said(here)}")
+    heading = study.identity()
+    settings = dict(study.settings)
+    steps = settings.pop("steps")
+
+    def done(task: Task) -> Parts:
+        scene = study.loaded(task.parameters)
+        measures = Measures()
+        kept: list[Row] = []
+        with closing(run(scene, steps, **settings)) as frames:
+            for frame in frames:
+                measures.add(frame)
+                if study.kept and frame.step % study.kept == 0:
+                    kept += rows(frame.step, frame.time, frame.bodies, frame.contacts)
+        parts = {STEPS: part(STEPS, task.name, task.parameters, kept, heading)} if study.kept else {}
+        return parts | {TASKS: part(TASKS, task.name, task.parameters, [measures.row()], heading)}
+
+    return done
+
+
+def _said(versions: Mapping[str, str]) -> str:
+    return " and ".join(f"{name} {version}" for name, version in versions.items())

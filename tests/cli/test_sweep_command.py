@@ -1,0 +1,101 @@
+"""`overlapper sweep` on the command line: text for people, JSON for programs, a page, and exit codes."""
+
+import json
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from sweeping import BALLS, parts, rows
+
+
+@pytest.fixture(autouse=True)
+def balls(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "balls.py").write_text(BALLS)
+
+
+def sweep(*arguments):
+    command = [sys.executable, "-m", "overlapper", "sweep", "balls.py", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+
+
+def test_a_sweep_says_what_became_of_it_and_writes_a_page_of_it():
+    done = sweep("--grid", "apart=0.1:0.3:3", "--seeds", "2", "--set", "seconds=0", "--out", "runs", "--pages", "1")
+    assert (done.returncode, done.stderr) == (0, "a scene may talk\n")  # for its page, here
+    assert done.stdout == ("balls: 6 of 6 tasks are done.\nWritten: runs/tasks.parquet\nWritten: runs/summary.html\n")
+    page = Path("runs/summary.html").read_text()
+    assert "6 of 6 tasks are done over apart (3), seed (2). Something overlaps in 2 of them." in page
+    # Nothing of it is loaded from elsewhere.
+    assert not re.search(r'(?:src|href)="(?:https?:)?//', page) and "default-src 'none'" in page
+    assert page.count("<svg") == 2 and "largest volume, cm³" in page
+    # The page beside the first command is there; it is what the command writes.
+    worst = min((row for row in rows("runs") if row["worst_step"]), key=lambda row: (row["apart"], row["seed"]))
+    link, command = re.search(r'<a href="([^"]*)">[^<]*</a><br><code>([^<]*)</code>', page).groups()
+    name = f"views/{worst['task'][:12]}.html"
+    assert link == f"{name}#t={1 / 240:.6g}"
+    assert command == f"overlapper view balls.py --set=apart=0.1 --html=runs/{name}"
+    before = Path("runs", name).read_bytes()
+    Path("runs", name).unlink()
+    words = shlex.split(command)
+    subprocess.run([sys.executable, "-m", *words], check=True, capture_output=True)
+    assert len(Path("runs", name).read_bytes()) == len(before)
+
+
+def test_json_says_what_failed_with_exit_code_1():
+    done = sweep("--grid", "fate=good,raises,dies", "--points", "points.csv", "--out", "runs", "--json")
+    assert (done.returncode, done.stderr) == (2, "overlapper: points.csv: No such file or directory\n")
+    Path("points.csv").write_text("apart\n0.1\n0.12\n")
+    done = sweep("--grid", "fate=good,raises", "--points", "points.csv", "--out", "runs", "--json")
+    told = json.loads(done.stdout)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert (told["tasks"], told["done"], told["there_before"], told["missing"]) == (4, 2, 0, 0)
+    assert [(row["apart"], row["what"]) for row in sorted(told["failed"], key=lambda row: row["apart"])] == [
+        (0.1, "raised"),
+        (0.12, "raised"),
+    ]
+    assert told["page"] == "runs/summary.html" and told["finished"] is True
+    assert "<h2>Failed: 2 raised</h2>" in Path("runs/summary.html").read_text()
+    text = sweep("--grid", "fate=good,raises", "--points", "points.csv", "--out", "runs").stdout.splitlines()
+    assert text[0] == "balls: 2 of 4 tasks are done, 2 of them before."
+    assert re.fullmatch(r"Failed: apart=0.1\d*, seed=0, fate=raises, seconds=0.0: .*apart must be more", text[1])
+    assert text[3] == "Tracebacks: runs/failures.parquet; --retry does them again"
+
+
+def test_ctrl_c_ends_a_sweep_that_goes_on_later():
+    words = ["--seeds", "40", "--set", "seconds=0.1", "--out", "runs", "--workers", "2"]
+    command = [sys.executable, "-m", "overlapper", "sweep", "balls.py", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        while not (Path("runs/tasks.parquet").is_dir() and parts("runs")):
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        said, complaints = process.communicate(timeout=60)
+    assert (process.returncode, complaints) == (130, "")
+    assert "Interrupted; the same command goes on with what is missing.\n" in said
+    assert 0 < len(parts("runs")) < 40 and "<h2>The worst tasks</h2>" in Path("runs/summary.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--grid", "mass=1"], "the scene balls has no parameter 'mass' (it has apart=0.15, seed=0, fate=good, "),
+        (["--steps-kept", "some"], "--steps-kept must be summary, 'every N' or all, not 'some'"),
+        (["--steps-kept", "every 0"], "--steps-kept must be summary, 'every N' or all, not 'every 0'"),
+        (["--address", "auto"], "--address is for --engine ray"),
+        (["--range", "apart=0:1"], "--range says what --sample draws, and there is no --sample"),
+    ],
+)
+def test_what_cannot_be_swept_is_refused_in_one_sentence(arguments, sentence):
+    done = sweep(*arguments, "--out", "runs")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"overlapper: {sentence}") and done.stderr.count("\n") == 1
+    assert not Path("runs").exists()
+
+
+def test_a_folder_that_is_none_is_refused():
+    Path("runs").write_text("a file")
+    done = sweep("--out", "runs")
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", "overlapper: runs: File exists\n")

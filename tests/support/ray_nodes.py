@@ -1,0 +1,29 @@
+"""A Ray cluster of two nodes of one CPU each on this machine: python ray_nodes.py
+
+It prints its address. A line "kill" on standard input kills the node that is not the head with all that runs on it, and
+is answered; the end of the input ends the cluster.
+"""
+
+import os
+import sys
+
+
+def main():
+    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+    from ray.cluster_utils import Cluster
+
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    try:
+        node = cluster.add_node(num_cpus=1)
+        cluster.wait_for_nodes()
+        print(cluster.address, flush=True)
+        for line in sys.stdin:
+            if line == "kill\n":
+                cluster.remove_node(node, allow_graceful=False)
+                print("killed", flush=True)
+    finally:
+        cluster.shutdown()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,134 @@
+"""The engine of a Ray cluster: the same bits as on one machine, whatever becomes of a node."""
+
+import json
+import subprocess
+import sys
+import types
+from contextlib import closing
+
+import psutil
+import pytest
+import ray_nodes
+from sweeping import begun, parts
+
+from overlapper.process import NotStarted
+from overlapper.sweep.cluster import LOSSES, Cluster
+from overlapper.sweep.hand import Done, Job
+
+
+@pytest.mark.usefixtures("balls")
+def test_a_cluster_finds_the_same_bits_while_a_node_is_killed(undisturbed):
+    pytest.importorskip("ray")
+    nodes = [sys.executable, ray_nodes.__file__]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(nodes, text=True, **pipes) as cluster:
+        address = cluster.stdout.readline().strip()
+        process = begun("runs", address)
+        # What a node runs that is killed goes with it: its hands, too.
+        hands = [each for each in psutil.Process(cluster.pid).children(True) if "serve" in " ".join(each.cmdline())]
+        cluster.stdin.write("kill\n")
+        cluster.stdin.flush()
+        assert cluster.stdout.readline() == "killed\n"
+        assert 0 < len(parts("runs")) < 60
+        assert process.wait(60) == 0
+        assert parts("runs") == undisturbed
+        # What fails of a task is as on one machine, on what is left of the cluster.
+        words = ["sweep", "balls.py", "--grid", "fate=good,raises,hangs in C,dies", "--limit", "3", "--out", "fates"]
+        words += ["--engine", "ray", "--address", address, "--json"]
+        done = subprocess.run([sys.executable, "-m", "overlapper", *words], capture_output=True, text=True, timeout=120)
+        told = json.loads(done.stdout)
+        assert (done.returncode, told["done"], told["missing"]) == (1, 1, 0)
+        assert {row["fate"]: row["what"] for row in told["failed"]} == {
+            "raises": "raised",
+            "hangs in C": "hung",
+            "dies": "died",
+        }
+        cluster.stdin.close()
+    assert not psutil.wait_procs(hands, timeout=20)[1]
+
+
+class Ray(types.ModuleType):
+    """A cluster of one machine that loses the first so many shares."""
+
+    def __init__(self, lost=0):
+        super().__init__("ray")
+        self.lost, self.cancelled = lost, []
+        self.exceptions = types.SimpleNamespace(RayError=ConnectionError, RayTaskError=KeyError)
+
+    def init(self, address, **_):
+        if address == "nowhere:1":
+            raise ConnectionError("nobody is there.\nAt all")
+
+    def cluster_resources(self):
+        return {"CPU": 2.0}
+
+    def remote(self, **_):
+        return lambda function: types.SimpleNamespace(remote=lambda *arguments: Share(function, arguments))
+
+    def wait(self, shares, num_returns):
+        return shares[:num_returns], shares[num_returns:]
+
+    def get(self, share):
+        if self.lost:
+            self.lost -= 1
+            raise ConnectionError("the node died.")
+        try:
+            return share.function(*share.arguments)
+        except NotStarted as error:
+            failed = KeyError()
+            failed.cause = error
+            raise failed from error
+
+    def cancel(self, share, force):
+        self.cancelled.append(share)
+
+    def shutdown(self):
+        pass
+
+
+class Share:
+    def __init__(self, function, arguments):
+        self.function, self.arguments = function, arguments
+
+
+@pytest.fixture
+def ray(monkeypatch):
+    module = Ray()
+    monkeypatch.setitem(sys.modules, "ray", module)
+    return module
+
+
+def test_shares_that_are_lost_are_sent_once_more(ray):
+    ray.lost = 3
+    with closing(Cluster()) as cluster:
+        assert cluster.workers == 2
+        found = [*cluster.outcomes(Job("jobs", "doing", "x"), [("give", k) for k in range(30)])]
+    assert sorted((number, outcome.value[1]) for number, outcome in found) == [(k, k) for k in range(30)]
+    assert all(isinstance(outcome, Done) for _, outcome in found)
+
+
+def test_a_cluster_that_loses_all_it_is_given_is_refused(ray):
+    ray.lost = 10 * LOSSES
+    with (
+        closing(Cluster(workers=2)) as cluster,
+        pytest.raises(NotStarted, match=r"^the cluster loses what it is given: "),
+    ):
+        [*cluster.outcomes(Job("jobs", "doing", "x"), [("give", k) for k in range(30)])]
+    assert ray.cancelled
+
+
+def test_a_job_that_cannot_be_prepared_is_refused(ray):
+    words = r"^a process for the sweep could not be prepared: there is no such thing$"
+    with closing(Cluster()) as cluster, pytest.raises(NotStarted, match=words):
+        [*cluster.outcomes(Job("jobs", "doing", "never"), [("give", 1)])]
+
+
+def test_a_cluster_that_is_not_there_is_refused(ray):
+    with pytest.raises(NotStarted, match=r"^there is no Ray cluster at nowhere:1: nobody is there$"):
+        Cluster("nowhere:1")
+
+
+def test_the_engine_names_what_is_to_be_installed(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(ImportError, match=r"^the engine 'ray' needs ray: pip install ray$"):
+        Cluster()
