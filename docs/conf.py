@@ -1,9 +1,11 @@
 """The site: `make docs` writes it to build/docs. Pages are those that are read in the repository, as they are."""
 
+import html
 import inspect
 import os
 import re
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -59,7 +61,7 @@ def mapped(text, base, page):
         file = (base / path).resolve()
         if not file.exists():
             raise FileNotFoundError(f"{page} links to {link}, which does not exist")
-        if file.suffix == ".md" and file.parent == DOCS:
+        if file.suffix == ".md" and file.is_relative_to(DOCS):
             return f"[{words}]({os.path.relpath(file, DOCS / Path(page).parent)}{anchor and '#' + anchor})"
         if file in SHOWN:
             return f'<a href="{os.path.relpath("files", Path(page).parent)}/{file.name}">{words}</a>'
@@ -72,10 +74,20 @@ def mapped(text, base, page):
 
 
 def read_source(app, docname, source):
-    """The first page is the README, with the contents of the site below it."""
+    """The first page is the README, with the contents of the site below it; that of the commands is their own words."""
     source[0] = mapped(source[0], (DOCS / docname).parent, docname)
+    if docname == "reference/commands":
+        source[0] += commands()
     if docname == "index":
         source[0] = mapped((ROOT / "README.md").read_text(encoding="utf-8"), ROOT, docname) + source[0]
+
+
+def commands():
+    """What every command says with --help, as Markdown below the title of a page."""
+    command = [sys.executable, "-m", "typer", "overlapper.cli.app", "utils", "docs", "--name", "overlapper"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    said = re.sub(r'<span style="font-weight: bold">(.*?)</span>', r"`\1`", said)
+    return html.unescape(said.partition("\n")[2])
 
 
 def bring_files(app, error):

@@ -23,6 +23,20 @@ def test_every_picture_that_is_shown_has_its_maker():
     assert {Path(name).name for name in shown} == {picture for maker in pictures.MAKERS for picture in maker.pictures}
 
 
+PAGES = sorted(ROOT.glob("docs/*.md"))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_a_page_names_the_command_that_makes_its_pictures(page):
+    """Itself, or by a link to the page that it is from."""
+    text = page.read_text("utf-8")
+    for picture in re.findall(r"!\[[^]]*\]\(([^):]+)\)", text):
+        (script,) = (maker.command.split()[0] for maker in pictures.MAKERS if picture in maker.pictures)
+        named = rf"(python {re.escape(script)}|overlapper {Path(script).stem})\b"
+        linked = [ROOT / "docs" / name for name in re.findall(r"\]\((\w+\.md)\)", text)]
+        assert any(re.search(named, each.read_text("utf-8")) for each in (page, *linked)), picture
+
+
 @pytest.fixture
 def gallery(tmp_path, monkeypatch):
     """One picture, made from a script and a text."""

@@ -121,7 +121,7 @@ def check_balance(planes: tuple[OwnedPlane, ...]) -> None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Separated(Short):
-    """At most four planes that no point can be below: their normals add up to zero, their offsets to less.
+    """No point is below all of at most four `planes` of `shapes`: normals add up to zero, offsets to less.
 
     Of a pair these are the two sides of a gap. (The weights of Farkas' lemma are in the lengths of the normals.)
     """
@@ -130,6 +130,7 @@ class Separated(Short):
     planes: tuple[OwnedPlane, ...]
 
     def verify(self) -> Bounds:
+        """Bounds of the volume, m³, that follow from the shapes alone; CertificateError names what does not hold."""
         check_planes(self.shapes, self.planes)
         check_balance(self.planes)
         require(sum(plane.offset for plane in self.planes) < 0, "offsets must add up to less than zero")
@@ -140,8 +141,8 @@ class Separated(Short):
 class Touching(Short):
     """Nearly a gap and nearly a common point.
 
-    At most four planes whose normals add up to zero leave no room for a ball larger than `inradius`. `point` (3,) is no
-    farther than `miss` from each of the points `nearest` (m, 3), which lie one in each body.
+    At most four `planes` of `shapes`, whose normals add up to zero, leave no room for a ball larger than `inradius`.
+    `point` (3,) is no farther than `miss` from each of the points `nearest` (m, 3), which lie one in each body.
     """
 
     shapes: tuple[Placed, ...]
@@ -152,6 +153,7 @@ class Touching(Short):
     miss: Fraction
 
     def verify(self) -> Bounds:
+        """Bounds of the volume, m³, that follow from the shapes alone; CertificateError names what does not hold."""
         check_planes(self.shapes, self.planes)
         check_balance(self.planes)
         require_number(self.inradius)
@@ -197,7 +199,8 @@ class Overlapping(Short):
     A ball of radius `margin` about `point` (3,) lies in all bodies. Polygons `rings[k]` of `vertices` (n, 3),
     counter-clockwise from outside, surround the point; number k lies in plane `facet[k]`, to rounding. `pull[v]` is in
     (0, 1]: at that share of the way from `point` to vertex v lies a point of all bodies. The polytope of the vertices,
-    shrunk by `inner_scale` about `point`, therefore fits into all bodies.
+    shrunk by `inner_scale` about `point`, therefore fits into all bodies. `planes` are those of the bodies, of which
+    each bounds one of `shapes`.
     """
 
     shapes: tuple[Placed, ...]
@@ -211,10 +214,12 @@ class Overlapping(Short):
 
     @property
     def inner_scale(self) -> Fraction:
+        """The least of `pull`."""
         scale: Fraction = self.pull.min()
         return scale
 
     def verify(self) -> Bounds:
+        """Bounds of the volume, m³, that follow from the shapes alone; CertificateError names what does not hold."""
         check_planes(self.shapes, self.planes)
         count = len(self.pull) if type(self.pull) is np.ndarray and self.pull.ndim == 1 else 0
         require_array("pull", self.pull, count)
@@ -279,7 +284,7 @@ class Overlapping(Short):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bracketed(Short):
-    """The volume that two bodies share, round ones among them, is not below `lower` and not above `upper`, in m³.
+    """The volume that two `shapes` share, round ones among them, is not below `lower` and not above `upper`, in m³.
 
     The check computes the volume anew from the numbers of the shapes, in ball arithmetic with as many bits as it takes
     to tell (see `overlapper.proof.volume`); it needs python-flint, whose number of bits all threads share: one check at
@@ -291,6 +296,7 @@ class Bracketed(Short):
     upper: Fraction
 
     def verify(self) -> Bounds:
+        """Bounds of the volume, m³, that follow from the shapes alone; CertificateError names what does not hold."""
         require_bodies(self.shapes)
         require(len(self.shapes) == 2, "shapes must be two bodies")
         require_number(self.lower)

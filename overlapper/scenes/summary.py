@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class PairSummary:
-    """Two links over a run: in how many steps they overlap, and the figures of the largest overlap, with its step.
+    """Two links over a run, by their `names`: in how many `steps` they overlap, and the figures of the worst.
 
-    Volumes are in m³ and of the links as a whole, where the shapes of one overlap each other counted once. Depths are
-    in m and of two of their shapes; `normal` is that of the largest, from the second link to the first.
+    `volume`, with its `volume_error`, is the largest, in m³ and of the links as a whole, where the shapes of one
+    overlap each other counted once; `volume_step` is the step in which it was met. `depth`, met in `depth_step`, is the
+    largest of two of their shapes, in m, and `normal` is its normal, from the second link to the first.
     """
 
     names: tuple[str, str]
@@ -53,7 +54,12 @@ class Disagreement:
 
 @dataclass(slots=True)
 class Summary:
-    """The frames of a run, taken in one by one."""
+    """The frames of a run, taken in one by one.
+
+    `scene` is what was run, for `steps` steps and `seconds` of simulated time. `pairs` has a `PairSummary` by (bodyA,
+    linkA, bodyB, linkB); `report`, `skipped` and `decomposed` are those of `Bodies`, summed up or as they are in the
+    end. If FCL was asked, `verdicts` counts what it said, and `disagreements` says where it differs.
+    """
 
     scene: str
     steps: int = 0

@@ -19,9 +19,9 @@ STATUS = np.array(["separated", "touching", "overlapping"])  # by the numbers of
 class Contact:
     """Two shapes that overlap or touch; `overlap.status` says which.
 
-    Bodies and links are pybullet's indices, link -1 is the base, shapes are counted within their link. A is the lesser
-    of the two; `overlap.shapes[0]` is A's, so that `overlap.normal` points from B to A as pybullet's contactNormalOnB
-    does.
+    Bodies (`bodyA`, `bodyB`) and links (`linkA`, `linkB`) are pybullet's indices, link -1 is the base, and shapes
+    (`shapeA`, `shapeB`) are counted within their link. A is the lesser of the two; `overlap.shapes[0]` is A's, so that
+    `overlap.normal` points from B to A as pybullet's contactNormalOnB does.
     """
 
     bodyA: int

@@ -22,9 +22,10 @@ if TYPE_CHECKING:
 class LinkContact:
     """Two links of which shapes overlap or touch. True only if they overlap.
 
-    `contacts` are the pairs of their shapes, and `deepest` is the one of them with the largest depth: its depth and
-    normal, from B to A, are those of the links where one pair of shapes overlaps, and otherwise a lower bound of how
-    far the links must be moved apart, and a first guess of where to.
+    `bodyA`, `linkA`, `bodyB` and `linkB` are pybullet's indices, link -1 is the base. `overlap` is what the unions of
+    their shapes share, `contacts` are the pairs of their shapes, and `deepest` is the one of them with the largest
+    depth: its depth and normal, from B to A, are those of the links where one pair of shapes overlaps, and otherwise a
+    lower bound of how far the links must be moved apart, and a first guess of where to.
     """
 
     bodyA: int
@@ -39,6 +40,7 @@ class LinkContact:
 
     @property
     def status(self) -> Literal["touching", "overlapping"]:
+        """Overlapping, if any pair of their shapes is."""
         return "overlapping" if self else "touching"
 
     @property
@@ -70,6 +72,7 @@ class LinkContact:
 
     @property
     def deepest(self) -> Contact:
+        """The pair of shapes with the largest depth."""
         return max(self.contacts, key=lambda contact: contact.overlap.depth or 0.0)
 
     @property

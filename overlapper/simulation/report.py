@@ -9,10 +9,11 @@ from dataclasses import dataclass
 class Report:
     """How little of a scene had to be modelled.
 
-    `shapes` counts those of the scene, `shapes_read` those modelled. The rest is of the last `overlaps()`:
+    `bodies` and `shapes` count those of the scene, `shapes_read` those modelled. The rest is of the last `overlaps()`:
     `pairs_possible` are the pairs of modelled shapes it was asked about, by default those that the simulator lets
-    collide, then follow pairs whose boxes meet, pairs that overlap, those of them that were measured again in wider
-    arithmetic (see `Overlap.widened`), facets that took part, and planes asked for (see `Overlaps.planes_asked`).
+    collide, `pairs_examined` those whose boxes meet, `pairs_overlapping` those that overlap, and `pairs_widened` those
+    of them that were measured again in wider arithmetic (see `Overlap.widened`); `facets_touched` took part, and
+    `planes_asked` were asked for (see `Overlaps.planes_asked`).
 
     `pairs_within_margins` are the pairs of links, of those asked about, between which pybullet has contact points and
     `overlaps()` found nothing, as the margins that Bullet lays around hulls hold them apart. With surface="margin"

@@ -41,11 +41,12 @@ MANY_FACETS = 100  # more than that are only of what is round
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What is drawn of each polytope. Colours are written #rrggbb; without them, each has its own.
+    """What is drawn of each polytope: its `faces`, `edges` and `vertices`.
 
-    `opacity` is that of the faces. `front` is the colour of faces seen from outside, `back` of those seen from inside,
-    which are drawn where they can be seen: overlaps' own are a shade of their owners', bodies have none of their own.
-    `marks` are the patch outline and the normal of an overlap.
+    Colours are written #rrggbb; without them, each has its own. `opacity`, from 0 to 1, is that of the faces. `front`
+    is the colour of faces seen from outside, `back` of those seen from inside, which are drawn where they can be seen:
+    overlaps' own are a shade of their owners', bodies have none of their own. `marks` are the patch outline and the
+    normal of an overlap.
     """
 
     faces: bool = True

@@ -23,7 +23,11 @@ BASE = -1
 
 @dataclass(frozen=True, slots=True)
 class Skipped:
-    """Shapes of one link (-1 is the base) that are not modelled; `body` is -1 if pybullet gives them no id."""
+    """Shapes of one link that are not modelled, and why.
+
+    `body` and `link` are pybullet's indices: link -1 is the base, body -1 one to which pybullet gives no id. `name` is
+    what the link is called, `reason` one sentence.
+    """
 
     body: int
     link: int
@@ -33,8 +37,9 @@ class Skipped:
 
 @dataclass(frozen=True, slots=True)
 class Decomposed:
-    """A concave mesh of one link (-1 is the base), modelled as the union of convex parts: the shapes `shapes` of it.
+    """A concave mesh of one link, modelled as the union of convex parts: the shapes `shapes` of it.
 
+    `body` and `link` are pybullet's indices, link -1 is the base; `name` is what the link is called.
     `volume` (m³) is that of the parts together, `mesh_volume` what the mesh bounds; None where its surface is open or
     turns both ways. `path` is where the parts are kept on disk, None if the mesh had them already and they are exact.
     """
