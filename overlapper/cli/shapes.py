@@ -44,7 +44,8 @@ def shapes(
 
     [bold]overlapper shapes humanoid.xml --self-collision --json[/bold]
     """
-    from overlapper.simulation.inventory import NotRead, inventory
+    from overlapper.simulation.inventory import inventory
+    from overlapper.simulation.model_file import NotRead
 
     try:
         found = inventory(file, self_collision, surface=surface, concave=concave, concave_threshold=concave_threshold)

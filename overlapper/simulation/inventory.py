@@ -1,11 +1,10 @@
 """What is modelled of a file that pybullet can load: every shape, and which links the simulator lets collide.
 
-It is read in a process of its own, as pybullet dies of some files.
+It is read in a process of its own (`overlapper.simulation.model_file`).
 """
 
 from __future__ import annotations
 
-import signal
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
@@ -15,19 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere
-from overlapper.process import Ended, Worker
 from overlapper.quaternion import composed, rotated
+from overlapper.simulation.model_file import NotRead, load, read_apart
 
 if TYPE_CHECKING:
     from overlapper.simulation.extraction.model import Concave, Surface
 
 Listed = dict[tuple[int, int], list[Placed]]
-
-ENDINGS = (".urdf", ".sdf", ".xml", ".bullet")
-
-
-class NotRead(Exception):
-    """A file of which pybullet makes nothing; the message is one sentence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,22 +76,7 @@ def inventory(path: Path, self_collision: bool = False, **settings: Any) -> Inve
     With `self_collision` a URDF or MJCF model is loaded with pybullet's URDF_USE_SELF_COLLISION. NotRead if the file is
     not there, or pybullet refuses it or dies of it.
     """
-    if path.suffix.lower() not in ENDINGS:
-        raise NotRead(f"the name must end in {', '.join(ENDINGS)}, and {path.name!r} does not")
-    if not path.is_file():
-        raise NotRead(f"there is no file {path}")
-    try:
-        with Worker(_answers) as worker:
-            worker.send((path, self_collision, settings))
-            found: Inventory | str = worker.receive()
-    except Ended as ended:
-        if ended.code is not None and ended.code < 0:
-            raise NotRead(f"pybullet dies of {path} with signal {signal.Signals(-ended.code).name}") from None
-        if not ended.words:
-            raise NotRead(f"{path} cannot be read: the process that reads it {ended}") from None
-        raise RuntimeError(f"the process that reads {path} {ended}:\n{ended.words}") from None
-    if isinstance(found, str):
-        raise NotRead(f"{path} cannot be read: {found}")
+    found: Inventory = read_apart(path, _answers, (path, self_collision, settings))
     return found
 
 
@@ -119,7 +97,7 @@ def _read(path: Path, self_collision: bool, settings: dict[str, Any]) -> Invento
 
     client = pybullet.connect(pybullet.DIRECT)
     with Recorder(client) as recorder:
-        _load(path, self_collision, client)
+        load(path, client, pybullet.URDF_USE_SELF_COLLISION if self_collision else 0)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of shapes left out, which the inventory names
             bodies = Bodies(client, recorder=recorder, **settings)
@@ -190,24 +168,6 @@ def _links(
     return tuple(
         ListedLink(*key, names[key], tuple(map(_listed, shapes)), meets[key]) for key, shapes in listed.items()
     )
-
-
-def _load(path: Path, self_collision: bool, client: int) -> None:
-    import pybullet
-    import pybullet_data
-
-    pybullet.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
-    flags = pybullet.URDF_USE_SELF_COLLISION if self_collision else 0
-    try:
-        match path.suffix.lower():
-            case ".urdf":
-                pybullet.loadURDF(str(path), flags=flags, physicsClientId=client)
-            case ".xml":
-                pybullet.loadMJCF(str(path), flags=flags, physicsClientId=client)
-            case _:
-                pybullet.loadSDF(str(path), physicsClientId=client)
-    except pybullet.error as error:
-        raise NotRead(f"pybullet says {str(error).strip().rstrip('.')!r}") from error
 
 
 def _listed(placed: Placed) -> ListedShape:

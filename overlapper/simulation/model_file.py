@@ -1,0 +1,66 @@
+"""Files that pybullet loads, read in a process of its own, as pybullet dies of some."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from overlapper.process import Ended, Worker
+
+ENDINGS = (".urdf", ".sdf", ".xml", ".bullet")
+
+
+class NotRead(Exception):
+    """A file of which pybullet makes nothing; the message is one sentence."""
+
+
+def read_apart(
+    path: Path,
+    answers: Callable[[Any], Iterator[Any]],
+    request: tuple[Any, ...],
+    endings: Sequence[str] = ENDINGS,
+) -> Any:
+    """The one reply of `answers` to a request, in a process of its own; a text is the reason why there is none.
+
+    NotRead if the file is not there, or pybullet refuses it or dies of it.
+    """
+    if path.suffix.lower() not in endings:
+        raise NotRead(f"the name must end in {', '.join(endings)}, and {path.name!r} does not")
+    if not path.is_file():
+        raise NotRead(f"there is no file {path}")
+    try:
+        with Worker(answers) as worker:
+            worker.send(request)
+            found = worker.receive()
+    except Ended as ended:
+        if ended.code is not None and ended.code < 0:
+            raise NotRead(f"pybullet dies of {path} with signal {signal.Signals(-ended.code).name}") from None
+        if not ended.words:
+            raise NotRead(f"{path} cannot be read: the process that reads it {ended}") from None
+        raise RuntimeError(f"the process that reads {path} {ended}:\n{ended.words}") from None
+    if isinstance(found, str):
+        raise NotRead(f"{path} cannot be read: {found}")
+    return found
+
+
+def load(path: Path, client: int, flags: int = 0) -> None:
+    """Load a URDF, SDF or MJCF file, by its ending; `flags` are those of loadURDF and loadMJCF.
+
+    Models of pybullet_data are found by their names. NotRead if pybullet refuses it.
+    """
+    import pybullet
+    import pybullet_data
+
+    pybullet.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
+    try:
+        match path.suffix.lower():
+            case ".urdf":
+                pybullet.loadURDF(str(path), flags=flags, physicsClientId=client)
+            case ".xml":
+                pybullet.loadMJCF(str(path), flags=flags, physicsClientId=client)
+            case _:
+                pybullet.loadSDF(str(path), physicsClientId=client)
+    except pybullet.error as error:
+        raise NotRead(f"pybullet says {str(error).strip().rstrip('.')!r}") from error
