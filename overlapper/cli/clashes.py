@@ -14,7 +14,14 @@ from rich.table import Table
 from rich.text import Text
 
 from overlapper.cli.figures import ROUNDED_UP, VOLUME_UNITS, volume_unit
-from overlapper.cli.options import HtmlOption, ThresholdOption, refuse_out_of_range
+from overlapper.cli.options import (
+    ExpectOption,
+    HtmlOption,
+    LeastDepthOption,
+    ThresholdOption,
+    expected_pairs,
+    refuse_out_of_range,
+)
 from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say
 from overlapper.printable import printable
 
@@ -37,13 +44,8 @@ def clashes(
     units: Annotated[
         Literal["mm", "cm", "m", "in"], typer.Option(help="Of files that do not say theirs, as STL, OBJ and PLY.")
     ] = "m",
-    least_depth: Annotated[
-        float, typer.Option(min=0.0, help="Depth in m below which an overlap is no clash.", show_default=False)
-    ] = 0.0,
-    expect: Annotated[
-        list[str] | None,
-        typer.Option(metavar="A,B", help="Two that may overlap; * is any text; may be repeated.", show_default=False),
-    ] = None,
+    least_depth: LeastDepthOption = 0.0,
+    expect: ExpectOption = None,
     concave: Annotated[
         Literal["decompose", "enclose"],
         typer.Option(help="Concave meshes as convex parts; open ones, too, with walls around them."),
@@ -72,7 +74,7 @@ def clashes(
     from overlapper.whole_file import must_be_writable
 
     refuse_out_of_range(0.5, concave_threshold, out)
-    pairs = [_expected(each) for each in expect or ()]
+    pairs = expected_pairs(expect)
     settings: dict[str, Any] = {
         "units": units,
         "least_depth": least_depth,
@@ -116,13 +118,6 @@ def clashes(
         for failure in found.failures:
             say(f"overlapper: {failure}", sys.stderr)
     raise typer.Exit(code)
-
-
-def _expected(text: str) -> tuple[str, str]:
-    first, comma, second = text.partition(",")
-    if not (first and comma and second):
-        raise Refused(f"--expect must be two names with a comma between them, not {text!r}")
-    return first, second
 
 
 def body_facts(body: Body) -> dict[str, Any]:

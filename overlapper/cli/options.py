@@ -61,6 +61,26 @@ def given_parameters(settings: Sequence[str] | None) -> dict[str, str]:
     return given
 
 
+LeastDepthOption = Annotated[
+    float, typer.Option(min=0.0, help="Depth in m below which an overlap is none to worry about.", show_default=False)
+]
+
+ExpectOption = Annotated[
+    list[str] | None,
+    typer.Option(metavar="A,B", help="Two that may overlap; * is any text; may be repeated.", show_default=False),
+]
+
+
+def expected_pairs(given: list[str] | None) -> list[tuple[str, str]]:
+    """What --expect was given."""
+    from overlapper.scenes.allowed import allowed_pair
+
+    try:
+        return [allowed_pair(each) for each in given or ()]
+    except ValueError as error:
+        raise Refused(str(error)) from error
+
+
 def refuse_out_of_range(tolerance: float, concave_threshold: float, out: Path | None) -> None:
     """Refuse what types cannot."""
     from overlapper.scenes.table_file import TABLES

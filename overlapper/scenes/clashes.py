@@ -13,7 +13,6 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Literal
 
@@ -26,6 +25,7 @@ from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, Surface,
 from overlapper.polytopes.mesh_file import ASSEMBLIES, BODIES, Part, read_parts
 from overlapper.polytopes.mesh_overlap import mesh_overlap, window
 from overlapper.printable import first_line
+from overlapper.scenes.allowed import is_allowed, must_name_some
 from overlapper.scenes.still import Still
 from overlapper.scenes.table import Row
 from overlapper.scenes.table_file import TABLES, origin
@@ -157,9 +157,7 @@ def clashes(
     lays walls around what is open. `least_depth` (m) is the least of a clash, and `expected` are pairs of names that
     may overlap, as fnmatch has them. ValueError for one that names no body.
     """
-    for pattern in (each for pair in expected for each in pair):
-        if not any(fnmatchcase(name, pattern) for name, _ in parts):
-            raise ValueError(f"no body is called {pattern!r}")
+    must_name_some(expected, [name for name, _ in parts], "body")
     found = Clashes([], [], [], [])
     hulls: list[Hull] = []
     for name, part in parts:
@@ -382,9 +380,5 @@ def _clash(
 
 def _expected(clash: Clash, expected: Sequence[tuple[str, str]]) -> Clash:
     """With its status, if somebody has said that the two may overlap."""
-    for patterns in expected:
-        if clash.status == "clash" and any(
-            all(map(fnmatchcase, names, patterns)) for names in (clash.names, clash.names[::-1])
-        ):
-            return replace(clash, status="expected")
-    return clash
+    may = clash.status == "clash" and is_allowed(clash.names, expected)
+    return replace(clash, status="expected") if may else clash
