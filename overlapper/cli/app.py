@@ -1,4 +1,4 @@
-"""The command line: scripts watched; scenes run, seen, listed, checked, compared; shapes, polytopes, hard cases."""
+"""The command line: scripts watched; scenes run, seen, listed, checked, compared; robots, shapes, polytopes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from overlapper import __version__
+from overlapper.cli.audit import audit
 from overlapper.cli.bench import chart, stability
 from overlapper.cli.check import check, diff
 from overlapper.cli.clashes import clashes
@@ -74,5 +75,5 @@ def scenes() -> None:
 
 # What stands behind a script is the script's.
 app.command(context_settings={"allow_interspersed_args": False})(watch)
-for command in (scenes, run, sweep, view, check, diff, intersect, clashes, shapes, stability, chart):
+for command in (scenes, run, sweep, view, check, diff, intersect, clashes, shapes, audit, stability, chart):
     app.command()(command)

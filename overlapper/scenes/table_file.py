@@ -68,9 +68,9 @@ class CsvTable:
     """
 
     def __init__(
-        self, path: Path, metadata: Mapping[str, str] | None = None, columns: Sequence[str] = tuple(COLUMNS)
+        self, path: Path, metadata: Mapping[str, str] | None = None, columns: Iterable[str] = tuple(COLUMNS)
     ) -> None:
-        self._columns, self._place = columns, path
+        self._columns, self._place = list(columns), path
         self._path = claim(path)
         self._empty = True
         try:
@@ -84,7 +84,7 @@ class CsvTable:
             self._seal = self._file.tell()
             self._write([_seal()])
             self._body = self._file.tell()
-            self._write([",".join(columns)])
+            self._write([",".join(self._columns)])
         except BaseException:
             self.leave()
             raise
@@ -221,11 +221,13 @@ class ParquetTable:
     PART = 4_000  # rows, above which the next file is begun: the last one is written anew every step, in milliseconds
     GROUP = 20_000  # rows; a row group of a few megabytes, as Parquet's readers expect
 
-    def __init__(self, path: Path, metadata: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self, path: Path, metadata: Mapping[str, str] | None = None, columns: Mapping[str, type] = COLUMNS
+    ) -> None:
         self._arrow: Any = _arrow()
         pyarrow = self._arrow
         kinds = {int: pyarrow.int32(), float: pyarrow.float64(), str: pyarrow.string()}
-        self._schema = pyarrow.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()], metadata)
+        self._schema = pyarrow.schema([(name, kinds[kind]) for name, kind in columns.items()], metadata)
         self._place, self._empty = path, True
         self._folder = claim(path, folder=True)
         # Beside the folder, whose every file some readers take for a part of the table: a kill may leave half of one.
@@ -304,20 +306,23 @@ class SqliteTable:
     for them.
     """
 
-    def __init__(self, path: Path, metadata: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self, path: Path, metadata: Mapping[str, str] | None = None, columns: Mapping[str, type] = COLUMNS
+    ) -> None:
+        self._columns = list(columns)
         self._place, self._empty = path, True
         self._path = claim(path)
         # Whoever writes takes care that no two threads do so at once.
         self._connection = sqlite3.connect(self._path, check_same_thread=False)
         kinds = {int: "INTEGER", float: "REAL", str: "TEXT"}
-        columns = ", ".join(f"{name} {kinds[kind]}" for name, kind in COLUMNS.items())
+        declared = ", ".join(f"{name} {kinds[kind]}" for name, kind in columns.items())
         try:
             with _named(path, sqlite3.Error), self._connection:
                 self._connection.execute("PRAGMA journal_mode = WAL")
                 # With a log, this loses no transaction to a kill and corrupts nothing in a power cut, and waits for no
                 # disk.
                 self._connection.execute("PRAGMA synchronous = NORMAL")
-                self._connection.execute(f"CREATE TABLE overlaps ({columns})")
+                self._connection.execute(f"CREATE TABLE overlaps ({declared})")
                 self._connection.execute("CREATE TABLE metadata (name TEXT PRIMARY KEY, value TEXT)")
                 self._connection.executemany("INSERT INTO metadata VALUES (?, ?)", (metadata or {}).items())
         except BaseException:
@@ -325,8 +330,8 @@ class SqliteTable:
             raise
 
     def write(self, rows: Iterable[Row]) -> None:
-        blanks = ", ".join("?" * len(COLUMNS))
-        cells = [[row.get(name) for name in COLUMNS] for row in rows]
+        blanks = ", ".join("?" * len(self._columns))
+        cells = [[row.get(name) for name in self._columns] for row in rows]
         with _named(self._place, sqlite3.Error), self._connection:
             self._connection.executemany(f"INSERT INTO overlaps VALUES ({blanks})", cells)
         self._empty = self._empty and not cells
@@ -355,8 +360,8 @@ class SqliteTable:
         return None if self._empty else self._path
 
 
-# The kinds of table, by the ending of the file's name.
-TABLES: dict[str, Callable[[Path, Mapping[str, str] | None], Table]] = {
+# The kinds of table, by the ending of the file's name: of a path, of metadata, and of columns by name with their types.
+TABLES: dict[str, Callable[..., Table]] = {
     ".csv": CsvTable,
     ".parquet": ParquetTable,
     ".sqlite": SqliteTable,

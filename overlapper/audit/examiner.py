@@ -1,0 +1,147 @@
+"""Which links overlap in a block of configurations: the work that is spread over processes."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import (
+    Batch,
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Overlaps,
+    RoundedHull,
+    Shape,
+    Sphere,
+)
+from overlapper.audit.kinematics import Kinematics
+from overlapper.audit.pairs import LinkPair, link_pairs
+from overlapper.audit.robot import Robot
+from overlapper.audit.sampling import Sampling
+from overlapper.audit.tally import Array, Counts, Seen, Tally
+from overlapper.quaternion import rotated
+
+Mask = NDArray[np.bool_]
+
+AT_ONCE = 16_384  # shapes that are placed at once, so that what is at work stays in the caches
+COMPARED = 1_000_000  # distances between balls at once, likewise
+
+WITH_ADJACENT = 512  # random configurations in which adjacent links are asked for
+SLACK = 1e-12  # of the largest coordinate: some thousand units in the last place, of which kinematics take a few
+
+
+class Examiner:
+    """Looks at blocks of configurations, and keeps one `Batch` from block to block.
+
+    Links that are adjacent overlap by design in most robots, and how depends on the joints between them alone: they are
+    asked for at rest, at the corners and in the first 512 random configurations. Those that no joint moves are asked
+    for at rest. What overlaps by a depth of `least_depth` (m) or less is taken not to.
+    """
+
+    def __init__(self, robot: Robot, sampling: Sampling, tolerance: float = 1e-3, least_depth: float = 0.0) -> None:
+        self.robot, self.sampling = robot, sampling
+        self.tolerance, self.least_depth = tolerance, least_depth
+        self.kinematics = Kinematics(robot)
+        self.pairs = link_pairs(robot)
+        shapes = [each.shape for each in robot.tree.shapes]
+        links = np.array([each.link for each in robot.tree.shapes])
+        first, second = np.triu_indices(len(shapes), 1)
+        places = {pair.links: k for k, pair in enumerate(self.pairs)}
+        pair = np.array([places.get((a, b), -1) for a, b in zip(links[first].tolist(), links[second].tolist())], int)
+        self._first, self._second, self._pair = (each[pair >= 0] for each in (first, second, pair))
+        balls = [ball(shape) for shape in shapes]
+        self._centres, self._radii = np.array([centre for centre, _ in balls]), np.array([r for _, r in balls])
+        self._copies = max(1, AT_ONCE // max(len(shapes), 1))
+        self._batch = Batch(shapes * self._copies)
+        self._positions = np.zeros((self._copies, len(shapes), 3))
+        self._orientations = np.tile([0.0, 0.0, 0.0, 1.0], (self._copies, len(shapes), 1))
+        self._pair_of = np.full((len(shapes),) * 2, -1)
+        self._pair_of[self._first, self._second] = self._pair
+
+    def again(self) -> Examiner:
+        """Another that says the same."""
+        return Examiner(self.robot, self.sampling, self.tolerance, self.least_depth)
+
+    def shape_pairs(self, pair: LinkPair) -> Counts:
+        """(s, 2): the pairs of shapes of two links, as places among the shapes."""
+        among = self._pair == self.pairs.index(pair)
+        return np.stack([self._first[among], self._second[among]], axis=1)
+
+    def __call__(self, block: int) -> Tally:
+        """What is seen in the block of that number."""
+        numbers, configurations = np.array(self.sampling.blocks[block]), self.sampling.block(block)
+        rigid = np.array([pair.rigid for pair in self.pairs], dtype=bool)
+        adjacent = np.array([pair.adjacent for pair in self.pairs], dtype=bool)
+        tally = self._look(numbers[:1], configurations[:1], rigid) if block == 0 else Tally.none(len(self.pairs))
+        alike = int((numbers < self.sampling.first_random + WITH_ADJACENT).sum())
+        cuts = sorted({*range(0, len(numbers), self._copies), alike, len(numbers)})
+        for start, stop in itertools.pairwise(cuts):
+            asked = ~rigid if start < alike else ~rigid & ~adjacent
+            tally += self._look(numbers[start:stop], configurations[start:stop], asked)
+        return tally
+
+    def _look(self, numbers: Counts, configurations: Array, asked: Mask) -> Tally:
+        positions, orientations = self.kinematics.poses(configurations)
+        rows, among = self._near(positions, orientations, np.flatnonzero(asked[self._pair]))
+        n, k = len(numbers), self.kinematics.count
+        # The batch has so many copies of the shapes; those that are left over stay where they were.
+        self._positions[:n], self._orientations[:n] = positions, orientations
+        found = self._batch.overlaps(
+            self._positions.reshape(-1, 3),
+            self._orientations.reshape(-1, 4),
+            np.stack([rows * k + self._first[among], rows * k + self._second[among]], axis=1),
+            self.tolerance,
+            separated=False,
+        )
+        counts = (found.status == Overlaps.OVERLAPPING) & (found.depth > self.least_depth)
+        first, second = found.pairs[counts].T
+        pairs = self._pair_of[first % k, second % k]
+        seen = Seen(pairs, first // k, found.volume[counts], found.depth[counts])
+        return seen.tally(asked, numbers, self.sampling.first_random)
+
+    def _near(self, positions: Array, orientations: Array, wanted: Counts) -> tuple[Counts, Counts]:
+        """Configurations and pairs of shapes, among the `wanted`, whose balls meet: (m,) each."""
+        centres = positions + rotated(orientations, self._centres)
+        slack = SLACK * float(np.abs(centres).max(initial=0.0))
+        columns = np.ascontiguousarray(centres.transpose(2, 1, 0))
+        rows, among = [], []
+        step = max(1, COMPARED // max(len(positions), 1))
+        for start in range(0, len(wanted), step):
+            pairs = wanted[start : start + step]
+            a, b = self._first[pairs], self._second[pairs]
+            squares = sum((axis[a] - axis[b]) ** 2 for axis in columns)
+            reach = self._radii[a] + self._radii[b] + slack
+            pair, row = np.nonzero(squares <= (reach * reach)[:, None])
+            rows.append(row)
+            among.append(pairs[pair])
+        nobody = np.empty(0, dtype=np.int64)
+        return np.concatenate([nobody, *rows]), np.concatenate([nobody, *among])
+
+
+def ball(shape: Shape) -> tuple[Array, float]:
+    """Centre and radius of a ball around a shape; a half-space has one without end."""
+    match shape:
+        case Hull() | RoundedHull():
+            core = shape if isinstance(shape, Hull) else shape.core
+            centre = core.bounds.mean(axis=0)
+            radius = float(np.linalg.norm(core.corners - centre, axis=1).max())
+            return centre, radius + (shape.radius if isinstance(shape, RoundedHull) else 0.0)
+        case HalfSpace():
+            return np.zeros(3), math.inf
+        case Sphere():
+            return np.zeros(3), shape.radius
+        case Capsule():
+            return np.zeros(3), shape.radius + shape.length / 2
+        case Ellipsoid():
+            return np.zeros(3), float(shape.half_axes.max())
+        case Cylinder():
+            return np.zeros(3), math.hypot(shape.radius, shape.length / 2)
+        case Box():
+            return np.zeros(3), float(np.linalg.norm(shape.half_extents))

@@ -1,0 +1,87 @@
+"""The page of an audit: the worst pose of each pair of links that overlaps, a frame each."""
+
+from __future__ import annotations
+
+import colorsys
+from dataclasses import dataclass
+from pathlib import Path
+
+from overlapper import Placed
+from overlapper.audit.kinematics import Array, Kinematics
+from overlapper.audit.robot import Robot, shape_keys
+from overlapper.audit.verdicts import Audit, Verdict
+
+Color = tuple[float, float, float, float]
+
+MOST = 100  # poses that a page has at most, so that it opens at once
+
+SHARED = "#ff4fa3"  # a colour that the links do not have
+
+
+def shown(audit: Audit) -> list[Verdict]:
+    """The pairs that a page shows, the largest volume first: they overlap, and are not adjacent."""
+    met = [each for each in audit.verdicts if each.largest and not each.pair.adjacent]
+    return sorted(met, key=_volume, reverse=True)[:MOST]
+
+
+def addresses(audit: Audit, path: Path) -> dict[tuple[int, int], str]:
+    """By pair of links, what opens the page at its pose."""
+    return {each.pair.links: f"{path.name}#t={frame}" for frame, each in enumerate(shown(audit))}
+
+
+def write_page(audit: Audit, path: Path) -> None:
+    """A page of the poses in which pairs share most, or of the rest pose if no pair shares anything.
+
+    ImportError without meshcat.
+    """
+    from overlapper.viewer import Look, Recording
+
+    recording = Recording(overlaps=Look(edges=False, front=SHARED, back=SHARED))
+    scene = _Scene(audit.robot)
+    for frame, each in enumerate(shown(audit)):
+        assert each.largest
+        recording.add(scene.at(each.largest.values), each.largest.contact.contacts, float(frame), _caption(each))
+    if not shown(audit):
+        recording.add(scene.at(audit.sampling.configuration(0)), [], 0.0, "at rest; no links overlap")
+    recording.save(path)
+
+
+def _volume(verdict: Verdict) -> float:
+    return verdict.largest.contact.volume if verdict.largest else 0.0
+
+
+def _caption(verdict: Verdict) -> str:
+    often = f", {verdict.fraction[0]:.2%}" if verdict.fraction else ""
+    return f"{' and '.join(verdict.names)}{often}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """What views ask of bodies."""
+
+    keys: list[tuple[int, int, int]]
+    placed: list[Placed]
+    colors: dict[tuple[int, int], Color]
+    names: dict[tuple[int, int], str]
+
+
+class _Scene:
+    """A robot to be drawn in one pose after the other, each link in a colour of its own."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._kinematics = Kinematics(robot)
+        self._shapes = [each.shape for each in robot.tree.shapes]
+        self._keys = [(body, link, shape) for body, link, shape in shape_keys(robot).tolist()]
+        links = sorted({key[:2] for key in self._keys})
+        # Hues a golden ratio apart stay distinct however many links there are.
+        self._colors = {link: (*colorsys.hsv_to_rgb(0.618034 * k % 1, 0.35, 0.85), 1.0) for k, link in enumerate(links)}
+        # A slash would make two names of one, of a body and its link.
+        names = [name.replace("/", ".") for name in robot.link_names]
+        self._names = {
+            (body, link): f"{robot.tree.bodies[body].replace('/', '.')}/{names[link]}" for body, link in links
+        }
+
+    def at(self, values: Array) -> _Drawn:
+        (positions,), (orientations,) = self._kinematics.poses(values[None])
+        placed = [Placed(*each) for each in zip(self._shapes, positions, orientations)]
+        return _Drawn(self._keys, placed, self._colors, self._names)

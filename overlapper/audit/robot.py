@@ -1,0 +1,181 @@
+"""A robot: its kinematic tree, and which of its joints can be moved at will and how far."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper.printable import first_line
+from overlapper.simulation.kinematic_tree import KinematicTree, kinematic_tree
+from overlapper.simulation.model_file import NotRead
+
+TURN = ("x", "y", "z", "w")  # of a spherical joint
+
+
+@dataclass(frozen=True, slots=True)
+class Mimic:
+    """A joint that stands at multiplier * q + offset where q, in rad or m, is that of the joint called `leader`."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True)
+class Degree:
+    """A joint that is moved at will: that of the link in that place, by the number in column `column`.
+
+    It goes from `lower` to `upper`, in rad or m, or, if it is "endless", once around. A "spherical" one has four
+    columns, a unit quaternion xyzw.
+    """
+
+    link: int
+    name: str
+    column: int
+    range: Literal["limited", "endless", "spherical"]
+    lower: float
+    upper: float
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """What its columns are called."""
+        return tuple(f"{self.name}.{each}" for each in TURN) if self.range == "spherical" else (self.name,)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Links, shapes and joints as pybullet has read them; `mimics` has, by name, the joints that follow others.
+
+    `name` is that of the robot in the file, or else of its first body.
+    """
+
+    name: str
+    tree: KinematicTree
+    mimics: Mapping[str, Mimic]
+
+    @cached_property
+    def link_names(self) -> tuple[str, ...]:
+        """Of each link, distinct: after its body's where there are several, and with its place where two share one."""
+        links = self.tree.links
+        names = [
+            f"{self.tree.bodies[link.body]}/{link.name}" * (len(self.tree.bodies) > 1) or link.name for link in links
+        ]
+        return tuple(name if names.count(name) == 1 else f"{name}#{place}" for place, name in enumerate(names))
+
+    @cached_property
+    def degrees(self) -> tuple[Degree, ...]:
+        """The joints that are moved at will. Those that nothing bounds, prismatic ones without limits, are not."""
+        found: list[Degree] = []
+        column = 0
+        for place, link in enumerate(self.tree.links):
+            joint = link.joint
+            limited = joint.lower <= joint.upper and math.isfinite(joint.upper - joint.lower)
+            if (
+                joint.kind in ("planar", "held")
+                or joint.name in self.mimics
+                or (joint.kind == "prismatic" and not limited)
+            ):
+                continue
+            if joint.kind == "spherical":
+                degree = Degree(place, joint.name, column, "spherical", -1.0, 1.0)
+            elif limited:
+                degree = Degree(place, joint.name, column, "limited", joint.lower, joint.upper)
+            else:
+                degree = Degree(place, joint.name, column, "endless", -math.pi, math.pi)
+            found.append(degree)
+            column += len(degree.columns)
+        return tuple(found)
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """What the numbers of a configuration are: joints, or parts of their quaternions."""
+        return tuple(column for degree in self.degrees for column in degree.columns)
+
+    @property
+    def unmoved(self) -> list[tuple[str, str]]:
+        """Joints that could move and do not: what kind of joint, and its name."""
+        moved = {degree.name for degree in self.degrees} | self.mimics.keys()
+        joints = [link.joint for link in self.tree.links if link.joint.name not in moved]
+        return [(joint.kind, joint.name) for joint in joints if joint.kind != "held"]
+
+    def drivers(self, place: int) -> frozenset[int]:
+        """The links between the base and the link in that place, itself among them, whose joints move."""
+        moved = {degree.link for degree in self.degrees}
+        found = set()
+        while place >= 0:
+            link = self.tree.links[place]
+            if place in moved or link.joint.name in self.mimics:
+                found.add(place)
+            place = link.parent
+        return frozenset(found)
+
+
+def shape_keys(robot: Robot) -> NDArray[np.int64]:
+    """(k, 3) body, place of the link among all links, and place within it of each shape."""
+    seen: Counter[int] = Counter()
+    keys = []
+    for shape in robot.tree.shapes:
+        keys.append((robot.tree.links[shape.link].body, shape.link, seen[shape.link]))
+        seen[shape.link] += 1
+    return np.array(keys, dtype=np.int64).reshape(-1, 3)
+
+
+def read_robot(path: Path, **settings: Any) -> Robot:
+    """The robot of a URDF, SDF or MJCF file; `settings` are those of `simulation.Bodies`.
+
+    pybullet passes over mimic joints: those of a URDF are read from its text. NotRead if pybullet cannot read it, or if
+    a joint mimics one that is not there or, in the end, itself.
+    """
+    tree = kinematic_tree(path, **settings)
+    if path.suffix.lower() != ".urdf":
+        return Robot(tree.bodies[0], tree, {})
+    root = _root(path)
+    return Robot(root.get("name") or tree.bodies[0], tree, _mimics(path, root, tree))
+
+
+def _mimics(path: Path, root: ElementTree.Element, tree: KinematicTree) -> dict[str, Mimic]:
+    kinds = {link.joint.name: link.joint.kind for link in tree.links}
+    told = {str(joint.get("name")): joint.find("mimic") for joint in root.findall("joint")}
+    found: dict[str, Mimic] = {}
+    for name, mimic in told.items():
+        if mimic is None or kinds.get(name) not in ("revolute", "prismatic"):
+            continue
+        leader = str(mimic.get("joint"))
+        if kinds.get(leader) not in ("revolute", "prismatic"):
+            raise NotRead(f"{path}: the joint {name!r} mimics {leader!r}, which is no joint that one number moves")
+        try:
+            multiplier, offset = (float(mimic.get(key, default)) for key, default in (("multiplier", 1), ("offset", 0)))
+        except ValueError as error:
+            raise NotRead(f"{path}: the joint {name!r} mimics {leader!r} by what is no number") from error
+        found[name] = Mimic(leader, multiplier, offset)
+    return {name: _followed(path, name, found) for name in found}
+
+
+def _root(path: Path) -> ElementTree.Element:
+    """The root of a URDF; what comes behind its end is not read, as pybullet does not. NotRead if it has none."""
+    text, end = path.read_bytes(), b"</robot>"
+    try:
+        return ElementTree.fromstring(text[: text.index(end) + len(end)] if end in text else text)
+    except ElementTree.ParseError as error:  # which pybullet may have passed over
+        raise NotRead(f"{path} is no XML: {first_line(error)}") from error
+
+
+def _followed(path: Path, name: str, mimics: Mapping[str, Mimic]) -> Mimic:
+    """The same with a leader that follows none."""
+    mimic, passed = mimics[name], {name}
+    while mimic.leader in mimics:
+        if mimic.leader in passed:
+            raise NotRead(f"{path}: the joint {name!r} mimics itself")
+        passed.add(mimic.leader)
+        next_ = mimics[mimic.leader]
+        mimic = Mimic(next_.leader, mimic.multiplier * next_.multiplier, mimic.multiplier * next_.offset + mimic.offset)
+    return mimic

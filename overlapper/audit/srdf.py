@@ -1,0 +1,47 @@
+"""SRDF: the pairs of links that a planner need not ask about, as MoveIt reads and writes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+from overlapper.audit.verdicts import Audit, Verdict
+from overlapper.printable import first_line
+from overlapper.whole_file import beside
+
+Names = frozenset[str]
+
+
+def reason(verdict: Verdict) -> str | None:
+    """Why a pair need not be asked about; None if it must be."""
+    if verdict.pair.adjacent:
+        return "Adjacent"
+    return {"never": "Never", "always": "Always"}.get(verdict.status)
+
+
+def write_srdf(audit: Audit, path: Path) -> None:
+    """Write <disable_collisions> for each pair that is adjacent, never overlaps or always does."""
+    root = ElementTree.Element("robot", name=audit.robot.name)
+    for verdict in audit.verdicts:
+        if why := reason(verdict):
+            first, second = verdict.names
+            ElementTree.SubElement(root, "disable_collisions", link1=first, link2=second, reason=why)
+    ElementTree.indent(root)
+    with beside(path) as file:
+        ElementTree.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
+        with file.open("a", encoding="utf-8") as end:
+            end.write("\n")
+
+
+def read_srdf(path: Path) -> dict[Names, str]:
+    """The pairs that an SRDF file disables, with its reasons. OSError if it is not there, ValueError if it is none."""
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, ValueError) as error:
+        raise ValueError(f"{path} is no SRDF: {first_line(error)}") from error
+    if root.tag != "robot":
+        raise ValueError(f"{path} is no SRDF: it is of <{root.tag}> and not of <robot>")
+    pairs = [each.attrib for each in root.findall("disable_collisions")]
+    if missing := [each for each in pairs if not each.get("link1") or not each.get("link2")]:
+        raise ValueError(f"{path} is no SRDF: a <disable_collisions> names no two links, but {dict(missing[0])}")
+    return {frozenset((each["link1"], each["link2"])): each.get("reason", "") for each in pairs}

@@ -1,0 +1,80 @@
+"""An audit as a table, a row for each pair of links, and as what JSON takes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from overlapper.audit.verdicts import Audit, Pose, Verdict
+from overlapper.scenes.table import Row, Value
+from overlapper.scenes.table_file import TABLES, origin
+
+# Every column, in order, with its type; the unit is in the name. `adjacent` is 1 or 0. Joints are JSON, by name, in rad
+# and m. `page` is a link to the pose of the largest volume.
+COLUMNS: dict[str, type] = {
+    "nameA": str,
+    "nameB": str,
+    "adjacent": int,
+    "status": str,
+    "asked": int,
+    "overlapping": int,
+    "fraction": float,
+    "fraction_low": float,
+    "fraction_high": float,
+    "volume_m3": float,
+    "volume_error_m3": float,
+    "volume_configuration": int,
+    "volume_joints": str,
+    "depth_m": float,
+    "depth_configuration": int,
+    "depth_joints": str,
+    "page": str,
+}
+
+
+def write_table(audit: Audit, path: Path, settings: Mapping[str, Any], page: Mapping[tuple[int, int], str]) -> None:
+    """Write a row for each pair of links; `page` has, by pair of links, where a page shows them.
+
+    OSError if the file cannot be written.
+    """
+    texts = {name: str(value) for name, value in settings.items()}
+    table = TABLES[path.suffix](path, origin() | {"robot": audit.robot.name} | texts, COLUMNS)
+    try:
+        table.write(_row(audit, verdict, page) for verdict in audit.verdicts)
+    except BaseException:
+        table.leave()
+        raise
+    table.close()
+
+
+def facts(audit: Audit, page: Mapping[tuple[int, int], str]) -> list[dict[str, Any]]:
+    """The rows as JSON takes them; joints are objects."""
+    made = []
+    for verdict in audit.verdicts:
+        row: dict[str, Any] = dict(_row(audit, verdict, page))
+        for name, pose in (("volume_joints", verdict.largest), ("depth_joints", verdict.deepest)):
+            row[name] = _joints(audit, pose) if pose else None
+        made.append(row)
+    return made
+
+
+def _row(audit: Audit, verdict: Verdict, page: Mapping[tuple[int, int], str]) -> Row:
+    fraction: tuple[Value, ...] = verdict.fraction or (None,) * 3
+    row: Row = {"nameA": verdict.names[0], "nameB": verdict.names[1], "adjacent": int(verdict.pair.adjacent)}
+    row |= {"status": verdict.status, "asked": verdict.asked, "overlapping": verdict.met}
+    row |= dict(zip(("fraction", "fraction_low", "fraction_high"), fraction))
+    for name, pose in (("volume", verdict.largest), ("depth", verdict.deepest)):
+        row[f"{name}_configuration"] = pose.number if pose else None
+        row[f"{name}_joints"] = json.dumps(_joints(audit, pose)) if pose else None
+    if verdict.largest and verdict.deepest:
+        shared = verdict.largest.contact
+        row |= {"volume_m3": shared.volume, "volume_error_m3": shared.volume_error}
+        row["depth_m"] = verdict.deepest.contact.depth
+    row["page"] = page.get(verdict.pair.links)
+    return {name: row.get(name) for name in COLUMNS}
+
+
+def _joints(audit: Audit, pose: Pose) -> dict[str, float]:
+    return dict(zip(audit.robot.columns, pose.values.tolist()))

@@ -1,0 +1,147 @@
+"""What an audit says of each pair of links: whether, how often, how much and how deep they overlap, and where."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import reduce
+from operator import add
+from typing import Literal
+
+from overlapper import Batch
+from overlapper.audit.examiner import Examiner
+from overlapper.audit.pairs import LinkPair
+from overlapper.audit.robot import Robot, shape_keys
+from overlapper.audit.sampling import Sampling
+from overlapper.audit.tally import Array, Tally
+from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.links import LinkContact, link_contacts
+
+Status = Literal["never", "sometimes", "always"]
+
+NORMAL_95 = 1.959963984540054  # between minus this and this are 95 % of a normal distribution
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """The configuration of that number: `values` (m,) by the columns of the robot, in rad and m.
+
+    `contact` is what the two links share in it.
+    """
+
+    number: int
+    values: Array
+    contact: LinkContact
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A pair of links, by their `names`, and what became of it in the configurations in which it was asked for.
+
+    It overlapped in `met` of `asked`: "never", "sometimes" or "always". `fraction` is that of the random ones, with the
+    interval of Wilson that holds it with 95 %; None if there was no random one. `largest` is the configuration with the
+    largest volume, summed over the pairs of shapes, and `deepest` the one with the largest depth.
+    """
+
+    pair: LinkPair
+    names: tuple[str, str]
+    status: Status
+    asked: int
+    met: int
+    fraction: tuple[float, float, float] | None
+    largest: Pose | None
+    deepest: Pose | None
+
+
+@dataclass(frozen=True, slots=True)
+class Audit:
+    """A robot, how it was looked at, and a verdict on each pair of links that have shapes, in their order."""
+
+    robot: Robot
+    sampling: Sampling
+    verdicts: list[Verdict]
+
+    def of_status(self, status: Status, adjacent: bool = False) -> list[Verdict]:
+        return [each for each in self.verdicts if each.status == status and each.pair.adjacent == adjacent]
+
+
+def audit(
+    robot: Robot,
+    configurations: int = 100_000,
+    seed: int = 0,
+    tolerance: float = 1e-3,
+    least_depth: float = 0.0,
+    threads: int = 1,
+    progress: Callable[[Iterator[Tally], int], Iterable[Tally]] = lambda blocks, count: blocks,
+) -> Audit:
+    """Look at a robot in so many configurations; the same of the same arguments, however many `processes` there are.
+
+    `tolerance` is that of `overlapper.overlap`, and links share nothing that overlap by a depth of `least_depth` (m) or
+    less. `progress` passes on what is seen block by block, of which there are so many. ValueError for less than one
+    configuration or thread, or a negative seed.
+    """
+    if threads < 1:
+        raise ValueError(f"threads must be 1 or more, not {threads}")
+    sampling = Sampling(robot, configurations, seed)
+    examiner = Examiner(robot, sampling, tolerance, least_depth)
+    tally = reduce(add, progress(_tallies(examiner, threads), len(sampling.blocks)))
+    sights = _Sights(examiner)
+    verdicts = []
+    for k, pair in enumerate(examiner.pairs):
+        asked, met = int(tally.asked[k]), int(tally.met[k])
+        status: Status = "never" if not met else "always" if met == asked else "sometimes"
+        random = int(tally.random_asked[k])
+        fraction = wilson(int(tally.random_met[k]), random) if random else None
+        places = (int(tally.volume.at[k]), int(tally.depth.at[k])) if met else ()
+        largest, deepest = [sights.of(pair, place) for place in places] or (None, None)
+        names = robot.link_names[pair.links[0]], robot.link_names[pair.links[1]]
+        verdicts.append(Verdict(pair, names, status, asked, met, fraction, largest, deepest))
+    return Audit(robot, sampling, verdicts)
+
+
+def wilson(met: int, asked: int) -> tuple[float, float, float]:
+    """A fraction, and the bounds of the interval of Wilson that holds the probability behind it with 95 %."""
+    fraction, z = met / asked, NORMAL_95
+    middle, weight = fraction + z * z / (2 * asked), 1 + z * z / asked
+    spread = z * math.sqrt(fraction * (1 - fraction) / asked + z * z / (4 * asked * asked))
+    lower, upper = (middle - spread) / weight, (middle + spread) / weight
+    return fraction, lower if met else 0.0, upper if met < asked else 1.0  # which rounding would miss
+
+
+def _tallies(examiner: Examiner, threads: int) -> Iterator[Tally]:
+    """What is seen in each block; each thread has an examiner of its own."""
+    own = threading.local()
+
+    def look(block: int) -> Tally:
+        if not hasattr(own, "examiner"):
+            own.examiner = examiner.again()
+        found: Tally = own.examiner(block)
+        return found
+
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            yield from pool.map(look, range(len(examiner.sampling.blocks)))
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+class _Sights:
+    """What two links share in a configuration, looked at again with all that can be asked of it."""
+
+    def __init__(self, examiner: Examiner) -> None:
+        self._examiner, tree = examiner, examiner.robot.tree
+        self._batch = Batch([each.shape for each in tree.shapes])
+        self.keys = shape_keys(examiner.robot)
+
+    def of(self, pair: LinkPair, number: int) -> Pose:
+        examiner = self._examiner
+        values = examiner.sampling.configuration(number)
+        (positions,), (orientations,) = examiner.kinematics.poses(values[None])
+        found = self._batch.overlaps(
+            positions, orientations, examiner.shape_pairs(pair), examiner.tolerance, separated=False
+        )
+        (contact,) = link_contacts(Contacts(self.keys, found))
+        return Pose(number, values, contact)

@@ -1,0 +1,207 @@
+"""`overlapper audit`: which pairs of links of a robot can overlap at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from overlapper.cli.figures import VOLUME_UNITS, volume_unit
+from overlapper.cli.options import (
+    ConcaveOption,
+    ExpectOption,
+    HtmlOption,
+    LeastDepthOption,
+    SurfaceOption,
+    ThresholdOption,
+    ToleranceOption,
+    expected_pairs,
+    refuse_out_of_range,
+)
+from overlapper.cli.recorded import with_progress
+from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say
+from overlapper.printable import printable
+
+if TYPE_CHECKING:
+    from overlapper.audit.verdicts import Audit, Verdict
+
+LISTED = 20  # pairs at most
+CAPTION = (
+    "Fraction: of the random configurations, with the bounds that hold it with 95 %. Volume: the largest. Depth: the "
+    "largest, of the deepest two shapes."
+)
+
+
+def audit(
+    robot: Annotated[Path, typer.Argument(help="A model: .urdf, .sdf, .xml (MJCF).", show_default=False)],
+    configurations: Annotated[int, typer.Option(min=1, help="How many are looked at.")] = 100_000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random ones.")] = 0,
+    expect: ExpectOption = None,
+    least_depth: LeastDepthOption = 0.0,
+    against: Annotated[
+        Path | None, typer.Option(help="An SRDF file, of which the pairs that it disables are checked.")
+    ] = None,
+    srdf: Annotated[Path | None, typer.Option(help="SRDF file to write, for a planner.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Table of all pairs of links: .csv, .parquet, .sqlite.")] = None,
+    html: HtmlOption = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="By default one for each core.", show_default=False)
+    ] = None,
+    tolerance: ToleranceOption = 1e-3,
+    surface: SurfaceOption = "nominal",
+    concave: ConcaveOption = "decompose",
+    concave_threshold: ThresholdOption = 0.05,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
+) -> None:
+    """Say which pairs of links of a robot never overlap, sometimes or always, how often, by how much and how deep.
+
+    Its joints are placed at rest, at corners of their limits, and at random between them. Links that a joint ties, or
+    joints and links without shapes alone, are adjacent: they overlap by design, and are left to themselves. The exit
+    code is 1 if a pair that is not adjacent overlaps always, or one that --against disables as one that does not
+    overlap does; 2 if the robot cannot be read; else 0.
+
+    Examples:
+
+    [bold]overlapper audit robot.urdf[/bold]
+
+    [bold]overlapper audit robot.urdf --srdf robot.srdf --out pairs.csv --html worst.html[/bold]  files of it
+
+    [bold]overlapper audit robot.urdf --against robot.srdf --expect "*finger,*finger"[/bold]  what CI asks
+    """
+    from overlapper.scenes.table_file import must_be_a_table
+    from overlapper.whole_file import must_be_writable
+
+    refuse_out_of_range(tolerance, concave_threshold, out)
+    pairs = expected_pairs(expect)
+    settings: dict[str, Any] = {
+        "configurations": configurations,
+        "seed": seed,
+        "expect": expect or [],
+        "least_depth": least_depth,
+        "against": str(against) if against else None,
+        "tolerance": tolerance,
+        "surface": surface,
+        "concave": concave,
+        "concave_threshold": concave_threshold,
+    }
+    written: list[Path] = []
+    try:
+        with input_refusals(), quiet():
+            from overlapper.audit.findings import findings, remarks
+            from overlapper.audit.page import addresses, write_page
+            from overlapper.audit.robot import read_robot
+            from overlapper.audit.srdf import read_srdf, write_srdf
+            from overlapper.audit.table import facts, write_table
+            from overlapper.audit.verdicts import audit as look
+            from overlapper.scenes.allowed import must_name_some
+            from overlapper.simulation.model_file import NotRead
+
+            if out:
+                must_be_a_table(out)
+            if html:
+                import overlapper.viewer.recording  # noqa: F401  # which says now what to install
+            for path in filter(None, (out, html, srdf)):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                must_be_writable(path)
+            disabled = read_srdf(against) if against else {}
+            try:
+                read = read_robot(robot, concave=concave, concave_threshold=concave_threshold, surface=surface)
+            except NotRead as error:
+                raise Refused(str(error)) from error
+            must_name_some(pairs, read.link_names, "link")
+            found = look(
+                read,
+                configurations,
+                seed,
+                tolerance,
+                least_depth,
+                threads or os.cpu_count() or 1,
+                lambda blocks, count: with_progress(blocks, robot.name, count),
+            )
+            if not found.verdicts:
+                raise Refused(f"{robot} has no two links with shapes that could overlap")
+            page = addresses(found, html) if html else {}
+            if out:
+                write_table(found, out, settings, page)
+                written.append(out)
+            if srdf:
+                write_srdf(found, srdf)
+                written.append(srdf)
+            if html:
+                write_page(found, html)
+                written.append(html)
+            wrong = findings(found, pairs, disabled)
+    except KeyboardInterrupt as error:
+        raise Interrupted from error
+    if as_json:
+        files = {name: str(path) for name, path in (("out", out), ("srdf", srdf), ("html", html)) if path}
+        about = {"robot": read.name, "joints": list(read.columns), "remarks": remarks(read)}
+        told = {"pairs": facts(found, page), "findings": wrong}
+        print(json.dumps({"settings": settings} | about | told | files))
+    else:
+        _show(found, wrong, written)
+    raise typer.Exit(1 if wrong else 0)
+
+
+def _show(found: Audit, wrong: list[str], written: list[Path]) -> None:
+    from overlapper.audit.findings import remarks
+
+    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
+    met = [each for each in found.verdicts if each.met and not each.pair.adjacent]
+    if met:
+        console.print(_list(found, sorted(met, key=lambda each: (-_often(each), each.names))))
+    counts = {status: len(found.of_status(status)) for status in ("never", "sometimes", "always")}
+    adjacent = len(found.verdicts) - sum(counts.values())
+    words = [f"{adjacent:,} {'are' if adjacent != 1 else 'is'} adjacent"]
+    words += [
+        f"{count:,} {status} {'overlaps' if count == 1 else 'overlap'}" for status, count in counts.items() if count
+    ]
+    links = len({link for each in found.verdicts for link in each.pair.links})
+    say(
+        f"Of {len(found.verdicts):,} pairs of {links:,} links, {', '.join(words)} in {found.sampling.count:,} "
+        "configurations."
+    )
+    for line in (*remarks(found.robot), *wrong, *(f"Written: {path}" for path in written)):
+        say(line)
+
+
+def _often(verdict: Verdict) -> float:
+    return verdict.fraction[0] if verdict.fraction else verdict.met / verdict.asked
+
+
+def _list(found: Audit, met: list[Verdict]) -> Table:
+    """The pairs that overlap most often, two lines each."""
+    unit = volume_unit(max(each.largest.contact.volume for each in met if each.largest))
+    left_out = f" The {LISTED} of {len(met):,} pairs that overlap most often." if len(met) > LISTED else ""
+    table = Table(
+        title="Links that overlap and are not adjacent",
+        caption=CAPTION + left_out,
+        caption_justify="left",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+        collapse_padding=True,
+    )
+    table.add_column("pair of links", overflow="fold")
+    for header in ("", "fraction\n%", "95 %\n%", f"volume\n{unit}", "depth\nmm"):
+        table.add_column(header, justify="right" if header else "left", no_wrap=True)
+    for each in met[:LISTED]:
+        assert each.largest and each.deepest
+        fraction, low, high = (f"{100 * value:.3g}" for value in each.fraction) if each.fraction else ("", "", "")
+        table.add_row(
+            Text("\n ".join(map(printable, each.names))),
+            each.status,
+            fraction,
+            f"{low} to {high}" if each.fraction else "",
+            f"{each.largest.contact.volume / VOLUME_UNITS[unit]:.4g}",
+            f"{1e3 * each.deepest.contact.depth:.3g}",
+        )
+    return table

@@ -1,0 +1,161 @@
+"""What an audit says of pairs of links is what each configuration says by itself."""
+
+from collections import Counter
+from math import comb
+
+import numpy as np
+import pytest
+from robots import DATA, moved, turntable
+
+from overlapper import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Placed,
+    RoundedHull,
+    Sphere,
+    overlap,
+)
+from overlapper.audit.examiner import Examiner, ball
+from overlapper.audit.robot import read_robot
+from overlapper.audit.sampling import BLOCK, Sampling
+from overlapper.audit.verdicts import audit, wilson
+from overlapper.quaternion import rotated
+from overlapper.simulation import Bodies
+from overlapper.simulation.model_file import load
+
+
+def by_names(found):
+    return {each.names: each for each in found.verdicts}
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    return read_robot(turntable(tmp_path_factory.mktemp("robots") / "table.urdf"))
+
+
+def edge(lower, upper):
+    """The angle between the two at which the arm begins to touch the wall, or ceases to."""
+
+    def touches(angle):
+        turn = np.array([0, 0, np.sin(angle / 2), np.cos(angle / 2)])
+        arm = Placed(Box((0.1, 0.1, 0.1)), (np.cos(angle), np.sin(angle), 0.2), turn)
+        return bool(overlap(arm, Placed(Box((0.1, 0.1, 0.1)), (0, 1, 0.2))))
+
+    assert touches(lower) != touches(upper)
+    for _ in range(60):
+        middle = (lower + upper) / 2
+        lower, upper = (middle, upper) if touches(middle) == touches(lower) else (lower, middle)
+    return lower
+
+
+def test_an_arm_runs_into_a_wall_as_often_as_its_angle_says(table):
+    found = audit(table, 3 * BLOCK)
+    pair = by_names(found)["arm", "wall"]
+    begins, ends = edge(1.0, np.pi / 2), edge(np.pi / 2, 2.2)
+    angles = np.concatenate([found.sampling.block(k) for k in range(len(found.sampling.blocks))])[:, 0]
+    assert (pair.status, pair.asked) == ("sometimes", 3 * BLOCK)
+    assert pair.met == ((angles > begins) & (angles < ends)).sum()
+    fraction, low, high = pair.fraction
+    assert low < (ends - begins) / 6 < high and low < fraction < high
+    # The largest volume, where the angle is nearest to a right one, is nearly all of the wall.
+    assert angles[pair.largest.number] == pair.largest.values[0] == angles[np.abs(angles - np.pi / 2).argmin()]
+    assert pair.largest.contact.volume == pytest.approx(0.008, rel=0.01)
+    assert pair.deepest.contact.depth == pytest.approx(0.2, rel=0.01)
+
+
+def test_links_are_adjacent_that_a_joint_ties_or_a_link_without_a_shape(table):
+    found = by_names(audit(table, 2 * BLOCK))
+    adjacent = {names for names, each in found.items() if each.pair.adjacent}
+    assert adjacent == {("post", "disc"), ("disc", "arm"), ("post", "wall"), ("post", "plate")}
+    assert {names for names, each in found.items() if each.status == "always"} == {("arm", "plate"), ("wall", "plate")}
+    assert found["arm", "plate"].largest.contact.volume == pytest.approx(0.2 * 0.2 * 0.02)
+    assert found["arm", "plate"].deepest.contact.depth == pytest.approx(0.04)
+    # What no joint moves is asked for at rest; what is adjacent, in few configurations.
+    assert {names for names, each in found.items() if each.asked == 1} == {
+        ("disc", "arm"), ("post", "wall"), ("post", "plate"), ("wall", "plate"),
+    }  # fmt: skip
+    assert found["wall", "plate"].fraction is None
+    assert found["post", "disc"].asked == 3 + 512 and found["post", "arm"].asked == 2 * BLOCK
+
+
+def test_what_overlaps_no_deeper_than_asked_does_not(table):
+    assert by_names(audit(table, 100, least_depth=0.039))["arm", "plate"].status == "always"
+    assert by_names(audit(table, 100, least_depth=0.041))["arm", "plate"].status == "never"
+
+
+def test_threads_do_not_change_a_bit():
+    robot = read_robot(DATA / "kuka_iiwa" / "model.urdf")
+    one, two = (audit(robot, BLOCK + 2000, seed=3, threads=threads) for threads in (1, 2))
+    assert any(each.status == "sometimes" for each in one.verdicts)
+    for a, b in zip(one.verdicts, two.verdicts, strict=True):
+        assert (a.names, a.met, a.asked, a.fraction) == (b.names, b.met, b.asked, b.fraction)
+        if a.largest:
+            assert (a.largest.number, a.deepest.number) == (b.largest.number, b.deepest.number)
+            assert a.largest.contact.volume == b.largest.contact.volume
+    with pytest.raises(ValueError, match="threads must be 1 or more, not 0"):
+        audit(robot, 1, threads=0)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [DATA / "kuka_iiwa" / "model.urdf", DATA / "humanoid" / "humanoid.urdf", DATA / "laikago" / "laikago.urdf"],
+    ids=lambda path: path.name,
+)
+def test_pairs_are_those_that_pybullet_and_bodies_find_one_configuration_at_a_time(path, client):
+    robot = read_robot(path)
+    found = audit(robot, 150)
+    load(path, client)
+    bodies = Bodies(client)
+    met, largest = Counter(), Counter()
+    for number in range(150):
+        moved(robot, client, found.sampling.configuration(number))
+        bodies.update()
+        contacts = [each for each in bodies.overlaps(pairs=[(0, 0)]) if each.overlap]
+        volumes = Counter()
+        for each in contacts:
+            volumes[each.linkA + 1, each.linkB + 1] += each.overlap.volume
+        met.update(volumes.keys())
+        largest |= volumes
+    for each in found.verdicts:
+        if each.asked == 150:
+            assert each.met == met[each.pair.links]
+            if each.met and len(each.largest.contact.contacts) == 1:
+                assert each.largest.contact.volume == pytest.approx(largest[each.pair.links], rel=1e-9)
+    assert sum(each.status == "sometimes" for each in found.verdicts) > 3
+
+
+def test_shapes_are_within_their_balls():
+    random = np.random.default_rng(0)
+    points = random.normal(size=(30, 3)) + [5, -2, 1]
+    shapes = [Box((1, 2, 3)), Sphere(2.0), Capsule(0.5, 2.0), Cylinder(1.0, 0.3), Ellipsoid((1, 2, 0.5)), Hull(points)]
+    for shape in [*shapes, RoundedHull(points, 0.7)]:
+        centre, radius = ball(shape)
+        for turn in random.normal(size=(200, 4)):
+            placed = Placed(shape, (0, 0, 0), turn)
+            reach = np.abs(placed.bounds - rotated(placed.orientation, centre)).max()
+            assert 0.2 * radius < reach <= radius * (1 + 1e-12)
+    assert ball(HalfSpace((0, 0, 1), 0.0))[1] == np.inf
+
+
+def test_intervals_are_those_of_wilson():
+    # The bounds are where the observed fraction is 1.96 standard deviations of theirs away.
+    for met, asked in ((3, 20), (50, 100), (1, 100_000)):
+        fraction, low, high = wilson(met, asked)
+        assert fraction == met / asked
+        for bound in (low, high):
+            deviation = np.sqrt(bound * (1 - bound) / asked)
+            assert abs(fraction - bound) / deviation == pytest.approx(1.959964, rel=1e-6)
+    assert wilson(0, 10)[:2] == (0, 0) and wilson(10, 10)[2] == 1
+    # As Clopper and Pearson have it, 0 of 10 is seen in less than 2.5 % of what is more likely than that.
+    assert comb(10, 0) * (1 - wilson(0, 10)[2]) ** 10 < 0.05
+
+
+def test_an_examiner_says_the_same_again(table):
+    examiner = Examiner(table, Sampling(table, BLOCK, 0))
+    first, second, again = examiner(1), examiner(1), examiner.again()(1)
+    for tally in (second, again):
+        assert (tally.met == first.met).all() and (tally.volume.value == first.volume.value).all()

@@ -1,0 +1,174 @@
+"""`overlapper audit`: pairs of links for people, for programs, for a planner and for CI."""
+
+import json
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from xml.etree import ElementTree
+
+import pyarrow.parquet
+import pytest
+from pages import Film
+from robots import joint, limit, link, mimic, turntable, urdf
+
+from overlapper.audit.findings import remarks
+from overlapper.audit.page import write_page
+from overlapper.audit.robot import read_robot
+from overlapper.audit.srdf import read_srdf
+from overlapper.audit.table import COLUMNS
+from overlapper.audit.verdicts import audit
+from overlapper.cli.audit import audit as command
+from overlapper.cli.refusals import Refused
+
+COUNT = 300
+FIXED = ["--expect", "arm,plate", "--expect", "plate,wa*"]  # what no configuration parts
+
+
+@pytest.fixture(autouse=True)
+def robot(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return turntable(tmp_path / "table.urdf")
+
+
+def run(*arguments):
+    given = [sys.executable, "-m", "overlapper", "audit", "--configurations", str(COUNT), *map(str, arguments)]
+    done = subprocess.run(given, capture_output=True, text=True, timeout=120)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_a_robot_is_told_as_json_table_srdf_and_page(robot, tmp_path):
+    code, said, complaints = run(
+        robot, "--json", "--out", "pairs.csv", "--srdf", "made/table.srdf", "--html", "worst.html", "--seed", 4
+    )
+    found = json.loads(said)
+    assert (code, complaints) == (1, "")
+    assert found["findings"] == [
+        f"{names} always overlap, and no joint ties them." for names in ("arm and plate", "wall and plate")
+    ]
+    assert (found["robot"], found["joints"], found["settings"]["seed"]) == ("made", ["turn"], 4)
+    pairs = {(each["nameA"], each["nameB"]): each for each in found["pairs"]}
+    wall = pairs["arm", "wall"]
+    assert (wall["status"], wall["adjacent"], wall["asked"], len(pairs)) == ("sometimes", 0, COUNT, 10)
+    assert 0 < wall["fraction_low"] < wall["fraction"] < wall["fraction_high"] < 1
+    assert 1.2 < wall["volume_joints"]["turn"] < 1.9 and 0.005 < wall["volume_m3"] < 0.008 and wall["depth_m"] > 0.1
+    assert pairs["post", "arm"]["volume_m3"] is None
+    # Of adjacent pairs, those that never overlap, and those that always do.
+    disabled = {
+        (each.get("link1"), each.get("link2")): each.get("reason")
+        for each in ElementTree.parse("made/table.srdf").getroot()
+    }
+    assert disabled.keys() == pairs.keys() - {("arm", "wall")}
+    assert (disabled["arm", "plate"], disabled["post", "arm"], disabled["disc", "arm"]) == (
+        "Always",
+        "Never",
+        "Adjacent",
+    )
+    assert read_srdf(tmp_path / "made" / "table.srdf")[frozenset(("arm", "plate"))] == "Always"
+    rows = (tmp_path / "pairs.csv").read_text().splitlines()
+    assert "# robot: made" in rows and "# configurations: 300" in rows
+    assert rows[-11] == ",".join(COLUMNS) and len([row for row in rows if not row.startswith("#")]) == 11
+    # The largest volume is the first frame of the page.
+    film = Film.of(tmp_path / "worst.html")
+    frames = film.heading["names"]
+    assert frames[0].startswith("arm and wall, ")
+    assert sorted(frames[1:]) == ["arm and plate, 100.00%", "wall and plate"]
+    assert wall["page"] == "worst.html#t=0"
+    assert pairs["wall", "plate"]["page"] == f"worst.html#t={frames.index('wall and plate')}"
+
+
+def test_what_is_expected_is_no_finding_and_people_get_a_table(robot):
+    code, said, complaints = run(robot, *FIXED)
+    assert (code, complaints) == (0, "")
+    assert "Links that overlap and are not adjacent" in said and "sometimes" in said
+    assert said.endswith(
+        "Of 10 pairs of 5 links, 4 are adjacent, 3 never overlap, 1 sometimes overlaps, 2 always overlap in 300 "
+        "configurations.\n"
+    )
+
+
+def test_an_srdf_file_that_passes_over_an_overlap_is_told(robot, tmp_path):
+    pairs = [("arm", "wall", "Never"), ("plate", "arm", "Always"), ("wall", "plate", "Always"), ("arm", "roof", "User")]
+    text = "".join(f'<disable_collisions link1="{a}" link2="{b}" reason="{why}"/>' for a, b, why in pairs)
+    (tmp_path / "table.srdf").write_text(f'<robot name="made">{text}</robot>')
+    code, said, _ = run(robot, "--against", "table.srdf")
+    assert code == 1
+    assert "The SRDF file names the link 'roof', which the robot does not have.\n" in said
+    assert "arm and wall never overlap by the SRDF file, and do in " in said
+    assert "no joint ties them" not in said
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"expect": ["arm"]}, "--expect must be two names with a comma between them, not 'arm'"),
+        ({"expect": ["arm,roof"]}, "no link is called 'roof'"),
+        ({"out": "pairs.txt"}, "--out must end in .csv, .parquet, .sqlite, not 'pairs.txt'"),
+        ({"srdf": "."}, ".: Is a directory"),
+        ({"against": "none.srdf"}, "none.srdf: No such file or directory"),
+        ({"against": "table.urdf.txt"}, "table.urdf.txt is no SRDF: syntax error: line 1, column 0"),
+        ({"against": "sdf.srdf"}, "sdf.srdf is no SRDF: it is of <sdf> and not of <robot>"),
+        ({"against": "half"}, "half is no SRDF: a <disable_collisions> names no two links, but {'link1': 'arm'}"),
+        ({"robot": "none.urdf"}, "there is no file none.urdf"),
+        ({"robot": "table.bullet"}, "the name must end in .urdf, .sdf, .xml, and 'table.bullet' does not"),
+        ({"robot": "one.urdf"}, "one.urdf has no two links with shapes that could overlap"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_done_is_told_in_a_sentence(options, sentence, robot, tmp_path):
+    (tmp_path / "table.urdf.txt").write_text("no XML")
+    (tmp_path / "sdf.srdf").write_text("<sdf/>")
+    (tmp_path / "half").write_text('<robot><disable_collisions link1="arm"/></robot>')
+    urdf(tmp_path / "one.urdf", link("a", ("1 1 1", "0 0 0")))
+    given = {name: value if name == "expect" else tmp_path / value for name, value in options.items()}
+    with pytest.raises(Refused) as refused:
+        command(given.pop("robot", robot), configurations=1, **given)
+    assert str(refused.value).replace(f"{tmp_path}/", "").replace(str(tmp_path), ".") == sentence
+
+
+@pytest.mark.parametrize("ending", [".parquet", ".sqlite"])
+def test_tables_of_every_kind_have_the_same_columns(ending, robot, tmp_path):
+    with pytest.raises(Exception, match="1"):
+        command(robot, configurations=20, out=tmp_path / f"pairs{ending}")
+    if ending == ".parquet":
+        table = pyarrow.parquet.read_table(tmp_path / "pairs.parquet")
+        columns, rows = table.schema.names, table.num_rows
+    else:
+        with closing(sqlite3.connect(tmp_path / "pairs.sqlite")) as base:
+            cursor = base.execute("SELECT * FROM overlaps")
+            columns, rows = [each[0] for each in cursor.description], len(cursor.fetchall())
+    assert (columns, rows) == (list(COLUMNS), 10)
+
+
+def test_where_nothing_overlaps_a_page_shows_the_robot_at_rest(tmp_path):
+    path = urdf(
+        tmp_path / "two.urdf",
+        link("a", ("1 1 1", "0 0 0")),
+        link("b", ("1 1 1", "3 0 0")),
+        joint("j", "fixed", "a", "b"),
+    )
+    write_page(audit(read_robot(path), 5), tmp_path / "page.html")
+    assert Film.of(tmp_path / "page.html").heading["names"] == ["at rest; no links overlap"]
+
+
+def test_what_is_not_moved_and_not_modelled_is_told(tmp_path):
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
+    (tmp_path / "flat.obj").write_text(f"o flat\n{corners}f 1 2 3\nf 2 3 4\n")
+    flat = link("flat").replace(
+        "</link>", '<collision><geometry><mesh filename="flat.obj"/></geometry></collision></link>'
+    )
+    path = urdf(
+        tmp_path / "robot.urdf",
+        *(link(name, ("1 1 1", "0 0 0")) for name in "abcd"),
+        flat,
+        joint("slide", "prismatic", "a", "b", limit(1, -1)),
+        joint("table", "planar", "a", "c"),
+        joint("turn", "revolute", "a", "d", limit(0, 1)),
+        joint("follow", "revolute", "d", "flat", limit(0, 1) + mimic("turn")),
+    )
+    robot = read_robot(path)
+    not_modelled, *unmoved = remarks(robot)
+    assert not_modelled.startswith("Not modelled: flat, ")
+    assert unmoved == [
+        "The prismatic joint slide stays where it is, as it has no limits.",
+        "The planar joint table stays where it is, as pybullet does not move it.",
+    ]
