@@ -29,6 +29,7 @@ from overlapper.audit.tally import Array, Counts, Seen, Tally
 from overlapper.quaternion import rotated
 
 Mask = NDArray[np.bool_]
+Setup = tuple[Robot, int, int, float, float]
 
 AT_ONCE = 16_384  # shapes that are placed at once, so that what is at work stays in the caches
 COMPARED = 1_000_000  # distances between balls at once, likewise
@@ -65,13 +66,14 @@ class Examiner:
         self._pair_of = np.full((len(shapes),) * 2, -1)
         self._pair_of[self._first, self._second] = self._pair
 
-    def again(self) -> Examiner:
-        """Another that says the same."""
-        return Examiner(self.robot, self.sampling, self.tolerance, self.least_depth)
+    @property
+    def setup(self) -> Setup:
+        """What another process makes the same of, by `prepared`."""
+        return self.robot, self.sampling.count, self.sampling.seed, self.tolerance, self.least_depth
 
-    def shape_pairs(self, pair: LinkPair) -> Counts:
-        """(s, 2): the pairs of shapes of two links, as places among the shapes."""
-        among = self._pair == self.pairs.index(pair)
+    def shape_pairs(self, *pairs: LinkPair) -> Counts:
+        """(s, 2): the pairs of shapes of these pairs of links, as places among the shapes."""
+        among = np.isin(self._pair, [self.pairs.index(pair) for pair in pairs])
         return np.stack([self._first[among], self._second[among]], axis=1)
 
     def __call__(self, block: int) -> Tally:
@@ -123,6 +125,12 @@ class Examiner:
             among.append(pairs[pair])
         nobody = np.empty(0, dtype=np.int64)
         return np.concatenate([nobody, *rows]), np.concatenate([nobody, *among])
+
+
+def prepared(setup: Setup) -> Examiner:
+    """The examiner of a setup."""
+    robot, count, seed, tolerance, least_depth = setup
+    return Examiner(robot, Sampling(robot, count, seed), tolerance, least_depth)
 
 
 def ball(shape: Shape) -> tuple[Array, float]:

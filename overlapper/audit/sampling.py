@@ -35,7 +35,7 @@ class Sampling:
             raise ValueError(f"configurations must be 1 or more, not {count}")
         if seed < 0:
             raise ValueError(f"seed must be 0 or more, not {seed}")
-        self.count, self._seed, self._degrees = count, seed, robot.degrees
+        self.count, self.seed, self._degrees = count, seed, robot.degrees
         self._placed = self._rest_and_corners()[:count]
         self.first_random = len(self._placed)
         drawn = range(self.first_random, count, BLOCK)
@@ -46,7 +46,7 @@ class Sampling:
         """(n, m): the configurations of a block."""
         if number == 0:
             return self._placed
-        random = np.random.default_rng([self._seed, number]).random((BLOCK, sum(map(_draws, self._degrees))))
+        random = np.random.default_rng([self.seed, number]).random((BLOCK, sum(map(_draws, self._degrees))))
         random = random[: len(self.blocks[number])]
         columns: list[Array] = []
         used = 0
@@ -73,7 +73,7 @@ class Sampling:
             sides = np.array(list(itertools.product((False, True), repeat=len(limited))), dtype=bool)
             alone = np.empty((0, len(rest)))
         else:
-            sides = np.random.default_rng([self._seed, 0]).random((SOME_CORNERS, len(limited))) < 0.5
+            sides = np.random.default_rng([self.seed, 0]).random((SOME_CORNERS, len(limited))) < 0.5
             alone = np.tile(rest, (2 * len(limited), 1))
             for k, degree in enumerate(limited):
                 alone[2 * k : 2 * k + 2, degree.column] = degree.lower, degree.upper

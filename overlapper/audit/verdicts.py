@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import reduce
 from operator import add
@@ -19,9 +17,12 @@ from overlapper.audit.sampling import Sampling
 from overlapper.audit.tally import Array, Tally
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.links import LinkContact, link_contacts
+from overlapper.sweep.engines import Engine
+from overlapper.sweep.hand import Failed, Job
 
 Status = Literal["never", "sometimes", "always"]
 
+FEW = 4  # blocks, which are done here in the time that another process takes to start
 NORMAL_95 = 1.959963984540054  # between minus this and this are 95 % of a normal distribution
 
 
@@ -74,20 +75,18 @@ def audit(
     seed: int = 0,
     tolerance: float = 1e-3,
     least_depth: float = 0.0,
-    threads: int = 1,
+    engine: Engine | None = None,
     progress: Callable[[Iterator[Tally], int], Iterable[Tally]] = lambda blocks, count: blocks,
 ) -> Audit:
     """Look at a robot in so many configurations; the same of the same arguments, however many `processes` there are.
 
     `tolerance` is that of `overlapper.overlap`, and links share nothing that overlap by a depth of `least_depth` (m) or
     less. `progress` passes on what is seen block by block, of which there are so many. ValueError for less than one
-    configuration or thread, or a negative seed.
+    configuration, or a negative seed.
     """
-    if threads < 1:
-        raise ValueError(f"threads must be 1 or more, not {threads}")
     sampling = Sampling(robot, configurations, seed)
     examiner = Examiner(robot, sampling, tolerance, least_depth)
-    tally = reduce(add, progress(_tallies(examiner, threads), len(sampling.blocks)))
+    tally = reduce(add, progress(_tallies(examiner, engine), len(sampling.blocks)))
     sights = _Sights(examiner)
     verdicts = []
     for k, pair in enumerate(examiner.pairs):
@@ -111,21 +110,17 @@ def wilson(met: int, asked: int) -> tuple[float, float, float]:
     return fraction, lower if met else 0.0, upper if met < asked else 1.0  # which rounding would miss
 
 
-def _tallies(examiner: Examiner, threads: int) -> Iterator[Tally]:
-    """What is seen in each block; each thread has an examiner of its own."""
-    own = threading.local()
-
-    def look(block: int) -> Tally:
-        if not hasattr(own, "examiner"):
-            own.examiner = examiner.again()
-        found: Tally = own.examiner(block)
-        return found
-
-    with ThreadPoolExecutor(threads) as pool:
-        try:
-            yield from pool.map(look, range(len(examiner.sampling.blocks)))
-        finally:
-            pool.shutdown(cancel_futures=True)
+def _tallies(examiner: Examiner, engine: Engine | None) -> Iterator[Tally]:
+    """What is seen in each block, in whatever order."""
+    blocks = range(len(examiner.sampling.blocks))
+    if engine is None or len(blocks) <= FEW:
+        yield from map(examiner, blocks)
+        return
+    job = Job("overlapper.audit.examiner", "prepared", examiner.setup)
+    for block, outcome in engine.outcomes(job, blocks):
+        if isinstance(outcome, Failed):
+            raise RuntimeError(f"configurations of block {block}: {outcome.sentence}\n{outcome.traceback}")
+        yield outcome.value
 
 
 class _Sights:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from overlapper.cli.engine import AddressOption, EngineOption, WorkersOption, engine_of, refuse_address
 from overlapper.cli.figures import VOLUME_UNITS, volume_unit
 from overlapper.cli.options import (
     ConcaveOption,
@@ -52,9 +52,9 @@ def audit(
     srdf: Annotated[Path | None, typer.Option(help="SRDF file to write, for a planner.")] = None,
     out: Annotated[Path | None, typer.Option(help="Table of all pairs of links: .csv, .parquet, .sqlite.")] = None,
     html: HtmlOption = None,
-    threads: Annotated[
-        int | None, typer.Option(min=1, help="By default one for each core.", show_default=False)
-    ] = None,
+    workers: WorkersOption = None,
+    engine: EngineOption = "processes",
+    address: AddressOption = None,
     tolerance: ToleranceOption = 1e-3,
     surface: SurfaceOption = "nominal",
     concave: ConcaveOption = "decompose",
@@ -80,6 +80,7 @@ def audit(
     from overlapper.whole_file import must_be_writable
 
     refuse_out_of_range(tolerance, concave_threshold, out)
+    refuse_address(engine, address)
     pairs = expected_pairs(expect)
     settings: dict[str, Any] = {
         "configurations": configurations,
@@ -117,15 +118,16 @@ def audit(
             except NotRead as error:
                 raise Refused(str(error)) from error
             must_name_some(pairs, read.link_names, "link")
-            found = look(
-                read,
-                configurations,
-                seed,
-                tolerance,
-                least_depth,
-                threads or os.cpu_count() or 1,
-                lambda blocks, count: with_progress(blocks, robot.name, count),
-            )
+            with engine_of(engine, address, workers) as working:
+                found = look(
+                    read,
+                    configurations,
+                    seed,
+                    tolerance,
+                    least_depth,
+                    working,
+                    lambda blocks, count: with_progress(blocks, robot.name, count),
+                )
             if not found.verdicts:
                 raise Refused(f"{robot} has no two links with shapes that could overlap")
             page = addresses(found, html) if html else {}

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -13,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from overlapper.cli.engine import AddressOption, EngineOption, WorkersOption, engine_of, refuse_address
 from overlapper.cli.options import (
     ConcaveOption,
     MethodOption,
@@ -75,15 +75,9 @@ def sweep(
         float | None, typer.Option(min=0.001, help="Seconds that a task may take; then it has failed.")
     ] = None,
     retry: Annotated[bool, typer.Option("--retry", help="Do tasks again that have failed.")] = False,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Tasks at a time; by default one on each core.", show_default=False)
-    ] = None,
-    engine: Annotated[
-        Literal["processes", "ray"], typer.Option(help="Who does it: processes of this machine, or a Ray cluster.")
-    ] = "processes",
-    address: Annotated[
-        str | None, typer.Option(help="Of the Ray cluster, host:port or auto; by default one of this machine.")
-    ] = None,
+    workers: WorkersOption = None,
+    engine: EngineOption = "processes",
+    address: AddressOption = None,
     pages: Annotated[int, typer.Option(min=0, help="Pages of so many of the worst tasks, beside the summary.")] = 0,
     method: MethodOption = "auto",
     tolerance: ToleranceOption = 1e-3,
@@ -114,8 +108,7 @@ def sweep(
     refuse_out_of_range(tolerance, concave_threshold, None)
     parameters = given_parameters(given)
     kept = _kept(steps_kept)
-    if address and engine != "ray":
-        raise Refused("--address is for --engine ray")
+    refuse_address(engine, address)
     if ranges and not sample:
         raise Refused("--range says what --sample draws, and there is no --sample")
     settings: dict[str, Any] = {
@@ -147,7 +140,7 @@ def sweep(
         study = Study.of(find_scene(scene), settings, kept)
         todo = Sweep(study, space.crossed(_axes(space, grid, seeds, points, sample, ranges, sample_seed)))
         store = stack.enter_context(todo.opened(out))
-        working = stack.enter_context(_engine(engine, address, workers))
+        working = stack.enter_context(engine_of(engine, address, workers))
         reached, finished = _run(todo, store, working, limit, retry, as_json)
         shown = page.write(todo, store, scene, pages) if store.done else None
         failures = store.rows("failures")
@@ -178,22 +171,6 @@ def _axes(
     axes += [space.samples(sample, ranges or [], sample_seed)] if sample else []
     axes += [space.grid(each) for each in grid or ()]
     return axes + ([space.seeds(seeds)] if seeds else [])
-
-
-@contextmanager
-def _engine(name: str, address: str | None, workers: int | None) -> Iterator[Engine]:
-    if name == "processes":
-        from overlapper.sweep.processes import Processes
-
-        yield Processes(workers)
-        return
-    from overlapper.sweep.cluster import Cluster
-
-    cluster = Cluster(address, workers)
-    try:
-        yield cluster
-    finally:
-        cluster.close()
 
 
 def _run(

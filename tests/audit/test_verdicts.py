@@ -19,13 +19,16 @@ from overlapper import (
     Sphere,
     overlap,
 )
-from overlapper.audit.examiner import Examiner, ball
+from overlapper.audit import verdicts
+from overlapper.audit.examiner import Examiner, ball, prepared
 from overlapper.audit.robot import read_robot
 from overlapper.audit.sampling import BLOCK, Sampling
 from overlapper.audit.verdicts import audit, wilson
 from overlapper.quaternion import rotated
 from overlapper.simulation import Bodies
 from overlapper.simulation.model_file import load
+from overlapper.sweep.hand import Failed
+from overlapper.sweep.processes import Processes
 
 
 def by_names(found):
@@ -87,17 +90,28 @@ def test_what_overlaps_no_deeper_than_asked_does_not(table):
     assert by_names(audit(table, 100, least_depth=0.041))["arm", "plate"].status == "never"
 
 
-def test_threads_do_not_change_a_bit():
-    robot = read_robot(DATA / "kuka_iiwa" / "model.urdf")
-    one, two = (audit(robot, BLOCK + 2000, seed=3, threads=threads) for threads in (1, 2))
-    assert any(each.status == "sometimes" for each in one.verdicts)
+def test_processes_do_not_change_a_bit(table, monkeypatch):
+    monkeypatch.setattr(verdicts, "FEW", 0)
+    one, two = (audit(table, 2 * BLOCK + 100, seed=3, engine=engine) for engine in (None, Processes(2)))
     for a, b in zip(one.verdicts, two.verdicts, strict=True):
         assert (a.names, a.met, a.asked, a.fraction) == (b.names, b.met, b.asked, b.fraction)
         if a.largest:
             assert (a.largest.number, a.deepest.number) == (b.largest.number, b.deepest.number)
             assert a.largest.contact.volume == b.largest.contact.volume
-    with pytest.raises(ValueError, match="threads must be 1 or more, not 0"):
-        audit(robot, 1, threads=0)
+
+
+def test_a_block_that_fails_is_told(table, monkeypatch):
+    class Broken:
+        workers = 1
+
+        def outcomes(self, job, items, limit=None):
+            yield 7, Failed("died", "its process ended with signal SIGKILL", "words")
+
+    monkeypatch.setattr(verdicts, "FEW", 0)
+    with pytest.raises(
+        RuntimeError, match=r"^configurations of block 7: its process ended with signal SIGKILL\nwords$"
+    ):
+        audit(table, 10, engine=Broken())
 
 
 @pytest.mark.parametrize(
@@ -156,6 +170,6 @@ def test_intervals_are_those_of_wilson():
 
 def test_an_examiner_says_the_same_again(table):
     examiner = Examiner(table, Sampling(table, BLOCK, 0))
-    first, second, again = examiner(1), examiner(1), examiner.again()(1)
+    first, second, again = examiner(1), examiner(1), prepared(examiner.setup)(1)
     for tally in (second, again):
         assert (tally.met == first.met).all() and (tally.volume.value == first.volume.value).all()

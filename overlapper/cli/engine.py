@@ -1,0 +1,49 @@
+"""Who does what can be done piece by piece: processes of this machine, or a Ray cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from overlapper.cli.refusals import Refused
+
+if TYPE_CHECKING:
+    from overlapper.sweep.engines import Engine
+
+EngineOption = Annotated[
+    Literal["processes", "ray"], typer.Option(help="Who does it: processes of this machine, or a Ray cluster.")
+]
+
+AddressOption = Annotated[
+    str | None, typer.Option(help="Of the Ray cluster, host:port or auto; by default one of this machine.")
+]
+
+WorkersOption = Annotated[
+    int | None, typer.Option(min=1, help="Tasks at a time; by default one on each core.", show_default=False)
+]
+
+
+def refuse_address(engine: str, address: str | None) -> None:
+    """Refuse an address that nobody asks for."""
+    if address and engine != "ray":
+        raise Refused("--address is for --engine ray")
+
+
+@contextmanager
+def engine_of(name: str, address: str | None, workers: int | None) -> Iterator[Engine]:
+    """The engine of that name; NotStarted if there is no cluster, ImportError without Ray."""
+    if name == "processes":
+        from overlapper.sweep.processes import Processes
+
+        yield Processes(workers)
+        return
+    from overlapper.sweep.cluster import Cluster
+
+    cluster = Cluster(address, workers)
+    try:
+        yield cluster
+    finally:
+        cluster.close()
