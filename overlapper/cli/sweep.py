@@ -127,22 +127,23 @@ def sweep(
         with without_banner():
             import overlapper.simulation.bodies  # noqa: F401  # which says now what to install
         from overlapper.scenes.scene import find_scene, load_scene
-        from overlapper.sweep import page
+        from overlapper.sweep import charts, page
         from overlapper.sweep.part import must_be_no_columns
         from overlapper.sweep.points import Space
         from overlapper.sweep.study import Study
         from overlapper.sweep.sweep import Sweep
 
+        charts.must_be_there()
         chosen = load_scene(scene, parameters)
         must_be_no_columns(chosen.parameters)
-        space = Space(chosen.name, chosen.parameters)
+        space = Space(chosen.name, chosen.parameters, parameters.keys())
         settings["steps"] = steps or chosen.steps
         study = Study.of(find_scene(scene), settings, kept)
         todo = Sweep(study, space.crossed(_axes(space, grid, seeds, points, sample, ranges, sample_seed)))
         store = stack.enter_context(todo.opened(out))
         working = stack.enter_context(engine_of(engine, address, workers))
         reached, finished = _run(todo, store, working, limit, retry, as_json)
-        shown = page.write(todo, store, scene, pages) if store.done else None
+        shown = page.write(todo, store, scene, pages) if store.done & todo.tasks.keys() else None
         failures = store.rows("failures")
     _tell(todo, store, reached, finished, failures, shown, as_json)
 
@@ -194,6 +195,8 @@ def _run(
         def heard(now: Reached) -> None:
             nonlocal reached
             reached = now
+            if not now.done + now.failed:  # what was there before says nothing of how fast it goes
+                progress.reset(bar, completed=now.total - now.missing)
             speed = progress.tasks[0].speed
             failed = f", {now.failed:,} failed" if now.failed else ""
             rate = f"{speed:,.3g}/s{failed}" if speed else ""
@@ -243,7 +246,7 @@ def _tell(
             say(f"Tracebacks: {store.path('failures')}; --retry does them again")
         if not finished:
             say("Interrupted; the same command goes on with what is missing.")
-        for path in filter(None, (store.path("tasks") if store.done else None, page)):
+        for path in filter(None, (store.path("tasks") if page else None, page)):
             say(f"Written: {path}")
     raise typer.Exit(130 if not finished else 1 if failures else 0)
 

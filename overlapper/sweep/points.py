@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections import ChainMap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -22,10 +22,11 @@ MOST = 10_000_000  # tasks of a sweep; beyond, somebody has mistyped
 
 @dataclass(frozen=True, slots=True)
 class Space:
-    """The parameters of a scene: their defaults, by name."""
+    """The parameters of a scene: their defaults, by name, and which of them are `settled` for all points."""
 
     scene: str
     defaults: Mapping[str, Parameter]
+    settled: Collection[str] = ()
 
     def grid(self, text: str) -> list[Point]:
         """A parameter with its values: "friction=0.3,0.5", or so many from one number to another, "mass=0.1:10:20",
@@ -107,10 +108,10 @@ class Space:
     def crossed(self, axes: Iterable[Sequence[Point]]) -> list[Point]:
         """All parameters of each point of the product of the axes, the last one moving fastest; none of them twice."""
         axes = [*axes]
-        taken: set[str] = set()
+        taken = set(self.settled)
         for axis in axes:
             if twice := taken & axis[0].keys():
-                raise ValueError(f"{min(twice)} is given by two of --grid, --seeds, --points and --range")
+                raise ValueError(f"{min(twice)} is given by two of --set, --grid, --seeds, --points and --range")
             taken |= axis[0].keys()
         if (count := math.prod(map(len, axes))) > MOST:
             raise ValueError(f"that would be {count:,} tasks, more than {MOST:,}")

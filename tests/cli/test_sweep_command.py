@@ -38,11 +38,11 @@ def test_a_sweep_says_what_became_of_it_and_writes_a_page_of_it():
     name = f"views/{worst['task'][:12]}.html"
     assert link == f"{name}#t={1 / 240:.6g}"
     assert command == f"overlapper view balls.py --set=apart=0.1 --html=runs/{name}"
-    before = Path("runs", name).read_bytes()
+    size = Path("runs", name).stat().st_size
     Path("runs", name).unlink()
     words = shlex.split(command)
     subprocess.run([sys.executable, "-m", *words], check=True, capture_output=True)
-    assert len(Path("runs", name).read_bytes()) == len(before)
+    assert Path("runs", name).stat().st_size == pytest.approx(size, rel=1e-3)
 
 
 def test_json_says_what_failed_with_exit_code_1():
@@ -99,3 +99,14 @@ def test_a_folder_that_is_none_is_refused():
     Path("runs").write_text("a file")
     done = sweep("--out", "runs")
     assert (done.returncode, done.stdout, done.stderr) == (2, "", "overlapper: runs: File exists\n")
+
+
+def test_a_sweep_of_which_nothing_is_done_has_no_page():
+    done = sweep("--set", "fate=raises", "--out", "runs")
+    assert (done.returncode, done.stderr) == (1, "")
+    lines = done.stdout.splitlines()
+    assert lines[0] == "balls: 0 of 1 tasks are done." and lines[1].startswith(
+        "Failed: apart=0.15, seed=0, fate=raises"
+    )
+    assert lines[2:] == ["Tracebacks: runs/failures.parquet; --retry does them again"]
+    assert not Path("runs/summary.html").exists()

@@ -46,7 +46,7 @@ SETTINGS = {"tolerance": 1e-3, "method": "auto", "concave": "decompose", "concav
 SETTINGS |= {"surface": "nominal", "pairs": None}
 
 # Sixty tasks of which a kill comes in the middle.
-SLOW = ["apart=0.05:0.25:20", "seed=0,1,2", "seconds=0.03"]
+SLOW = ["apart=0.05:0.25:20", "seed=0,1,2", "seconds=0.06"]
 
 
 def sweep_of(grids, kept=0, steps=3):

@@ -63,8 +63,11 @@ def test_axes_are_crossed_and_no_point_is_there_twice():
 
 
 def test_a_parameter_is_on_one_axis_only():
-    with pytest.raises(ValueError, match=r"^mass is given by two of --grid, --seeds, --points and --range$"):
+    words = r"^mass is given by two of --set, --grid, --seeds, --points and --range$"
+    with pytest.raises(ValueError, match=words):
         SPACE.crossed([SPACE.grid("mass=1,2"), SPACE.grid("mass=3")])
+    with pytest.raises(ValueError, match=words):
+        Space("grasp", SPACE.defaults, {"mass"}).crossed([SPACE.grid("mass=1,2")])
 
 
 def test_more_tasks_than_anybody_means_are_refused(monkeypatch):

@@ -58,7 +58,7 @@ def test_steps_are_kept_as_asked():
 
 
 def test_each_reader_takes_it_for_one_table():
-    import duckdb
+    duckdb = pytest.importorskip("duckdb")
     import pandas
     import polars
 

@@ -1,0 +1,65 @@
+"""The summary of a sweep: its charts group what a grid or a sample has, and its commands show what they say."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sweeping import rows, sweep_of, swept
+
+from overlapper.sweep import charts, page
+from overlapper.sweep.charts import APART, BINS, MEASURES, axis
+
+
+def test_values_of_a_grid_are_told_apart_and_those_of_a_sample_are_binned():
+    grid = axis("mass", [1.0, 2.0, 4.0, 2.0])
+    assert grid.group.tolist() == [0, 1, 2, 1] and not grid.log
+    assert grid.middles.tolist() == [1, 2, 4] and grid.edges.tolist() == [0.5, 1.5, 3, 5]
+    sample = axis("mass", np.linspace(0, 1, APART + 1).tolist())
+    assert len(sample.middles) == BINS and set(sample.group.tolist()) == set(range(BINS))
+    assert sample.edges[0] == 0 and sample.edges[-1] == 1
+
+
+def test_factors_of_ten_and_more_are_seen_by_factors():
+    scale = axis("mass", [0.1, 1.0, 10.0])
+    assert scale.log and scale.middles == pytest.approx([0.1, 1, 10])
+    assert scale.edges == pytest.approx([10**-1.5, 10**-0.5, 10**0.5, 10**1.5])
+    assert not axis("count", [1, 100]).log
+
+
+def test_texts_and_truths_have_their_names():
+    assert axis("kind", ["b", "a", "b"]).labels == ["a", "b"]
+    assert axis("soft", [True, False]).labels == ["False", "True"]
+
+
+def test_charts_are_the_same_again_and_are_svg():
+    values = np.array([1e-6, 2e-6, 3e-6, 4e-6])
+    measured = [(measure, values) for measure in MEASURES]
+    across, up = axis("mass", [1.0, 2.0, 1.0, 2.0]), axis("kind", ["a", "a", "b", "b"])
+    for drawn in (charts.lines(across, measured), charts.heat_map(across, up, measured[:2])):
+        assert ET.fromstring(drawn).tag == "{http://www.w3.org/2000/svg}svg"
+        assert "largest volume, cm³" in drawn and "mass" in drawn
+    assert charts.lines(across, measured) == charts.lines(across, measured)
+
+
+@pytest.mark.usefixtures("balls")
+def test_a_page_of_samples_and_settings_has_maps_and_whole_commands():
+    grids = ["apart=0.1:0.19:30", "seconds=0.0,0.001", "seed=0,1"]
+    swept("runs", grids, steps=1)
+    sweep = sweep_of(grids, steps=1)
+    sweep.study.settings["surface"] = "margin"
+    with sweep_of(grids, steps=1).opened(Path("runs")) as store:
+        assert page.write(sweep_of(grids, steps=1), store, "my scene.py") == Path("runs/summary.html")
+    text = Path("runs/summary.html").read_text()
+    assert "120 of 120 tasks are done over apart (30), seconds (2), seed (2)." in text
+    assert text.count("<svg") == 4 and "Over two parameters" in text  # three of lines, one map
+    row = rows("runs")[0] | {"apart": 0.125, "seed": 0, "seconds": 0.0}
+    assert page.command(sweep, "my scene.py", row, Path("a.html")) == (
+        "overlapper run 'my scene.py' --set=apart=0.125 --steps=1 --surface=margin --html=a.html"
+    )
+
+
+def test_the_summary_names_what_is_to_be_installed(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
+    with pytest.raises(ImportError, match=r"^the summary of a sweep needs matplotlib: pip install matplotlib$"):
+        charts.must_be_there()
