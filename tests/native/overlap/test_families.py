@@ -15,7 +15,11 @@ from overlapper import Hull
 SEED = 2026
 AFFORDABLE = {  # seeds whose exact truth takes less than half a second, and such as were hard
     "combined": (*range(SEED, SEED + 5), 300168, 400034),  # witnesses of needles, and needles that touch
-    "flush_round": (*range(SEED, SEED + 5), 41, 44, 500354),  # a half ball, lids, a cylinder in a box that it fills
+    "flush_round": (
+        *range(SEED, SEED + 5),
+        *(41, 44, 500354),  # a half ball, lids, a cylinder in a box that it fills
+        4001101,  # planes that touch a ball, and by rounding cut it
+    ),
     "round_contacts": (
         *range(SEED, SEED + 5),
         *(300076, 400019, 500146, 2000219),  # over the diagonal that is no edge

@@ -17,6 +17,9 @@ struct Points {
 
 double sum(const Row& row) { return ((row[0] + row[1]) + (row[2] + row[3])) + ((row[4] + row[5]) + (row[6] + row[7])); }
 
+/// Of the radius: the direction of a shorter chord is mostly what rounding has made of its ends.
+constexpr double kShort = 1e-6;
+
 /// Slices of one outline, a row of them after the other.
 class Bundle {
  public:
@@ -227,7 +230,7 @@ class Bundle {
     Row one, two;
     beyond(stack_.line[before], one), beyond(stack_.line[after], two);
     Row length, distance, ax, ay, angle, sine, cosine;
-    double least = 4, most = 0;
+    double least = 4, most = 0, shortest = 0;
     for (int k = 0; k < kRow; ++k) {
       const double cx = q.x[k] - p.x[k], cy = q.y[k] - p.y[k], l = std::sqrt(cx * cx + cy * cy);
       const double inverse = l > 0 ? 1 / l : 0, x = cy * inverse, y = -cx * inverse;
@@ -236,13 +239,24 @@ class Bundle {
       // Of a chord that rounding may have turned round, what is known of the two lines that it lies between tells the
       // side.
       const double sure = back && one[k] > 0 && two[k] > 0 ? -std::abs(beside) : std::abs(beside);
-      const double d = l < 1e-6 * radius[k] ? sure : beside, h = 0.5 * l;
+      const double d = l < kShort * radius[k] ? sure : beside, h = 0.5 * l;
       const double whole = std::max(std::sqrt(h * h + d * d), DBL_MIN);
       length[k] = l, distance[k] = d, ax[k] = x, ay[k] = y;
       sine[k] = h / whole, cosine[k] = d / whole;
       angle[k] = half_turn_angle(h / whole, d / whole);
     }
-    for (int k = 0; k < kRow; ++k) least = std::min(least, angle[k]), most = std::max(most, angle[k]);
+    for (int k = 0; k < kRow; ++k) {
+      least = std::min(least, angle[k]), most = std::max(most, angle[k]);
+      shortest = std::min(shortest, length[k] - kShort * radius[k]);
+    }
+    // Across a chord that is nothing but rounding is the way from the centre.
+    for (int k = 0; shortest < 0 && k < kRow; ++k) {
+      if (!(length[k] < kShort * radius[k])) continue;
+      const Point away =
+          Point{0.5 * (p.x[k] + q.x[k]) - sides_.centre_x[k], 0.5 * (p.y[k] + q.y[k]) - sides_.centre_y[k]};
+      const double far = std::copysign(norm(away), distance[k]);
+      if (far != 0) ax[k] = away.x / far, ay[k] = away.y / far;
+    }
     Row segment_area{}, first_across{}, second_across{}, second_along{};
     if (least < kNarrow)
       for (int k = 0; k < kRow; ++k) {
