@@ -564,8 +564,8 @@ def test_rounded_boxes_that_are_nearly_parallel_are_sliced():
         found.append(assert_motion_changes_nothing(*make("tilted_round", seed).bodies, np.random.default_rng(seed)))
     overlapping = [one for one in found if one]
     assert len(overlapping) > 180
-    assert sum("dual" in one.way for one in overlapping) <= 0.02 * len(overlapping)
-    assert sum(one.volume_error > 1e-11 * one.volume for one in overlapping) <= 0.35 * len(overlapping)
+    assert {one.way for one in overlapping} == {"slicing"}
+    assert sum(one.volume_error > 1e-11 * one.volume for one in overlapping) <= 0.2 * len(overlapping)
 
 
 @pytest.mark.parametrize("which", range(len(SILENT)))
@@ -584,8 +584,8 @@ def test_special_poses_are_measured_truly_wherever_they_are(first_seed):
         found.append(assert_motion_changes_nothing(a, b, np.random.default_rng(seed)))
     overlapping = [one for one in found if one]
     assert len(overlapping) > 200
-    assert sum(one.volume_error > 1e-11 * one.volume for one in overlapping) <= 0.03 * len(overlapping)
-    assert sum("dual" in one.way for one in overlapping) <= 0.01 * len(overlapping)
+    assert sum(one.volume_error > 1e-11 * one.volume for one in overlapping) <= 0.02 * len(overlapping)
+    assert not any("dual" in one.way for one in overlapping)
 
 
 def test_a_formula_that_is_not_sure_is_not_believed_where_slices_give_up():

@@ -355,11 +355,10 @@ class Settling {
     candidates.trace(low_, high_);
     values.push_back(low_), values.push_back(high_);
     std::sort(values.begin(), values.end());
-    const double least = 1e-14 * (high_ - low_);
-    for (size_t i = 0; i + 1 < values.size(); ++i)
-      if (values[i] >= low_ && values[i + 1] <= high_ && values[i + 1] - values[i] > least &&
-          !settle(values[i], values[i + 1]))
-        return false;
+    for (size_t i = 0; i + 1 < values.size(); ++i) {
+      const double low = values[i], high = values[i + 1];
+      if (low >= low_ && high <= high_ && high - low > 1e-14 * size_near(low, high) && !settle(low, high)) return false;
+    }
     if (!intervals_.empty()) refine();
     return true;
   }
@@ -370,6 +369,12 @@ class Settling {
   static constexpr double kPointlike = 1e-11, kPointlikeClosely = 1e-14;  ///< of the stack
   static constexpr double kRounded = 1e-12;                               ///< of how far all slices are from the origin
   static constexpr int kMostEvents = 40;
+
+  /// What an interval is small beside: all of them, or near the origin, where doubles are finer, less.
+  double size_near(double low, double high) const {
+    const double all = high_ - low_;
+    return std::clamp(1e3 * std::max(std::abs(low), std::abs(high)), 1e-3 * all, all);
+  }
 
   Outline at(double t) const { return outline(Slice(stack_, t)); }
   /// That outline may be it.
@@ -384,7 +389,8 @@ class Settling {
     if (!intervals_.empty()) intervals_.back().high = low;
     // A corner and a circle, or three lines, meet in a value of t; rounding makes it an interval of its own.
     const double far = std::max({0.0, low_, -high_});
-    const double pointlike = std::max((closely_ ? kPointlikeClosely : kPointlike) * (high_ - low_), kRounded * far);
+    const double pointlike =
+        std::max((closely_ ? kPointlikeClosely : kPointlike) * size_near(low, high), kRounded * far);
     if (high - low < pointlike && !intervals_.empty()) {
       intervals_.back().high = high;
       return;

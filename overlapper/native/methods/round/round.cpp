@@ -44,6 +44,8 @@ constexpr double kSummation = 16 * DBL_EPSILON;
 /// many pairs of such what they bound is cut there: each makes two of a piece.
 constexpr double kFolded = 1e-10;
 constexpr size_t kMostFolds = 3;
+/// Of the size, how far from each other planes may be that are counted from beside one of them.
+constexpr double kOneSlab = 1e-6;
 
 /// Whether slices are to have so many walls: of more, they take long, by the cube of their number.
 bool sliceable(size_t walls) { return walls <= 28; }
@@ -107,7 +109,7 @@ class Measuring {
     if (!around) return add_stack();
     // Axes of slices are chosen by what is near the point that coordinates count from.
     const Vec3 middle = around->middle();
-    if (const std::optional<Vec3> beside = slicing::beside_rushing(rounds_, walls_, middle)) return add_about(*beside);
+    if (const auto rushing = slicing::rushing(rounds_, walls_, middle); !rushing.empty()) return add_slabs(rushing);
     if (!around->excludes({})) return add_stack();
     // Beside the point inside, a shallow piece has more digits about that than about the middle of what encloses it.
     return (norm(middle) <= around->reach(middle) && add_surely()) || add_about(middle);
@@ -725,6 +727,28 @@ class Measuring {
     const bool done = add_stack();
     offset_ = offset, extent = usual;
     return done;
+  }
+
+  /// Between planes whose lines rush across slices, these are cut, and counted from beside one of them on either side.
+  bool add_slabs(std::span<const slicing::Rushing> rushing) {
+    const WideVector across = unit(cross(rounds_[0].axis, rounds_[1].axis));
+    const std::vector<Round> rounds = rounds_;
+    const std::vector<Wall> walls = walls_;
+    std::optional<Wall> lower;
+    for (size_t first = 0, last; first < rushing.size(); first = last + 1) {
+      const auto level = [&](size_t i) { return rushing[i].level; };
+      last = first;
+      while (last + 1 < rushing.size() && level(last + 1) - level(last) <= kOneSlab * extent) ++last;
+      rounds_ = rounds, walls_ = walls;
+      if (lower) walls_.push_back(*lower);
+      if (last + 1 < rushing.size()) {
+        const DoubleDouble middle{level(last) + (level(last + 1) - level(last)) / 2};
+        walls_.push_back({across, middle, slicing::kCut});
+        lower = {-across, -middle, slicing::kCut};
+      }
+      if (!add_about(rushing[first].beside)) return false;
+    }
+    return true;
   }
 
   /// False, and nothing is added, if slices about the present point are not sure to a fraction of the whole that

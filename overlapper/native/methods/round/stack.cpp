@@ -217,18 +217,19 @@ void add_round(Stack& stack, const Round& r, const Axes& axes) {
 
 }  // namespace
 
-std::optional<Vec3> beside_rushing(std::span<const Round> rounds, std::span<const Wall> walls, Vec3 point) {
-  if (rounds.size() != 2 || rounds[0].ball || rounds[1].ball) return std::nullopt;
+std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall> walls, Vec3 point) {
+  std::vector<Rushing> found;
+  if (rounds.size() != 2 || rounds[0].ball || rounds[1].ball) return found;
   const Vec3 across = rounded(unit(cross(rounds[0].axis, rounds[1].axis)));
-  std::optional<Vec3> beside;
-  double least = std::numeric_limits<double>::infinity();
   for (const Wall& wall : walls) {
     const Vec3 normal = rounded(wall.normal);
-    const double tilt = norm(cross(normal, across)), away = wall.slack.head - dot(normal, point);
-    if (tilt > kParallel && tilt < kRushing && std::abs(away) < least)
-      least = std::abs(away), beside = point + away * normal;
+    const double tilt = norm(cross(normal, across));
+    if (!(tilt > kParallel && tilt < kRushing)) continue;
+    const Vec3 beside = point + (wall.slack.head - dot(normal, point)) * normal;
+    found.push_back({dot(across, beside), beside});
   }
-  return beside;
+  std::ranges::sort(found, {}, &Rushing::level);
+  return found;
 }
 
 std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way) {

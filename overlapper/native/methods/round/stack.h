@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "methods/round/pieces.h"
 #include "methods/round/slice.h"
@@ -16,8 +17,13 @@ inline constexpr int kAxes = 5;
 /// best. Nothing where there are too many walls, or not so many ways.
 std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way);
 
-/// Of two cylinders, whose slices may not be turned, and a plane that is nearly parallel to these but not quite, so
-/// that its line rushes across them: the point of the plane beside another. From there, doubles tell those slices.
-std::optional<Vec3> beside_rushing(std::span<const Round> rounds, std::span<const Wall> walls, Vec3 point);
+/// A plane that is nearly parallel to the slices of two cylinders, which may not be turned, but not quite, so that its
+/// line rushes across them.
+struct Rushing {
+  double level;  ///< across the slices
+  Vec3 beside;   ///< a point of it beside another: from there, doubles tell those slices
+};
+/// All of these by level, each with its point beside `point`.
+std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall> walls, Vec3 point);
 
 }  // namespace overlapper::slicing
