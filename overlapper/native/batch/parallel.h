@@ -13,6 +13,15 @@
 
 namespace overlapper {
 
+/// A thread that is waited for where it is forgotten, as by std::jthread, which not every library has.
+struct WaitedFor : std::thread {
+  using std::thread::thread;
+  WaitedFor(WaitedFor&&) = default;
+  ~WaitedFor() {
+    if (joinable()) join();
+  }
+};
+
 /// Calls `work(i, thread)` for every i below `count`, on the calling thread and on `threads` - 1 others. They live for
 /// this call only, so that a process forked between calls lacks nothing. `work` returns false if it took long enough to
 /// look at the clock. Once the answer is not wanted any more, no further i is begun, those under way are given up at
@@ -45,7 +54,7 @@ bool for_each_in_parallel(size_t count, int threads, const Work& work) {
 
   int working = static_cast<int>(std::min<size_t>(threads, (count + kBlock - 1) / kBlock)) - 1;
   std::condition_variable done;
-  std::vector<std::jthread> others;
+  std::vector<WaitedFor> others;
   const auto help = [&](int thread) {
     cancellation::given_up = &stopped;
     work_on(thread);

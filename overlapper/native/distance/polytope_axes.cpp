@@ -34,10 +34,10 @@ void lowest_along_normals(const Solid& faces, const Solid& other, double best, s
         const double x = other.x[v], y = other.y[v], z = other.z[v];
         const TwoLanes a = ax * x + ay * y + az * z, b = bx * x + by * y + bz * z,
                        number = TwoLanes{} + static_cast<double>(v);
-        lowest_a = a < height_a ? number : lowest_a;
-        height_a = a < height_a ? a : height_a;
-        lowest_b = b < height_b ? number : lowest_b;
-        height_b = b < height_b ? b : height_b;
+        choose(a < height_a, number, lowest_a, lowest_a);
+        choose(a < height_a, a, height_a, height_a);
+        choose(b < height_b, number, lowest_b, lowest_b);
+        choose(b < height_b, b, height_b, height_b);
       }
       const auto shorter = (top_a - height_a < best) | (top_b - height_b < best);
       if (!(shorter[0] | shorter[1])) break;

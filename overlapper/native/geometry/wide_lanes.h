@@ -1,16 +1,9 @@
 #pragma once
 
-#ifdef __x86_64__
-#include <immintrin.h>
-#endif
-
+#include "geometry/lanes.h"
 #include "geometry/wide.h"
 
 namespace overlapper {
-
-/// Four doubles that are added and multiplied at once, by whatever the machine has. Aligned as the widest of machines
-/// want it: functions compiled for those meet data of others.
-using Quad = double __attribute__((vector_size(32), aligned(32)));
 
 /// Four numbers in double-double. Copied quad by quad: left to itself, the compiler copies smaller pieces, and the quad
 /// that is loaded next waits for all of them.
@@ -42,18 +35,11 @@ struct Halves {
   T high, low;
 };
 
-#ifdef __x86_64__
-__attribute__((target("avx2,fma"))) inline WideLanes fused_product(const Quad& a, const Quad& b) {
-  const Quad product = a * b;
-  return {product, _mm256_fmsub_pd(a, b, product)};
-}
-#else
-inline WideLanes fused_product(const Quad& a, const Quad& b) {
-  WideLanes product{a * b};
-  for (int i = 0; i < 4; ++i) product.tail[i] = std::fma(a[i], b[i], -product.head[i]);
+OVERLAPPER_FUSING inline WideLanes fused_product(const Quad& a, const Quad& b) {
+  WideLanes product(a * b, Quad{});
+  fused_difference(a, b, product.head, product.tail);
   return product;
 }
-#endif
 
 /// The exact product, by fused multiply-adds or Dekker's way for machines that have none; the same bits, unless
 /// something underflows.

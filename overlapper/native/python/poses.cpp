@@ -3,14 +3,28 @@
 namespace overlapper::python {
 namespace {
 
+/// A list or a tuple of what is given.
+struct Items {
+  explicit Items(nb::handle given)
+      : list(nb::steal(PySequence_Fast(given.ptr(), "frames must be pairs of sequences of numbers"))) {
+    if (!list.is_valid()) throw nb::python_error();
+  }
+  size_t size() const { return nb::len(list); }
+  nb::handle operator[](size_t i) const {
+    PyObject* const item = PyTuple_Check(list.ptr()) ? PyTuple_GetItem(list.ptr(), Py_ssize_t(i))
+                                                     : PyList_GetItem(list.ptr(), Py_ssize_t(i));
+    if (!item) throw nb::python_error();
+    return item;
+  }
+  nb::object list;
+};
+
 template <size_t n>
 void read(nb::handle given, std::array<double, n>& numbers) {
-  const nb::object sequence = nb::steal(PySequence_Fast(given.ptr(), "frames must be pairs of sequences of numbers"));
-  if (!sequence.is_valid()) throw nb::python_error();
-  if (PySequence_Fast_GET_SIZE(sequence.ptr()) != Py_ssize_t(n))
-    fail("frames", "must have positions of 3 numbers and quaternions of 4");
+  const Items items(given);
+  if (items.size() != n) fail("frames", "must have positions of 3 numbers and quaternions of 4");
   for (size_t i = 0; i < n; ++i) {
-    numbers[i] = PyFloat_AsDouble(PySequence_Fast_GET_ITEM(sequence.ptr(), Py_ssize_t(i)));
+    numbers[i] = PyFloat_AsDouble(items[i].ptr());
     if (numbers[i] == -1 && PyErr_Occurred()) throw nb::python_error();
   }
 }
@@ -22,13 +36,12 @@ struct Frame {
 };
 
 Frame to_frame(nb::handle given) {
-  const nb::object pair = nb::steal(PySequence_Fast(given.ptr(), "frames must be pairs of sequences of numbers"));
-  if (!pair.is_valid()) throw nb::python_error();
-  if (PySequence_Fast_GET_SIZE(pair.ptr()) < 2) fail("frames", "must have a position and a quaternion each");
+  const Items pair(given);
+  if (pair.size() < 2) fail("frames", "must have a position and a quaternion each");
   std::array<double, 3> p{};
   std::array<double, 4> q{};
-  read(PySequence_Fast_GET_ITEM(pair.ptr(), 0), p);
-  read(PySequence_Fast_GET_ITEM(pair.ptr(), 1), q);
+  read(pair[0], p);
+  read(pair[1], q);
   return {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}};
 }
 

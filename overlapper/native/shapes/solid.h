@@ -4,12 +4,10 @@
 #include <span>
 #include <vector>
 
+#include "geometry/lanes.h"
 #include "shapes/shape.h"
 
 namespace overlapper {
-
-/// Two doubles of a column, which every machine adds, multiplies and compares at once.
-using TwoLanes = double __attribute__((vector_size(16)));
 
 inline TwoLanes load(const double* p) {
   TwoLanes v;

@@ -156,7 +156,7 @@ Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
         load(offset + j, height);
         const Lanes s = normal_x * x + normal_y * y + normal_z * z - height;
         store(signs + j, s);
-        farthest = farthest > s ? farthest : s;
+        choose(farthest > s, farthest, s, farthest);
         marked |= (s > 0.0) & bit;
       }
     }
@@ -303,16 +303,13 @@ Signs run_by(TableClipping& clipping, double rounding) {
   return EdgeCutter<Lanes>(clipping, rounding).run();
 }
 
-#if defined(__AVX2__)
-Run* fastest_run() { return run_by<Quad>; }
-#elif defined(__x86_64__)
-/// Compiled with all that it calls for machines that have more than the rest is compiled for.
-__attribute__((target("avx2"), flatten)) Signs run_by_avx2(TableClipping& clipping, double rounding) {
+#ifdef OVERLAPPER_WIDER
+OVERLAPPER_WIDER Signs run_by_wider(TableClipping& clipping, double rounding) {
   return run_by<Quad>(clipping, rounding);
 }
-Run* fastest_run() { return __builtin_cpu_supports("avx2") ? run_by_avx2 : run_by<TwoLanes>; }
+Run* fastest_run() { return is_wider() ? run_by_wider : run_by<MostLanes>; }
 #else
-Run* fastest_run() { return run_by<TwoLanes>; }
+Run* fastest_run() { return run_by<MostLanes>; }
 #endif
 
 }  // namespace

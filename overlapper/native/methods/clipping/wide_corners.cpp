@@ -184,9 +184,13 @@ class WideCorners {
     way = {(a * qr.x + b * rp.x + c * pq.x) / -volume, (a * qr.y + b * rp.y + c * pq.y) / -volume,
            (a * qr.z + b * rp.z + c * pq.z) / -volume};
     // The sum is off by what the heights are and by the roundings of its own terms.
-    const Quad size = volume < 0 ? -volume : volume;
-    const Quad high_a = a < 0 ? -a : a, high_b = b < 0 ? -b : b, high_c = c < 0 ? -c : c;
-    const Quad high = high_a < high_b ? high_b : high_a, highest = high < high_c ? high_c : high;
+    Quad size, high_a, high_b, high_c, high, highest;
+    choose(volume < 0, -volume, volume, size);
+    choose(a < 0, -a, a, high_a);
+    choose(b < 0, -b, b, high_b);
+    choose(c < 0, -c, c, high_c);
+    choose(high_a < high_b, high_b, high_a, high);
+    choose(high < high_c, high_c, high, highest);
     const Quad rounding = 4 * (wide_rounding_ + 0x1p-50 * highest / size) / size;
     for (int n = 0; n < 4; ++n)
       if (common_.corners[at[n]].vertex < 0) corner_rounding_ = std::max(corner_rounding_, rounding[n]);
@@ -229,21 +233,14 @@ std::optional<double> place_by(const CommonCorners& common, const Mat3& axes, st
   return wide.corner_rounding();
 }
 
-#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
-Placing* fastest_placing() { return place_by<true>; }
-#elif defined(__x86_64__)
-/// Compiled with all that it calls for machines that have more than the rest is compiled for.
-__attribute__((target("avx2,fma"), flatten)) std::optional<double> place_by_avx2(const CommonCorners& common,
-                                                                                 const Mat3& axes,
-                                                                                 std::span<Vec3> vertices,
-                                                                                 std::span<WideLanes> planes) {
+#ifdef OVERLAPPER_WIDER
+OVERLAPPER_WIDER std::optional<double> place_by_wider(const CommonCorners& common, const Mat3& axes,
+                                                      std::span<Vec3> vertices, std::span<WideLanes> planes) {
   return place_by<true>(common, axes, vertices, planes);
 }
-Placing* fastest_placing() {
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? place_by_avx2 : place_by<false>;
-}
+Placing* fastest_placing() { return is_wider() ? place_by_wider : place_by<kFused>; }
 #else
-Placing* fastest_placing() { return place_by<false>; }
+Placing* fastest_placing() { return place_by<kFused>; }
 #endif
 
 /// Equal but for what underflows, which is nothing beside any body's size.

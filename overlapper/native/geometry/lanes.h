@@ -1,0 +1,154 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+/// Rows of doubles that are worked on at once, and what compilers have to do so. Nothing else in the core is written
+/// for one compiler.
+///
+/// GCC and clang have vectors of their own, and compile a function for machines that have more than the rest is
+/// compiled for; but not for Windows, where GCC leaves the stack less aligned than wide vectors want it. Elsewhere rows
+/// are arrays, and loops over them are left to the compiler. The bits are the same.
+#if defined(__GNUC__) && !defined(_WIN32) && !defined(OVERLAPPER_PLAIN_LANES)
+#define OVERLAPPER_VECTORS
+#ifdef __x86_64__
+#include <immintrin.h>
+#endif
+#endif
+
+#if defined(__MINGW32__) && !defined(__FMA__)
+#error "The fma of MinGW's library rounds twice, by which exact signs would be wrong: use another compiler, or -mfma"
+#endif
+
+namespace overlapper {
+
+#ifdef OVERLAPPER_VECTORS
+
+/// Two doubles, which every machine adds, multiplies and compares at once.
+using TwoLanes = double __attribute__((vector_size(16)));
+
+/// Four doubles, by whatever the machine has. Aligned as the widest of machines want it: functions compiled for those
+/// meet data of others.
+using Quad = double __attribute__((vector_size(32), aligned(32)));
+
+/// In each lane one or the other. A quad is not returned, as machines differ in how they do it.
+template <class Which, class Lanes>
+inline void choose(const Which& which, const Lanes& one, const Lanes& other, Lanes& result) {
+  result = which ? one : other;
+}
+
+#else
+
+template <class T, int count>
+struct LanesOf {
+  T lane[count];
+
+  constexpr T& operator[](int i) { return lane[i]; }
+  constexpr const T& operator[](int i) const { return lane[i]; }
+};
+
+/// Of each lane, or of each and the same number; as in a vector, what is true has all bits set.
+template <class T, int count, class Operation>
+constexpr auto each_of(const LanesOf<T, count>& a, const LanesOf<T, count>& b, Operation operation) {
+  LanesOf<decltype(operation(T{}, T{})), count> row{};
+  for (int i = 0; i < count; ++i) row.lane[i] = operation(a.lane[i], b.lane[i]);
+  return row;
+}
+template <int count>
+constexpr LanesOf<double, count> in_each(double number) {
+  LanesOf<double, count> row{};
+  for (double& lane : row.lane) lane = number;
+  return row;
+}
+constexpr std::int64_t all_bits(bool is) { return -static_cast<std::int64_t>(is); }
+
+#define OVERLAPPER_IN_LANES(sign, expression)                                                  \
+  template <class T, int count>                                                                \
+  constexpr auto operator sign(const LanesOf<T, count>& one, const LanesOf<T, count>& other) { \
+    return each_of(one, other, [](T a, T b) { return expression; });                           \
+  }                                                                                            \
+  template <int count>                                                                         \
+  constexpr auto operator sign(const LanesOf<double, count>& one, double b) {                  \
+    return one sign in_each<count>(b);                                                         \
+  }                                                                                            \
+  template <int count>                                                                         \
+  constexpr auto operator sign(double a, const LanesOf<double, count>& other) {                \
+    return in_each<count>(a) sign other;                                                       \
+  }
+OVERLAPPER_IN_LANES(+, a + b)
+OVERLAPPER_IN_LANES(-, a - b)
+OVERLAPPER_IN_LANES(*, a* b)
+OVERLAPPER_IN_LANES(/, a / b)
+OVERLAPPER_IN_LANES(<, all_bits(a < b))
+OVERLAPPER_IN_LANES(>, all_bits(a > b))
+OVERLAPPER_IN_LANES(>=, all_bits(a >= b))
+OVERLAPPER_IN_LANES(&, a& b)
+OVERLAPPER_IN_LANES(|, a | b)
+#undef OVERLAPPER_IN_LANES
+
+template <class T, int count>
+constexpr LanesOf<T, count> operator-(const LanesOf<T, count>& row) {
+  return each_of(row, row, [](T a, T) { return -a; });
+}
+template <class T, int count>
+constexpr void operator+=(LanesOf<T, count>& row, const LanesOf<T, count>& other) {
+  row = row + other;
+}
+template <class T, int count>
+constexpr void operator-=(LanesOf<T, count>& row, const LanesOf<T, count>& other) {
+  row = row - other;
+}
+template <class T, int count>
+constexpr void operator|=(LanesOf<T, count>& row, const LanesOf<T, count>& other) {
+  row = row | other;
+}
+template <class T, int count>
+constexpr void operator<<=(LanesOf<T, count>& row, int by) {
+  for (T& lane : row.lane) lane <<= by;
+}
+
+using TwoLanes = LanesOf<double, 2>;
+using Quad = LanesOf<double, 4>;
+
+template <int count>
+constexpr void choose(const LanesOf<std::int64_t, count>& which, const LanesOf<double, count>& one,
+                      const LanesOf<double, count>& other, LanesOf<double, count>& result) {
+  for (int i = 0; i < count; ++i) result.lane[i] = which.lane[i] ? one.lane[i] : other.lane[i];
+}
+
+#endif
+
+// What is OVERLAPPER_WIDER is compiled, with all that it calls, for machines that have more than the rest is compiled
+// for, and called if is_wider(). Where there is no such thing, all is compiled for one machine, which has what it has.
+#if defined(OVERLAPPER_VECTORS) && defined(__x86_64__)
+#define OVERLAPPER_FUSING __attribute__((target("avx2,fma")))
+#if !(defined(__AVX2__) && defined(__FMA__))
+#define OVERLAPPER_WIDER __attribute__((target("avx2,fma"), flatten))
+inline bool is_wider() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
+#endif
+#else
+#define OVERLAPPER_FUSING
+#endif
+
+#if defined(__AVX2__)
+using MostLanes = Quad;
+#else
+using MostLanes = TwoLanes;
+#endif
+
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+inline constexpr bool kFused = true;
+#else
+inline constexpr bool kFused = false;
+#endif
+
+/// a * b - c, rounded once.
+OVERLAPPER_FUSING inline void fused_difference(const Quad& a, const Quad& b, const Quad& c, Quad& result) {
+#if defined(OVERLAPPER_VECTORS) && defined(__x86_64__)
+  result = _mm256_fmsub_pd(a, b, c);
+#else
+  for (int i = 0; i < 4; ++i) result[i] = std::fma(a[i], b[i], -c[i]);
+#endif
+}
+
+}  // namespace overlapper
