@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+import sys
+import sysconfig
+
 
 def hint(*packages: str) -> str:
     """The packages, and the command that installs them: the end of a sentence of what needs them."""
     return f"{' and '.join(packages)}: pip install {' '.join(packages)}"
+
+
+def simulator_hint() -> str:
+    """That of pybullet, which pip compiles where it has no wheel."""
+    has_wheel = sys.version_info < (3, 12) and sysconfig.get_platform() == "linux-x86_64"
+    where = " (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere pip has to compile it)"
+    return hint("pybullet") + ("" if has_wheel else where)

@@ -50,7 +50,7 @@ def settle(written: Path, place: Path) -> None:
     """Move what was written to its place, on the disk itself; what was there is gone from then on."""
     # A link stays one: what it points to is replaced.
     target = Path(os.path.realpath(place))
-    descriptor = os.open(written, os.O_RDONLY)
+    descriptor = os.open(written, os.O_RDWR)  # Windows puts no file on the disk that is open to be read alone
     try:
         os.fsync(descriptor)  # a disk that is full, or gone, may say so no earlier
     finally:

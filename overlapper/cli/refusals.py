@@ -15,7 +15,7 @@ from overlapper.printable import first_line, printable
 from overlapper.process import NotStarted
 from overlapper.scenes.scene import SceneError
 
-LIBC = ctypes.CDLL(None)
+LIBC = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
 
 
 class Refused(Exception):

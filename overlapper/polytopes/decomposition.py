@@ -320,7 +320,8 @@ def _coacd(vertices: Vertices, faces: Faces, threshold: float, time_limit: float
 def _answers(request: tuple[Vertices, Faces, float, int]) -> Iterator[list[Vertices]]:
     """In the process in which CoACD runs: the parts of a mesh."""
     vertices, faces, threshold, seconds = request
-    signal.alarm(seconds)  # for when nobody waits any more
+    if sys.platform != "win32":
+        signal.alarm(seconds)  # for when nobody waits any more
     import coacd
 
     coacd.set_log_level("error")

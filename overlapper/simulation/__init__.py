@@ -8,7 +8,7 @@ makes a 32-gon hull). Pairs are those that the simulator lets collide.
 from typing import TYPE_CHECKING
 
 from overlapper.face import lazily
-from overlapper.install import hint
+from overlapper.install import simulator_hint
 
 if TYPE_CHECKING:
     from overlapper.scenes.log import Log
@@ -52,5 +52,5 @@ __getattr__ = lazily(
         ".scenes.log": ("Log",),  # a table, which is above what it is of
         "report": ("Report",),
     },
-    needs=hint("pybullet"),
+    needs=simulator_hint(),
 )
