@@ -196,7 +196,8 @@ Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
 struct Batch::Memory {
   std::vector<Body> bodies;
   std::shared_ptr<const std::vector<PoseNumbers>> poses;  ///< of the bodies; shared with the answers
-  std::vector<Enclosure> enclosures;                      ///< parallel to them
+  std::vector<Enclosure> enclosures;                      ///< parallel to them, of where they were when last sought
+  std::vector<std::uint64_t> enclosed;                    ///< parallel to them: the versions of which these are
   BoxTree tree;
   std::vector<IndexPair> candidates;
   std::vector<Known> known, next_known;        ///< of the last call with pairs, and of the one under way
@@ -214,9 +215,11 @@ struct Batch::Memory {
   explicit Memory(const std::vector<Shape>& shapes) {
     for (const Shape& shape : shapes) bodies.push_back({make_placed(shape, {}, {}), radius(shape), 0});
     enclosures.resize(shapes.size());
+    enclosed.resize(shapes.size());
   }
 
   void place(std::span<const double> positions, std::span<const double> orientations);
+  void find_pairs(std::vector<IndexPair>& pairs);
   void begin(std::span<const IndexPair> pairs);
   void recall(std::span<const IndexPair> pairs);
   bool answer(size_t i, double with_tolerance, Method by_method);
@@ -238,9 +241,15 @@ void Batch::Memory::place(std::span<const double> positions, std::span<const dou
       throw std::invalid_argument("pose " + std::to_string(i) + ": " + error.what());
     }
     ++bodies[i].version;
-    enclosures[i] = enclosure(bodies[i].placed);
   }
   poses = std::move(now);
+}
+
+/// The pairs whose boxes meet. Whoever names pairs needs no boxes, which take longer than to move the bodies.
+void Batch::Memory::find_pairs(std::vector<IndexPair>& pairs) {
+  for (size_t i = 0; i < bodies.size(); ++i)
+    if (std::exchange(enclosed[i], bodies[i].version) != bodies[i].version) enclosures[i] = enclosure(bodies[i].placed);
+  tree.pairs(enclosures, pairs);
 }
 
 void Batch::Memory::begin(std::span<const IndexPair> pairs) {
@@ -325,7 +334,7 @@ std::vector<IndexPair> Batch::candidate_pairs(std::span<const double> positions,
   Borrowed memory(*this);
   memory->place(positions, orientations);
   std::vector<IndexPair> pairs;
-  memory->tree.pairs(memory->enclosures, pairs);
+  memory->find_pairs(pairs);
   return pairs;
 }
 
@@ -338,7 +347,7 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
   memory->place(positions, orientations);
   finished = true;
   if (!given) try {
-      memory->tree.pairs(memory->enclosures, memory->candidates);
+      memory->find_pairs(memory->candidates);
     } catch (const Cancelled&) {
       finished = false;
       memory->candidates.clear();
