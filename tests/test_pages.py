@@ -22,7 +22,7 @@ BLOCK = re.compile(r"^```([^`\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # What makes the environment that these tests run in is run by .ci/run, and what waits for Ctrl-C by test_live.py.
 ELSEWHERE = re.compile(r"(make|python3 -m venv|\. env/bin/activate|pip install)\b|.* --live\b")
 # Of these, 1 says that something overlaps, has moved or is skipped.
-ANSWERS_BY_EXIT_CODE = re.compile(r"overlapper (clashes|check|diff|shapes)\b|pytest\b")
+ANSWERS_BY_EXIT_CODE = re.compile(r"overlapper (audit|clashes|check|diff|shapes)\b|pytest\b")
 
 LOOP = """
 import sys
@@ -112,6 +112,12 @@ def database(folder):
     write_polytopes(f"sqlite:///{folder / 'parts.db'}", polytopes)
 
 
+def turntable(path):
+    import robots
+
+    robots.turntable(path)
+
+
 def model(name):
     import pybullet_data
 
@@ -128,6 +134,8 @@ OF_THE_READER = {
     "run.csv": table,
     "monday.csv": table,
     "robot.urdf": lambda folder: shutil.copy(model("block.urdf"), folder / "robot.urdf"),
+    "arm.urdf": lambda folder: turntable(folder / "arm.urdf"),
+    "panda/panda.urdf": lambda folder: shutil.copytree(model("franka_panda"), folder / "panda"),
     "humanoid.xml": lambda folder: shutil.copy(model("mjcf/humanoid.xml"), folder),
     "clashes parts": parts,
     "gearbox.step": assembly,

@@ -58,7 +58,8 @@ class Examiner:
         pair = np.array([places.get((a, b), -1) for a, b in zip(links[first].tolist(), links[second].tolist())], int)
         self._first, self._second, self._pair = (each[pair >= 0] for each in (first, second, pair))
         balls = [ball(shape) for shape in shapes]
-        self._centres, self._radii = np.array([centre for centre, _ in balls]), np.array([r for _, r in balls])
+        self._centres = np.array([centre for centre, _ in balls]).reshape(-1, 3)
+        self._radii = np.array([radius for _, radius in balls])
         self._copies = max(1, AT_ONCE // max(len(shapes), 1))
         self._batch = Batch(shapes * self._copies)
         self._positions = np.zeros((self._copies, len(shapes), 3))

@@ -111,6 +111,7 @@ def test_an_srdf_file_that_passes_over_an_overlap_is_told(robot, tmp_path):
         ({"against": "half"}, "half is no SRDF: a <disable_collisions> names no two links, but {'link1': 'arm'}"),
         ({"robot": "none.urdf"}, "there is no file none.urdf"),
         ({"robot": "table.bullet"}, "the name must end in .urdf, .sdf, .xml, and 'table.bullet' does not"),
+        ({"robot": "bare.urdf"}, "bare.urdf has no two links with shapes that could overlap"),
         ({"robot": "one.urdf"}, "one.urdf has no two links with shapes that could overlap"),
     ],
 )  # fmt: skip
@@ -118,6 +119,7 @@ def test_what_cannot_be_done_is_told_in_a_sentence(options, sentence, robot, tmp
     (tmp_path / "table.urdf.txt").write_text("no XML")
     (tmp_path / "sdf.srdf").write_text("<sdf/>")
     (tmp_path / "half").write_text('<robot><disable_collisions link1="arm"/></robot>')
+    urdf(tmp_path / "bare.urdf", link("a"), link("b"), joint("j", "fixed", "a", "b"))
     urdf(tmp_path / "one.urdf", link("a", ("1 1 1", "0 0 0")))
     given = {name: value if name == "expect" else tmp_path / value for name, value in options.items()}
     with pytest.raises(Refused) as refused:
