@@ -1,6 +1,6 @@
 """Whether a sweep of the grasp scene survives `kill -9`: of its parent, of its workers and of a node of its cluster.
 
-python benchmarks/kills.py [TASKS] [STEPS] [--kills 3] [--ray] [--seed 0]
+python benchmarks/kills.py [TASKS] [STEPS] [--kills 3] [--ray] [--scene SCENE] [--seed 0]
 
 The same tasks are swept twice with two processes, once undisturbed. The second time, the parent is killed so many
 times, and started again, and as many times a worker, each at a random moment. The parts of both must be the same files
@@ -30,12 +30,13 @@ def main() -> None:
     parser.add_argument("steps", nargs="?", type=int, default=5)
     parser.add_argument("--kills", type=int, default=3)
     parser.add_argument("--ray", action="store_true")
+    parser.add_argument("--scene", default=ROOT / "scenes" / "franka_grasp.py", help="any with mass and friction")
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     chance = random.Random(asked.seed)
     frictions = min(asked.tasks, 100)
     masses = max(asked.tasks // frictions, 1)
-    command = [sys.executable, "-m", "overlapper", "sweep", str(ROOT / "scenes" / "franka_grasp.py")]
+    command = [sys.executable, "-m", "overlapper", "sweep", str(asked.scene)]
     command += [f"--grid=mass=0.05:5:{masses}:log", f"--grid=friction=0.1:1:{frictions}", f"--steps={asked.steps}"]
     total = masses * frictions
     with tempfile.TemporaryDirectory() as folder:

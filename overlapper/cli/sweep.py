@@ -142,7 +142,7 @@ def sweep(
         todo = Sweep(study, space.crossed(_axes(space, grid, seeds, points, sample, ranges, sample_seed)))
         store = stack.enter_context(todo.opened(out))
         working = stack.enter_context(engine_of(engine, address, workers))
-        reached, finished = _run(todo, store, working, limit, retry, as_json)
+        reached, finished = _run(todo, store, working, limit, retry)
         shown = page.write(todo, store, scene, pages) if store.done & todo.tasks.keys() else None
         failures = store.rows("failures")
     _tell(todo, store, reached, finished, failures, shown, as_json)
@@ -174,9 +174,7 @@ def _axes(
     return axes + ([space.seeds(seeds)] if seeds else [])
 
 
-def _run(
-    todo: Sweep, store: Store, engine: Engine, limit: float | None, retry: bool, as_json: bool
-) -> tuple[Reached, bool]:
+def _run(todo: Sweep, store: Store, engine: Engine, limit: float | None, retry: bool) -> tuple[Reached, bool]:
     """How far it came; False if it was interrupted."""
     from overlapper.sweep.sweep import Progress as Reached
 

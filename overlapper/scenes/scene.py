@@ -16,8 +16,9 @@ import re
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 from overlapper.scenes.parameters import Parameter, described, parameters_of, values_of
@@ -154,10 +155,16 @@ def _imported(path: Path, source: bytes) -> ModuleType:
     module.__file__ = str(path)
     try:
         # Bytecode on disk is taken for that of a source of the same size that was written in the same second.
-        exec(compile(source, path, "exec"), module.__dict__)
+        exec(_compiled(path, source), module.__dict__)
     except Exception as error:
         raise broken(path, "cannot be loaded", error) from error
     return module
+
+
+@lru_cache(maxsize=1)
+def _compiled(path: Path, source: bytes) -> CodeType:
+    """Kept for the next run of the same scene, of which a sweep has thousands."""
+    return compile(source, path, "exec")
 
 
 def broken(path: Path, what: str, error: Exception) -> SceneError:

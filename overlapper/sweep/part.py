@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -55,7 +54,7 @@ def part(
     schema = pyarrow.schema([(column, kinds[kind]) for column, kind in columns.items()], dict(heading))
     which = {TASK: name, **parameters}
     filled = pyarrow.Table.from_pylist([{**which, **row} for row in rows], schema=schema)
-    file = io.BytesIO()
+    file = pyarrow.BufferOutputStream()
     many = len(filled) > 1
     pyarrow.parquet.write_table(
         filled,
@@ -66,4 +65,4 @@ def part(
         write_statistics=many,
         write_page_checksum=True,
     )
-    return file.getvalue()
+    return bytes(file.getvalue())

@@ -35,6 +35,7 @@ class Store:
         folder.mkdir(parents=True, exist_ok=True)
         # Beside the tables, whose every file readers take for a part.
         self._begun = folder / ".begun.parquet"
+        self._there: set[str] = set()  # tables whose folders were made
         self._lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
         try:
             try:
@@ -43,6 +44,8 @@ class Store:
                 raise ValueError(f"another sweep is at work in {folder}") from error
             self._belong(identity)
             self.done, self.failed = (self._names(table) for table in (TASKS, FAILURES))
+            if self.path(STEPS).is_dir():
+                self.done &= self._names(STEPS)
             for task in self.done & self.failed:  # a kill came between the two
                 self._recovered(task)
         except BaseException:
@@ -52,12 +55,12 @@ class Store:
     def _belong(self, identity: Mapping[str, str]) -> None:
         there = self.folder / "sweep.json"
         try:
-            known = json.loads(there.read_text(encoding="utf-8"))
+            known = dict(json.loads(there.read_text(encoding="utf-8")))
         except FileNotFoundError:
             with beside(there) as begun:
                 begun.write_text(json.dumps(dict(identity), indent=1), encoding="utf-8")
             return
-        except ValueError as error:
+        except (ValueError, TypeError) as error:
             raise ValueError(f"{there} does not say what is in {self.folder}: give another --out") from error
         if known == dict(identity):
             return
@@ -78,7 +81,9 @@ class Store:
         """Put the parts of a task in their places; it is done when the last one is in its own, and failed no more."""
         for table in sorted(parts, key=TABLES.index, reverse=True):
             folder = self.path(table)
-            folder.mkdir(exist_ok=True)
+            if table not in self._there:
+                folder.mkdir(exist_ok=True)
+                self._there.add(table)
             self._put(parts[table], folder / f"{task}.parquet")
         if TASKS in parts:
             self.done.add(task)
@@ -90,8 +95,10 @@ class Store:
     def _recovered(self, task: str) -> None:
         (self.path(FAILURES) / f"{task}.parquet").unlink()
         self.failed.discard(task)
-        with suppress(OSError):  # if it has others
-            self.path(FAILURES).rmdir()
+        if not self.failed:
+            with suppress(OSError):  # if somebody has put something else there
+                self.path(FAILURES).rmdir()
+            self._there.discard(FAILURES)
 
     def _put(self, data: bytes, place: Path) -> None:
         """Without waiting for the disk, which takes longer than many a task: a power cut may leave half of what is

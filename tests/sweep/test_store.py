@@ -63,9 +63,20 @@ def test_what_a_kill_left_is_put_in_order(tmp_path):
     (tmp_path / ".begun.parquet").write_bytes(b"half")
     for name, half in (("empty", b""), ("short", b"PAR1"), ("cut", whole()[:-1] + b"\0")):
         (tmp_path / "tasks.parquet" / f"{name}.parquet").write_bytes(half)
+    # A power cut may leave the row of a task without its steps.
+    (tmp_path / "steps.parquet").mkdir()
+    (tmp_path / "steps.parquet" / "a.parquet").write_bytes(whole(b"2"))
+    (tmp_path / "steps.parquet" / "c.parquet").write_bytes(b"PAR1")
+    (tmp_path / "tasks.parquet" / "c.parquet").write_bytes(whole(b"1"))
     with Store(tmp_path, IDENTITY) as store:
         assert (store.done, store.failed) == ({"a"}, {"b"})
-    assert files(tmp_path) == ["failures.parquet/b.parquet", "tasks.parquet/a.parquet"]
+    left = [
+        "failures.parquet/b.parquet",
+        "steps.parquet/a.parquet",
+        "tasks.parquet/a.parquet",
+        "tasks.parquet/c.parquet",
+    ]
+    assert files(tmp_path) == left
 
 
 def test_two_sweeps_do_not_work_in_one_folder(tmp_path):
@@ -97,8 +108,9 @@ def test_a_scene_file_that_has_changed_is_another_sweep(tmp_path):
         Store(tmp_path, IDENTITY | {"scene file": "xyz"})
 
 
-def test_a_folder_that_does_not_say_what_it_is_of_is_refused(tmp_path):
-    (tmp_path / "sweep.json").write_text("half")
+@pytest.mark.parametrize("text", ["half", "7", '["a"]'])
+def test_a_folder_that_does_not_say_what_it_is_of_is_refused(tmp_path, text):
+    (tmp_path / "sweep.json").write_text(text)
     with pytest.raises(ValueError, match=r"sweep.json does not say what is in .*: give another --out$"):
         Store(tmp_path, IDENTITY)
 
