@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from overlapper.install import simulator_hint
 from overlapper.process import Ended, Worker
 
 ENDINGS = (".urdf", ".sdf", ".xml", ".bullet")
@@ -24,8 +26,10 @@ def read_apart(
 ) -> Any:
     """The one reply of `answers` to a request, in a process of its own; a text is the reason why there is none.
 
-    NotRead if the file is not there, or pybullet refuses it or dies of it.
+    NotRead if the file is not there, or pybullet refuses it or dies of it; ImportError without pybullet.
     """
+    if find_spec("pybullet") is None:
+        raise ImportError(f"overlapper.simulation needs {simulator_hint()}")
     if path.suffix.lower() not in endings:
         raise NotRead(f"the name must end in {', '.join(endings)}, and {path.name!r} does not")
     if not path.is_file():

@@ -20,6 +20,7 @@ from overlapper.audit.table import COLUMNS
 from overlapper.audit.verdicts import audit
 from overlapper.cli.audit import audit as command
 from overlapper.cli.refusals import Refused
+from overlapper.cli.shapes import shapes
 
 COUNT = 300
 FIXED = ["--expect", "arm,plate", "--expect", "plate,wa*"]  # what no configuration parts
@@ -125,6 +126,13 @@ def test_what_cannot_be_done_is_told_in_a_sentence(options, sentence, robot, tmp
     with pytest.raises(Refused) as refused:
         command(given.pop("robot", robot), configurations=1, **given)
     assert str(refused.value).replace(f"{tmp_path}/", "").replace(str(tmp_path), ".") == sentence
+
+
+def test_without_pybullet_it_is_said_what_is_needed(robot, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    for ask in (command, shapes):
+        with pytest.raises(Refused, match=r"^overlapper.simulation needs pybullet: pip install pybullet"):
+            ask(robot)
 
 
 @pytest.mark.parametrize("ending", [".parquet", ".sqlite"])
