@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import pickle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,6 @@ from overlapper.audit.tally import Array, Counts, Seen, Tally
 from overlapper.quaternion import rotated
 
 Mask = NDArray[np.bool_]
-Setup = tuple[Robot, int, int, float, float]
 
 AT_ONCE = 16_384  # shapes that are placed at once, so that what is at work stays in the caches
 COMPARED = 1_000_000  # distances between balls at once, likewise
@@ -68,9 +68,9 @@ class Examiner:
         self._pair_of[self._first, self._second] = self._pair
 
     @property
-    def setup(self) -> Setup:
-        """What another process makes the same of, by `prepared`."""
-        return self.robot, self.sampling.count, self.sampling.seed, self.tolerance, self.least_depth
+    def setup(self) -> bytes:
+        """What another process makes the same of, by `prepared`; bytes, as arrays are not simply equal or not."""
+        return pickle.dumps((self.robot, self.sampling.count, self.sampling.seed, self.tolerance, self.least_depth))
 
     def shape_pairs(self, *pairs: LinkPair) -> Counts:
         """(s, 2): the pairs of shapes of these pairs of links, as places among the shapes."""
@@ -128,9 +128,9 @@ class Examiner:
         return np.concatenate([nobody, *rows]), np.concatenate([nobody, *among])
 
 
-def prepared(setup: Setup) -> Examiner:
+def prepared(setup: bytes) -> Examiner:
     """The examiner of a setup."""
-    robot, count, seed, tolerance, least_depth = setup
+    robot, count, seed, tolerance, least_depth = pickle.loads(setup)
     return Examiner(robot, Sampling(robot, count, seed), tolerance, least_depth)
 
 

@@ -1,6 +1,7 @@
 """What an audit says of pairs of links is what each configuration says by itself."""
 
 from collections import Counter
+from contextlib import closing
 from math import comb
 
 import numpy as np
@@ -27,6 +28,7 @@ from overlapper.audit.verdicts import audit, wilson
 from overlapper.quaternion import rotated
 from overlapper.simulation import Bodies
 from overlapper.simulation.model_file import load
+from overlapper.sweep.cluster import Cluster
 from overlapper.sweep.hand import Failed
 from overlapper.sweep.processes import Processes
 
@@ -98,6 +100,15 @@ def test_processes_do_not_change_a_bit(table, monkeypatch):
         if a.largest:
             assert (a.largest.number, a.deepest.number) == (b.largest.number, b.deepest.number)
             assert a.largest.contact.volume == b.largest.contact.volume
+
+
+def test_a_cluster_says_the_same(table, monkeypatch):
+    pytest.importorskip("ray")
+    monkeypatch.setattr(verdicts, "FEW", 0)
+    with closing(Cluster()) as cluster:
+        far = audit(table, BLOCK + 100, seed=3, engine=cluster)
+    here = audit(table, BLOCK + 100, seed=3)
+    assert [(each.names, each.met) for each in far.verdicts] == [(each.names, each.met) for each in here.verdicts]
 
 
 def test_a_block_that_fails_is_told(table, monkeypatch):
