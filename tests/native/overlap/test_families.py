@@ -36,6 +36,7 @@ AFFORDABLE = {  # seeds whose exact truth takes less than half a second, and suc
         *(700001, 700003),  # a hull apart from a round body, and within one
         *(2000111, 4000055, 4000287),  # cores that all but meet
         3000178,  # a capsule that touches a rim
+        4200380,  # a thin slab, whose lids do not quite sum to zero
     ),
     "rounded_hulls": (
         *range(SEED, SEED + 5),

@@ -889,6 +889,9 @@ double missing(const Totals& totals) {
   return std::max(0.0, std::sqrt(std::max(0.0, square / totals.volume)) - rounding);
 }
 
+/// m²: of a surface whose area vectors, but for rounding, should sum to zero, at least as much is missing.
+double astray(Vec3 unbalanced, double border) { return std::max(0.0, norm(unbalanced) - kSummation * border); }
+
 /// What slices measure at once.
 struct Part {
   slicing::Enclosure polytope;
@@ -1060,7 +1063,8 @@ std::optional<RoundMeasures> measure_stretched(const Placed& a, const Placed& b,
   result.volume = stretch.volume * volume;
   result.area = totals.area;
   result.first_area = swapped ? totals.area - totals.first_area : totals.first_area;
-  result.area_error = totals.area_error + stretch.open() * totals.area;
+  result.area_error =
+      totals.area_error + stretch.open() * totals.area + astray(stretch.normal(totals.unbalanced), totals.area);
   result.volume_error = stretch.volume * (error + 4 * DBL_EPSILON * volume) + of_flat.flatness * totals.area;
   const Vec3 about_which = rounded(inside) + turn * scaled(h, moved);
   result.centroid = about_which + turn * scaled(h, totals.first / volume);
@@ -1197,7 +1201,7 @@ std::optional<RoundMeasures> measured(const Placed& a, const Placed& b, Vec3 ref
   if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
   result.volume_error += (of_a.flatness + of_b.flatness) * totals.area;
   result.area = totals.area, result.first_area = totals.first_area;
-  result.area_error = totals.area_error;
+  result.area_error = totals.area_error + astray(totals.unbalanced, totals.border);
   result.rounding = rounding_of_surfaces(sum(totals.squares) / totals.volume);
   result.centroid = rounded(inside) + totals.first / totals.volume;
   result.inertia = totals.inertia_about_centroid();
