@@ -25,11 +25,11 @@ class Kinematics:
         self.count = len(self._shapes)
         names = {link.joint.name: place for place, link in enumerate(self._links)}
         columns = {degree.link: degree.column for degree in robot.degrees}
-        # By link: the column that moves its joint, and what of it.
+        # By link: the column that moves its joint, and what of it; -1 where the leader of a joint stays at 0.
         self._driven = {place: (column, 1.0, 0.0) for place, column in columns.items()}
         for name, mimic in robot.mimics.items():
-            if (leader := names[mimic.leader]) in columns:
-                self._driven[names[name]] = columns[leader], mimic.multiplier, mimic.offset
+            column = columns.get(names[mimic.leader], -1)
+            self._driven[names[name]] = column, mimic.multiplier, mimic.offset
 
     def poses(self, configurations: Array) -> tuple[Array, Array]:
         """Positions (n, k, 3) in m and unit quaternions xyzw (n, k, 4) of the shapes, in the frame of the world.
@@ -55,21 +55,19 @@ class Kinematics:
             joint = link.joint
             position, orientation, matrix = frames[link.parent] if link.parent >= 0 else world
             column, multiplier, offset = self._driven.get(place, (-1, 0.0, 0.0))
-            moved = column >= 0
+            value = columns[column] * multiplier + offset if column >= 0 else offset
             pivot = _moved(position, matrix, joint.position)
             turn: Numbers = joint.orientation.tolist()
-            if joint.kind == "spherical" and moved:
+            if joint.kind == "spherical":
                 turn = _product(turn, list(columns[column : column + 4]))
-            elif joint.kind == "revolute" and moved:
-                half = (columns[column] * multiplier + offset) / 2
-                sine, cosine = np.sin(half), np.cos(half)
+            elif joint.kind == "revolute":
+                sine, cosine = np.sin(value / 2), np.cos(value / 2)
                 about = _product(turn, [*joint.axis.tolist(), 0.0])
                 turn = [cosine * a + sine * b for a, b in zip(turn, about)]
             turn = _product(orientation, turn)
             matrix = _matrix(turn)
-            if joint.kind == "prismatic" and moved:
-                shift = columns[column] * multiplier + offset
-                pivot = [p + shift * a for p, a in zip(pivot, _moved((0.0,) * 3, matrix, joint.axis))]
+            if joint.kind == "prismatic":
+                pivot = [p + value * a for p, a in zip(pivot, _moved((0.0,) * 3, matrix, joint.axis))]
             frames.append((_moved(pivot, matrix, joint.offset), turn, matrix))
         return frames
 

@@ -56,6 +56,20 @@ def test_joints_that_mimic_others_follow_them(tmp_path):
     assert positions[..., 2].tolist() == [[0, 0, 0.5, 1.75], [0, 0.25, 0, 0.25]]
 
 
+def test_what_follows_a_joint_that_stays_is_where_its_offset_says(tmp_path):
+    free = '<limit lower="1" upper="-1" effort="1" velocity="1"/>'
+    path = urdf(
+        tmp_path / "robot.urdf",
+        *(link(name, ("1 1 1", "0 0 0")) for name in "abc"),
+        joint("lead", "prismatic", "a", "b", free),
+        joint("follow", "prismatic", "a", "c", limit(0, 9) + mimic("lead", 2, 0.5)),
+    )
+    robot = read_robot(path)
+    assert robot.columns == () and robot.unmoved == [("prismatic", "lead")]
+    positions, _ = Kinematics(robot).poses(Sampling(robot, 3, 0).block(1))
+    assert positions[..., 2].tolist() == [[0, 0, 0.5]] * 2
+
+
 def test_what_has_no_end_goes_once_around_and_what_nothing_bounds_stays(tmp_path):
     free = '<limit lower="1" upper="-1" effort="1" velocity="1"/>'
     path = urdf(
