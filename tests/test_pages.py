@@ -77,6 +77,7 @@ def shell(page, command):
 def meshes(folder):
     import trimesh
 
+    folder.mkdir(exist_ok=True)
     for seed, name in enumerate(("bolt.stl", "plate.obj", "bracket.stl")):
         trimesh.creation.icosphere(2, 0.1).apply_translation([0.1 * seed, 0, 0]).export(folder / name)
 
@@ -134,6 +135,7 @@ OF_THE_READER = {
     "run.csv": table,
     "monday.csv": table,
     "robot.urdf": lambda folder: shutil.copy(model("block.urdf"), folder / "robot.urdf"),
+    "audit assets": lambda folder: meshes(folder / "assets"),
     "arm.urdf": lambda folder: turntable(folder / "arm.urdf"),
     "panda/panda.urdf": lambda folder: shutil.copytree(model("franka_panda"), folder / "panda"),
     "humanoid.xml": lambda folder: shutil.copy(model("mjcf/humanoid.xml"), folder),

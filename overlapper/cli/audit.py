@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from overlapper.cli.assets import audit_folder
 from overlapper.cli.engine import AddressOption, EngineOption, WorkersOption, engine_of, refuse_address
 from overlapper.cli.figures import VOLUME_UNITS, volume_unit
 from overlapper.cli.options import (
@@ -41,7 +42,12 @@ CAPTION = (
 
 
 def audit(
-    robot: Annotated[Path, typer.Argument(help="A model: .urdf, .sdf, .xml (MJCF).", show_default=False)],
+    robot: Annotated[
+        Path,
+        typer.Argument(
+            metavar="ROBOT|FOLDER", help="A model, .urdf, .sdf, .xml (MJCF), or a folder of assets.", show_default=False
+        ),
+    ],
     configurations: Annotated[int, typer.Option(min=1, help="How many are looked at.")] = 100_000,
     seed: Annotated[int, typer.Option(min=0, help="Of the random ones.")] = 0,
     expect: ExpectOption = None,
@@ -59,6 +65,9 @@ def audit(
     surface: SurfaceOption = "nominal",
     concave: ConcaveOption = "decompose",
     concave_threshold: ThresholdOption = 0.05,
+    units: Annotated[
+        Literal["mm", "cm", "m", "in"], typer.Option(help="Of meshes in a folder that do not say theirs.")
+    ] = "m",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
     """Say which pairs of links of a robot never overlap, sometimes or always, how often, by how much and how deep.
@@ -68,6 +77,9 @@ def audit(
     code is 1 if a pair that is not adjacent overlaps always, or one that --against disables as one that does not
     overlap does; 2 if the robot cannot be read; else 0.
 
+    Of a folder of models and meshes it is said what loads, what is closed, what is left out and why, how much volume
+    convex parts add, and what overlaps in itself at rest. The exit code is 1 if anything is to be told.
+
     Examples:
 
     [bold]overlapper audit robot.urdf[/bold]
@@ -75,6 +87,8 @@ def audit(
     [bold]overlapper audit robot.urdf --srdf robot.srdf --out pairs.csv --html worst.html[/bold]  files of it
 
     [bold]overlapper audit robot.urdf --against robot.srdf --expect "*finger,*finger"[/bold]  what CI asks
+
+    [bold]overlapper audit assets --units mm[/bold]  a folder of models and meshes
     """
     from overlapper.scenes.table_file import must_be_a_table
     from overlapper.whole_file import must_be_writable
@@ -93,6 +107,12 @@ def audit(
         "concave": concave,
         "concave_threshold": concave_threshold,
     }
+    if robot.is_dir():
+        asked = {"--expect": expect, "--against": against, "--srdf": srdf, "--out": out, "--html": html}
+        if of_robots := [name for name, value in asked.items() if value]:
+            raise Refused(f"{of_robots[0]} is for a robot, and {robot} is a folder")
+        geometry = {"surface": surface, "concave": concave, "concave_threshold": concave_threshold}
+        audit_folder(robot, units, least_depth, geometry, as_json)
     written: list[Path] = []
     try:
         with input_refusals(), quiet():

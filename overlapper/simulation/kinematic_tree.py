@@ -58,8 +58,9 @@ class Joint:
 class Link:
     """A link of the body of that number, named as in the file; `parent` is its place among the links, -1 of a base.
 
-    `skipped` says what of its shapes is not modelled and why, "" if all are, and `concave` of how many convex parts its
-    concave meshes are.
+    `skipped` says what of its shapes is not modelled and why, "" if all are. `concave` is of how many convex parts its
+    concave meshes are, and `excess` the fraction by which these have more volume than the mesh that gains most; None if
+    no closed mesh is concave.
     """
 
     body: int
@@ -68,6 +69,7 @@ class Link:
     joint: Joint
     skipped: str
     concave: int
+    excess: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,11 +131,13 @@ def _read(path: Path, settings: Settings) -> KinematicTree:
     for number, (id, body) in enumerate(known.by_id.items()):
         base = len(links)
         skipped = {each.link: each.reason for each in body.skipped}
-        concave = {each.link: len(each.shapes) for each in body.decomposed}
+        concave = {link: [each for each in body.decomposed if each.link == link] for link in body.link_names}
         joints = _joints(client, id, known.labels[id])
         for link, joint in enumerate(joints, BASE):
             parent = base + 1 + body.parents[link] if link > BASE else -1
-            about = skipped.get(link, ""), concave.get(link, 0)
+            gains = [each.volume / each.mesh_volume - 1 for each in concave[link] if each.mesh_volume]
+            parts_of_it = sum(len(each.shapes) for each in concave[link])
+            about = skipped.get(link, ""), parts_of_it, max(gains, default=None)
             links.append(Link(number, body.link_names[link], parent, joint, *about))
         parts = sorted(body.parts, key=lambda part: (part.link, part.index))
         shapes += [LinkShape(base + 1 + part.link, part.shape, part.position, part.orientation) for part in parts]

@@ -1,0 +1,156 @@
+"""A pile of assets, models and meshes: what loads, what is closed, what is left out, and what overlaps in itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from overlapper import Batch, Hull
+from overlapper.audit.robot import read_robot
+from overlapper.audit.verdicts import audit
+from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, Surface, decompose
+from overlapper.printable import first_line
+from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.kinematic_tree import ENDINGS
+from overlapper.simulation.links import link_contacts
+from overlapper.simulation.model_file import NotRead
+
+MESHES = (".obj", ".off", ".ply", ".stl", ".3mf", ".glb", ".gltf", ".step", ".stp")
+
+
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """Two parts of an asset that overlap at rest: `volume` in m³, `depth` in m of the deepest two shapes."""
+
+    names: tuple[str, str]
+    volume: float
+    depth: float
+
+
+@dataclass(frozen=True, slots=True)
+class Asset:
+    """A file, by its path in the folder.
+
+    `failure` says why it cannot be read, "" if it can. It has so many `bodies`, of a mesh, or `links` with shapes, of a
+    model, and convex `shapes`. `closed` says whether all meshes bound a volume; None of a model. `skipped` are
+    sentences on what is left out, and `excess` is the fraction by which convex parts have more volume than the mesh
+    that gains most, None if none is concave.
+    """
+
+    name: str
+    failure: str
+    bodies: int
+    shapes: int
+    closed: bool | None
+    skipped: tuple[str, ...]
+    excess: float | None
+    overlaps: tuple[Shared, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Whether it can be read, nothing is open or left out, and nothing overlaps."""
+        return not (self.failure or self.skipped or self.overlaps) and self.closed is not False
+
+
+def asset_files(folder: Path) -> list[Path]:
+    """The models and meshes in a folder and those in it, sorted. ValueError if there is none."""
+    found = sorted(
+        path
+        for path in folder.rglob("*")
+        if path.suffix.lower() in (*ENDINGS, *MESHES)
+        and path.is_file()
+        and not path.name.startswith(".")
+        and (path.suffix.lower() != ".xml" or b"<mujoco" in path.read_bytes()[:4000])
+    )
+    if not found:
+        raise ValueError(f"there is no model and no mesh in the folder {folder}: {', '.join((*ENDINGS, *MESHES))}")
+    return found
+
+
+def read_asset(folder: Path, path: Path, units: str, least_depth: float, **settings: Any) -> Asset:
+    """One of the files; `units` are those of meshes that do not say theirs, `settings` those of `simulation.Bodies`.
+
+    What overlaps by a depth of `least_depth` (m) or less, or by what the rounding of corners with six digits explains,
+    is taken not to. Whatever is wrong with a file, or a library that it needs and that is missing, is its failure.
+    """
+    name = path.relative_to(folder).as_posix()
+    of_kind: Callable[..., Asset] = _model if path.suffix.lower() in ENDINGS else _mesh
+    try:
+        return of_kind(name, path, units, least_depth, settings)
+    except OSError as error:
+        return _unread(name, f"{error.strerror}")
+    except (ImportError, NotRead, RuntimeError, ValueError) as error:
+        return _unread(name, first_line(error).removeprefix(f"{path} ").removeprefix(f"{path}: "))
+
+
+def _unread(name: str, failure: str) -> Asset:
+    return Asset(name, failure, 0, 0, None, (), None, ())
+
+
+def _model(name: str, path: Path, units: str, least_depth: float, settings: dict[str, Any]) -> Asset:
+    robot = read_robot(path, **settings)
+    links = robot.tree.links
+    skipped = [f"{label}: {link.skipped}" for label, link in zip(robot.link_names, links) if link.skipped]
+    met = [each for each in audit(robot, 1, least_depth=least_depth).verdicts if not each.pair.adjacent]
+    overlaps = [
+        Shared(each.names, each.largest.contact.volume, each.largest.contact.depth) for each in met if each.largest
+    ]
+    excess = max((link.excess for link in links if link.excess is not None), default=None)
+    bodies = len({shape.link for shape in robot.tree.shapes})
+    return Asset(name, "", bodies, len(robot.tree.shapes), None, tuple(skipped), excess, tuple(overlaps))
+
+
+def _mesh(name: str, path: Path, units: str, least_depth: float, settings: dict[str, Any]) -> Asset:
+    from overlapper.polytopes.mesh_file import read_parts
+
+    parts = read_parts(path, units)
+    closed, excess = True, None
+    skipped: list[str] = []
+    keys: list[tuple[int, int, int]] = []
+    hulls: list[Hull] = []
+    names = [part.name or name for part in parts]
+    for number, part in enumerate(parts):
+        try:
+            surface = Surface.of(part.triangles)
+        except NotDecomposed as error:
+            closed = False
+            skipped.append(f"{names[number]}: {error}")
+            continue
+        closed = closed and surface.volume is not None and not surface.open_edges
+        try:
+            if settings["concave"] == "skip" and not surface.convex_bodies():
+                raise NotDecomposed("the mesh is concave, and --concave skip asks to leave it out")
+            made = decompose(part.triangles, settings["concave_threshold"], settings["concave"] == "enclose")
+            placed = [Hull(part.placed(each.vertices)) for each in made.parts]
+        except ValueError as error:
+            skipped.append(f"{names[number]}: {first_line(error)}")
+            continue
+        if made.path and made.mesh_volume:
+            excess = max(made.volume / made.mesh_volume - 1, excess or 0.0)
+        keys += [(number, -1, shape) for shape in range(len(placed))]
+        hulls += placed
+    overlaps = _shared(keys, hulls, names, least_depth)
+    return Asset(name, "", len(parts), len(hulls), closed, tuple(skipped), excess, tuple(overlaps))
+
+
+def _shared(
+    keys: Sequence[tuple[int, int, int]], hulls: Sequence[Hull], names: Sequence[str], least_depth: float
+) -> list[Shared]:
+    rows = np.array(keys, dtype=np.int64).reshape(-1, 3)
+    poses = np.zeros((len(hulls), 3)), np.tile([0.0, 0.0, 0.0, 1.0], (len(hulls), 1))
+    batch = Batch(hulls)
+    pairs = batch.candidate_pairs(*poses)
+    pairs = pairs[rows[pairs[:, 0], 0] != rows[pairs[:, 1], 0]]
+    reach = max((float(np.abs(hull.bounds).max()) for hull in hulls), default=0.0)
+    least = max(least_depth, 2 * math.sqrt(3) * ROUNDING * reach)
+    contacts = link_contacts(Contacts(rows, batch.overlaps(*poses, pairs, separated=False)))
+    return [
+        Shared((names[each.bodyA], names[each.bodyB]), each.volume, each.depth)
+        for each in contacts
+        if each.depth > least
+    ]

@@ -1,0 +1,66 @@
+"""`overlapper audit FOLDER`: what is wrong with the models and meshes of a folder."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from overlapper.cli.recorded import with_progress
+from overlapper.cli.refusals import Interrupted, input_refusals, quiet, say
+from overlapper.printable import printable
+
+if TYPE_CHECKING:
+    from overlapper.audit.assets import Asset
+
+
+def audit_folder(folder: Path, units: str, least_depth: float, settings: Mapping[str, Any], as_json: bool) -> NoReturn:
+    """Tell of every asset; exit code 1 if anything is wrong with one."""
+    try:
+        with input_refusals(), quiet():
+            from overlapper.audit.assets import asset_files, read_asset
+
+            files = asset_files(folder)
+            read = (read_asset(folder, file, units, least_depth, **settings) for file in files)
+            assets = list(with_progress(read, folder.name, len(files)))
+    except KeyboardInterrupt as error:
+        raise Interrupted from error
+    if as_json:
+        told = {"units": units, "least_depth": least_depth, **settings}
+        print(json.dumps({"settings": told, "assets": [asdict(asset) | {"sound": asset.sound} for asset in assets]}))
+    else:
+        _show(assets)
+    raise typer.Exit(0 if all(asset.sound for asset in assets) else 1)
+
+
+def _show(assets: Sequence[Asset]) -> None:
+    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
+    table.add_column("asset", overflow="fold")
+    for header in ("", "bodies", "convex\nshapes", "closed", "their\nvolume", "overlap\nat rest"):
+        table.add_column(header, justify="right" if header else "left", no_wrap=True)
+    for asset in assets:
+        row = [str(asset.bodies), str(asset.shapes), {True: "yes", False: "no", None: ""}[asset.closed]]
+        row += ["" if asset.excess is None else f"{asset.excess:+.1%}", str(len(asset.overlaps))]
+        status = "sound" if asset.sound else "not read" if asset.failure else "not sound"
+        table.add_row(Text(printable(asset.name)), status, *(row if not asset.failure else [""] * 5))
+    console.print(table)
+    for asset in assets:
+        if asset.failure:
+            say(f"{asset.name} is not read: {asset.failure}.")
+        for sentence in asset.skipped:
+            say(f"{asset.name}, left out: {sentence}.")
+        for each in asset.overlaps:
+            names = " and ".join(each.names)
+            say(f"{asset.name}, {names} share {each.volume:.3g} m³ at rest, {1e3 * each.depth:.3g} mm deep.")
+    sound = sum(asset.sound for asset in assets)
+    say(f"Of {len(assets):,} assets, {sound:,} {'is' if sound == 1 else 'are'} sound.")

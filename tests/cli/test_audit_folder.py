@@ -1,0 +1,115 @@
+"""`overlapper audit FOLDER`: what loads, what is closed, what is left out, and what overlaps in itself at rest."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+from robots import turntable
+
+from overlapper import Hull, write_mesh
+from overlapper.audit.assets import read_asset
+from overlapper.cli.audit import audit as command
+from overlapper.cli.refusals import Refused
+
+CUBE = np.array(np.meshgrid([0, 10], [0, 10], [0, 10.0])).reshape(3, 8).T
+L_SHAPE = """
+v 0 0 0\nv 20 0 0\nv 20 10 0\nv 10 10 0\nv 10 20 0\nv 0 20 0
+v 0 0 10\nv 20 0 10\nv 20 10 10\nv 10 10 10\nv 10 20 10\nv 0 20 10
+f 4 3 2 1\nf 6 5 4 1\nf 7 8 9 10\nf 7 10 11 12
+f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12
+"""
+# Makes the convex hull of all, in the place of CoACD.
+WRAP = """
+def set_log_level(level): pass
+class Mesh:
+    def __init__(self, vertices, indices): self.vertices = vertices
+def run_coacd(mesh, threshold):
+    return [[mesh.vertices, None]]
+"""
+SETTINGS = {"surface": "nominal", "concave": "decompose", "concave_threshold": 0.05}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A cube, an open box, an L, two boxes in each other, no mesh, a robot, and what is no model."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "fake").mkdir()
+    (tmp_path / "fake" / "coacd.py").write_text(WRAP)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "fake"))
+    assets = tmp_path / "assets"
+    (assets / "robots").mkdir(parents=True)
+    write_mesh(assets / "cube.stl", Hull(CUBE))
+    box = trimesh.creation.box((10, 10, 10))
+    trimesh.Trimesh(box.vertices, box.faces[1:]).export(assets / "open.ply")
+    (assets / "bent.obj").write_text(L_SHAPE)
+    pair = trimesh.Scene()
+    for name, at in (("left", 0), ("right", 8), ("far", 50)):
+        pair.add_geometry(box, name, name, transform=trimesh.transformations.translation_matrix([at, 0, 0]))
+    pair.export(assets / "pair.glb")
+    (assets / "broken.stl").write_text("no mesh")
+    (assets / "notes.xml").write_text("<notes/>")
+    turntable(assets / "robots" / "table.urdf")
+    return assets
+
+
+def run(*arguments):
+    given = [sys.executable, "-m", "overlapper", "audit", *map(str, arguments)]
+    done = subprocess.run(given, capture_output=True, text=True, timeout=120)
+    return done.returncode, done.stdout
+
+
+def test_every_asset_of_a_folder_is_told(folder):
+    code, said = run(folder, "--units", "mm", "--json")
+    found = {asset["name"]: asset for asset in json.loads(said)["assets"]}
+    assert code == 1
+    assert [*found] == ["bent.obj", "broken.stl", "cube.stl", "open.ply", "pair.glb", "robots/table.urdf"]
+    assert {name for name, asset in found.items() if asset["sound"]} == {"bent.obj", "cube.stl"}
+    assert found["broken.stl"]["failure"].startswith("is not a mesh that can be read")
+    assert found["open.ply"]["closed"] is False
+    assert found["open.ply"]["skipped"] == [
+        "open.ply: the concave mesh bounds no volume: its surface is open along 3 edges"
+    ]
+    # The L is three cubes of 1 cm, its hull has half a cube more.
+    assert (found["bent.obj"]["closed"], found["bent.obj"]["shapes"]) == (True, 1)
+    assert found["bent.obj"]["excess"] == pytest.approx(1 / 6) and found["cube.stl"]["excess"] is None
+    (shared,) = found["pair.glb"]["overlaps"]
+    assert sorted(shared["names"]) == ["left", "right"] and found["pair.glb"]["bodies"] == 3
+    assert (shared["volume"], shared["depth"]) == (pytest.approx(200.0), pytest.approx(2.0))  # glTF is in metres
+    assert [each["names"] for each in found["robots/table.urdf"]["overlaps"]] == [["arm", "plate"], ["wall", "plate"]]
+    assert (found["robots/table.urdf"]["bodies"], found["robots/table.urdf"]["closed"]) == (5, None)
+
+
+def test_people_get_a_table_and_sentences(folder):
+    (folder / "open.ply").unlink()
+    code, said = run(folder)
+    assert code == 1
+    assert "broken.stl is not read: is not a mesh" in said and "bent.obj" in said and "+16.7%" in said
+    assert "robots/table.urdf, arm and plate share 0.0008 m³ at rest, 40 mm deep." in said
+    assert said.endswith("Of 5 assets, 2 are sound.\n")
+
+
+def test_concave_meshes_may_be_left_out_and_shallow_overlaps_passed_over(folder):
+    skipped = read_asset(folder, folder / "bent.obj", "mm", 0.0, **SETTINGS | {"concave": "skip"})
+    assert skipped.skipped == ("bent.obj: the mesh is concave, and --concave skip asks to leave it out",)
+    assert (skipped.closed, skipped.sound) == (True, False)
+    assert read_asset(folder, folder / "pair.glb", "mm", 2.1, **SETTINGS).sound
+    table = read_asset(folder, folder / "robots" / "table.urdf", "mm", 0.05, **SETTINGS)
+    assert table.sound
+
+
+def test_what_stops_one_asset_stops_no_other(folder, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    table = read_asset(folder, folder / "robots" / "table.urdf", "mm", 0.0, **SETTINGS)
+    assert table.failure.startswith("overlapper.simulation needs pybullet: pip install pybullet")
+    assert read_asset(folder, folder / "cube.stl", "mm", 0.0, **SETTINGS).sound
+
+
+def test_what_is_for_robots_and_a_folder_of_nothing_are_refused(folder, tmp_path):
+    with pytest.raises(Refused, match=r"^--srdf is for a robot, and .*assets is a folder$"):
+        command(folder, srdf=tmp_path / "out.srdf")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(Refused, match=r"^there is no model and no mesh in the folder .*empty: \.urdf, "):
+        command(tmp_path / "empty")
