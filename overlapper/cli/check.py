@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import io
+import os
 import sys
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing, redirect_stderr
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
+from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say, scene_refusals, without_banner
+from overlapper.process import NotStarted
 from overlapper.scenes.scene import SceneError, scenes_in
 
 
@@ -18,6 +24,14 @@ def check(
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the pages of scenes that have moved.")] = Path("out"),
     record: Annotated[bool, typer.Option("--record", help="Write what is expected anew instead.")] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Scenes at a time; by default one on each core. With 1, they are run in this process.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Run scenes and compare them with what was recorded of them in the folder `expected` beside each.
 
@@ -27,12 +41,28 @@ def check(
 
     Examples:
 
-    [bold]overlapper check scenes[/bold]  says what moved, and writes out/<scene>.html with before and after
+    [bold]overlapper check scenes[/bold]  says what moved, and writes out/<scene>.moved.html with before and after
 
     [bold]overlapper check scenes/grasp.py --record[/bold]  takes what happens today as what is expected
     """
-    codes = [_checked(scene, out, record) for folder in paths or [Path("scenes")] for scene in _scenes_in(folder)]
-    raise typer.Exit(max(codes))
+    named: dict[str, Path] = {}
+    for scene in (scene for folder in paths or [Path("scenes")] for scene in _scenes_in(folder)):
+        named.setdefault(os.path.abspath(scene), scene)  # once, or two at once would write its expected file
+    scenes = [*named.values()]
+    held = _in_turn(scenes, out, record) if workers == 1 else _at_once(scenes, out, record, workers)
+    code = 0
+    try:
+        with closing(held):
+            for each in held:
+                code = max(code, each.code)
+                sys.stderr.write(each.talk)
+                for line in each.lines:
+                    say(line, sys.stderr if each.code == 2 else sys.stdout)
+    except KeyboardInterrupt as error:
+        raise Interrupted from error
+    except NotStarted as error:
+        raise Refused(str(error)) from error
+    raise typer.Exit(code)
 
 
 def _scenes_in(folder: Path) -> list[Path]:
@@ -42,20 +72,65 @@ def _scenes_in(folder: Path) -> list[Path]:
         raise Refused(str(error)) from error
 
 
-def _checked(scene: Path, out: Path, record: bool) -> int:
-    """Says what became of a scene, on stderr if it could not be run; returns the exit code that it deserves."""
+@dataclass(frozen=True, slots=True)
+class _Held:
+    """What is said of a scene, with the exit code that it deserves, and what the scene itself has said."""
+
+    code: int
+    lines: list[str]
+    talk: str = ""
+
+
+def _in_turn(scenes: Sequence[Path], out: Path, record: bool) -> Generator[_Held, None, None]:
+    for scene in scenes:
+        yield _held(scene, out, record)
+
+
+def _at_once(scenes: Sequence[Path], out: Path, record: bool, workers: int | None) -> Generator[_Held, None, None]:
+    """As _in_turn, in the same order, by several processes."""
+    from overlapper.sweep.hand import Done, Job, Outcome
+    from overlapper.sweep.processes import Processes
+
+    job = Job(__name__, prepared.__name__, (out, record))
+    found: dict[int, Outcome] = {}
+    told = 0
+    with closing(Processes(workers).outcomes(job, scenes)) as outcomes:
+        for number, outcome in outcomes:
+            found[number] = outcome
+            while told in found:
+                ready = found.pop(told)
+                if isinstance(ready, Done):
+                    yield ready.value
+                else:
+                    yield _refused(f"{scenes[told]}: {ready.sentence}")
+                told += 1
+
+
+def prepared(setup: tuple[Path, bool]) -> Callable[[Path], _Held]:
+    """What holds a scene against its expected file in another process."""
+
+    def held(scene: Path) -> _Held:
+        with redirect_stderr(io.StringIO()) as talk:
+            found = _held(scene, *setup)
+        return replace(found, talk=talk.getvalue())
+
+    return held
+
+
+def _held(scene: Path, out: Path, record: bool) -> _Held:
     try:
         with quiet() as noise, scene_refusals(noise):
             with without_banner():
                 from overlapper.scenes.check import hold
             outcome = hold(scene, out, record)
     except Refused as error:
-        say(f"overlapper: {error}", sys.stderr)
-        return 2
+        return _refused(str(error))
     shown = outcome.lines if outcome.word != "as recorded" else [f"note: {note}" for note in outcome.notes]
-    for line in [f"{scene}: {outcome.word}", *(f"    {line}" for line in shown)]:
-        say(line)
-    return 0 if outcome.passed else 1
+    return _Held(0 if outcome.passed else 1, [f"{scene}: {outcome.word}", *(f"    {line}" for line in shown)])
+
+
+def _refused(sentence: str) -> _Held:
+    return _Held(2, [f"overlapper: {sentence}"])
 
 
 def diff(

@@ -93,7 +93,8 @@ def _begun(job: Job) -> str:
     global _call
     # Whoever asks may be killed while this process hangs in an item. It is asked for by the thread that reads its
     # replies, which lives as long.
-    ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
     faulthandler.enable()
     warnings.simplefilter("ignore")
     with contextlib.suppress(OSError):
@@ -123,7 +124,7 @@ def _outcome(call: Callable[[Any], Any], item: Any, limit: float | None) -> Outc
 
 
 class Hand:
-    """Does items in a process of its own, which is started anew when it has ended.
+    """Does items in a worker process, which is started anew when it has ended.
 
     `limit` is the number of seconds that an item may take. NotStarted if there can be no process for the job.
     """
@@ -163,10 +164,10 @@ class Hand:
             worker.send(self._job)
             complaint = worker.receive(START_LIMIT)
         except Ended as ended:
-            raise NotStarted(f"a process for the sweep {ended}") from ended
+            raise NotStarted(f"a worker process {ended}") from ended
         if complaint:
             worker.close()
-            raise NotStarted(f"a process for the sweep could not be prepared: {complaint}")
+            raise NotStarted(f"a worker process could not be prepared: {complaint}")
         return worker
 
     def _forget(self) -> None:

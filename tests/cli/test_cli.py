@@ -9,8 +9,11 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
+from overlapper.cli.check import check
+from overlapper.cli.refusals import Refused
 from overlapper.scenes.table_file import read_csv, read_table
 
 TWO_CUBES = '''
@@ -52,6 +55,14 @@ def build(client):
 FAILS_LATE = TWO_CUBES.replace("i < STEPS", "i < 5")
 LONG = TWO_CUBES.replace("STEPS = 8", "STEPS = 1_000_000")
 SLOW = TWO_CUBES.replace("def build(client):", "def build(client):\n    print('here'); import time; time.sleep(30)")
+WAIT = """
+
+def wait():
+    import os, pathlib, time
+
+    pathlib.Path("waits").write_text(str(os.getpid()))
+    time.sleep(60)
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -519,6 +530,75 @@ def test_scenes_that_cannot_be_run_are_told_with_exit_code_2_after_all_others(tw
     assert code == 2
     assert "guarded/one.py: moved" in said
     assert "overlapper: the scene guarded/deeper/two.py fails before step 6 at line 17: AssertionError" in complaints
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_scenes_are_told_in_their_order_by_however_many_processes(two_scenes, workers):
+    # The first is the last to be through.
+    (two_scenes / "a.py").write_text(
+        TWO_CUBES.replace("a scene may talk", "a talks").replace("STEPS = 8", "STEPS = 300")
+    )
+    for name in "bcd":
+        (two_scenes / f"{name}.py").write_text(TWO_CUBES.replace("a scene may talk", f"{name} talks"))
+    (two_scenes / "c.py").write_text(FAILS_LATE)
+    for path in (two_scenes / "deeper").glob("*.py"):
+        path.unlink()
+    code, said, complaints = checked("guarded", "guarded/../guarded/a.py", "--workers", workers)
+    assert code == 2
+    assert re.findall(r"^guarded.*", said, re.MULTILINE) == [
+        "guarded/a.py: new",
+        "guarded/b.py: new",
+        "guarded/d.py: new",
+        "guarded/one.py: as recorded",
+    ]
+    assert list(dict.fromkeys(complaints.splitlines())) == [
+        "a talks",
+        "b talks",
+        "a scene may talk",
+        "overlapper: the scene guarded/c.py fails before step 6 at line 17: AssertionError: no more",
+        "d talks",
+    ]
+
+
+def test_scenes_that_end_their_process_are_told_with_exit_code_2(two_scenes):
+    dies = "import os; os.abort()\n    print("
+    # As a fault of this package would be.
+    faulty = "import overlapper.scenes.check as check\ncheck.examine = lambda *_: 1 / 0\nimport pybullet"
+    (two_scenes / "one.py").write_text(TWO_CUBES.replace("print(", dies))
+    (two_scenes / "deeper" / "two.py").write_text(TWO_CUBES.replace("import pybullet", faulty))
+    code, said, complaints = checked("guarded/one.py", "guarded/deeper/two.py")
+    assert (code, said) == (2, "")
+    assert complaints == (
+        "overlapper: guarded/one.py: its process ended with signal SIGABRT\n"
+        "overlapper: guarded/deeper/two.py: ZeroDivisionError: division by zero\n"
+    )
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_ctrl_c_ends_a_check(two_scenes, workers):
+    (two_scenes / "one.py").write_text(
+        TWO_CUBES.replace("def build(client):", "def build(client):\n    wait()", 1) + WAIT
+    )
+    words = ["check", "guarded/one.py", "guarded/deeper/two.py", "--workers", workers]
+    with subprocess.Popen([sys.executable, "-m", "overlapper", *words], stdout=-1, stderr=-1, text=True) as process:
+        deadline = time.monotonic() + 30
+        while not Path("waits").exists() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        said, complaints = process.communicate(timeout=30)
+    assert (process.returncode, said) == (130, "")
+    assert complaints == "overlapper: interrupted; nothing was written\n"
+    waiting = int(Path("waits").read_text())
+    assert waiting == process.pid or not psutil.pid_exists(waiting)
+
+
+def test_scenes_are_refused_for_which_there_can_be_no_process(two_scenes, monkeypatch):
+    def lacking(*_, **__):
+        raise OSError(12, "Cannot allocate memory")
+
+    monkeypatch.setattr(subprocess, "Popen", lacking)
+    with pytest.raises(Refused, match=r"^a worker process could not be started \(.*Cannot allocate memory\)$"):
+        check([two_scenes])
 
 
 @pytest.mark.parametrize(

@@ -118,7 +118,7 @@ def test_a_cluster_that_loses_all_it_is_given_is_refused(ray):
 
 
 def test_a_job_that_cannot_be_prepared_is_refused(ray):
-    words = r"^a process for the sweep could not be prepared: there is no such thing$"
+    words = r"^a worker process could not be prepared: there is no such thing$"
     with closing(Cluster()) as cluster, pytest.raises(NotStarted, match=words):
         [*cluster.outcomes(Job("jobs", "doing", "never"), [("give", 1)])]
 

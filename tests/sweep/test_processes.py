@@ -72,7 +72,7 @@ def test_a_process_that_is_killed_between_items_is_started_anew(hand):
 def test_a_job_that_cannot_be_prepared_is_refused():
     with (
         closing(Hand(job("never"))) as hand,
-        pytest.raises(NotStarted, match=r"^a process for the sweep could not be prepared: there is no such thing$"),
+        pytest.raises(NotStarted, match=r"^a worker process could not be prepared: there is no such thing$"),
     ):
         [*hand.work([("give", 1)])]
 
@@ -82,7 +82,7 @@ def test_a_process_that_cannot_be_started_is_refused(monkeypatch):
         raise OSError(12, "Cannot allocate memory")
 
     monkeypatch.setattr(process.subprocess, "Popen", lacking)
-    words = r"^a process for the sweep could not be started \(.*Cannot allocate memory\)$"
+    words = r"^a worker process could not be started \(.*Cannot allocate memory\)$"
     with pytest.raises(NotStarted, match=words):
         [*Processes(2).outcomes(job(), [("give", 1)])]
 
