@@ -331,6 +331,20 @@ def test_frames_with_names_are_shown_by_them(browser, tmp_path):
     browser.press("ArrowRight")
     assert text(browser, "#time output") == "today"
     assert browser.ask("document.querySelector('#slider').getAttribute('aria-valuetext')") == "today"
+    assert browser.ask("document.querySelector('#chart').namesShown") == ["as <b>recorded</b>", "today"]
+
+
+def test_of_many_names_those_are_below_the_chart_that_have_room(browser, tmp_path):
+    recording = Recording()
+    for k in range(40):
+        x = 0.12 + 0.001 * k
+        recording.add(hand_at(x), hand_at(x).contacts(), float(k), f"the pair of number {k}")
+    browser.open(
+        recording.save(tmp_path / "many.html").as_uri(),
+        until="document.querySelector('#time output').textContent === 'the pair of number 0'",
+    )
+    shown = browser.ask("document.querySelector('#chart').namesShown")
+    assert shown[0] == "the pair of number 0" and 2 < len(shown) < 12
 
 
 @pytest.mark.parametrize(("width", "height"), [DESK, TABLET, PHONE])

@@ -107,9 +107,16 @@ function sizeChart() {
     context.fillText(text, x, chart.height - 4 * ratio);
   };
   context.textAlign = "center";
+  // Names that would run into each other are left out: the bar above has the name of the frame that is shown.
+  let end = -Infinity;
+  chart.namesShown = [];
   if (names) names.forEach((name, frame) => {
+    const width = context.measureText(name).width, begin = across(frame) - (frame ? width : 0);
+    if (begin < end + 12 * ratio) return;
     context.textAlign = frame ? "right" : "left";
     label(name, across(frame));
+    end = begin + width;
+    chart.namesShown.push(name);
   });
   else for (const time of ticks(times[last], Math.max(chart.clientWidth / 120, 2))) {
     const x = left + (right - left) * time / times[last];
