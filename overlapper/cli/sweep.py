@@ -26,6 +26,7 @@ from overlapper.cli.options import (
 from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
 
 if TYPE_CHECKING:
+    from overlapper.sweep.comparison import Comparison
     from overlapper.sweep.engines import Engine
     from overlapper.sweep.points import Point, Space
     from overlapper.sweep.store import Store
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from overlapper.sweep.sweep import Sweep
 
 FAILURES_SHOWN = 5
+MOVED_SHOWN = 10
 
 
 def sweep(
@@ -78,6 +80,10 @@ def sweep(
     workers: WorkersOption = None,
     engine: EngineOption = "processes",
     address: AddressOption = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="A recorded sweep: say what has moved since.", show_default=False),
+    ] = None,
     pages: Annotated[int, typer.Option(min=0, help="Pages of so many of the worst tasks, beside the summary.")] = 0,
     method: MethodOption = "auto",
     tolerance: ToleranceOption = 1e-3,
@@ -97,6 +103,10 @@ def sweep(
     and one that failed a row of OUT/failures.parquet. Started again, a sweep does what is missing. The exit code is 0
     if all tasks are done, 1 if any has failed, and 2 if none could be run.
 
+    With --check, the tasks are compared with those of the same parameters in another folder, by the budgets of the
+    scene's expected file, or else by rounding. The exit code is 0 if nothing moved, 1 if something did, or failed that
+    was not recorded as failed, and 2 if there is nothing to compare.
+
     Examples:
 
     [bold]overlapper sweep franka_grasp --grid mass=0.1:10:20:log --grid friction=0.3,0.5 --out runs[/bold]
@@ -104,11 +114,15 @@ def sweep(
     [bold]overlapper sweep box_pile --seeds 50 --steps-kept "every 10" --limit 60 --out piles[/bold]
 
     [bold]overlapper sweep franka_grasp --sample 1000 --range mass=0.1:10:log --range friction=0.1:1 --out runs[/bold]
+
+    [bold]overlapper sweep box_pile --seeds 50 --out today --check piles[/bold]
     """
     refuse_out_of_range(tolerance, concave_threshold, None)
     parameters = given_parameters(given)
     kept = _kept(steps_kept)
     refuse_address(engine, address)
+    if check and check.resolve() == out.resolve():
+        raise Refused("--check and --out are the same folder")
     if ranges and not sample:
         raise Refused("--range says what --sample draws, and there is no --sample")
     settings: dict[str, Any] = {
@@ -128,6 +142,7 @@ def sweep(
             import overlapper.simulation.bodies  # noqa: F401  # which says now what to install
         from overlapper.scenes.scene import find_scene, load_scene
         from overlapper.sweep import charts, page
+        from overlapper.sweep.comparison import Recorded
         from overlapper.sweep.part import must_be_no_columns
         from overlapper.sweep.points import Space
         from overlapper.sweep.study import Study
@@ -140,12 +155,15 @@ def sweep(
         settings["steps"] = steps or chosen.steps
         study = Study.of(find_scene(scene), settings, kept)
         todo = Sweep(study, space.crossed(_axes(space, grid, seeds, points, sample, ranges, sample_seed)))
+        recorded = Recorded(check, chosen.expected, todo) if check else None
         store = stack.enter_context(todo.opened(out))
         working = stack.enter_context(engine_of(engine, address, workers))
         reached, finished = _run(todo, store, working, limit, retry)
-        shown = page.write(todo, store, scene, pages) if store.done & todo.tasks.keys() else None
+        compared = recorded.compare(store) if recorded and finished else None
+        done = store.done & todo.tasks.keys()
+        shown = page.write(todo, store, scene, pages, comparison=compared) if done else None
         failures = store.rows("failures")
-    _tell(todo, store, reached, finished, failures, shown, as_json)
+    _tell(todo, store, reached, finished, failures, compared, shown, as_json)
 
 
 def _kept(text: str) -> int:
@@ -213,6 +231,7 @@ def _tell(
     reached: Reached,
     finished: bool,
     failures: list[dict[str, Any]],
+    compared: Comparison | None,
     page: Path | None,
     as_json: bool,
 ) -> None:
@@ -232,6 +251,15 @@ def _tell(
             "failed": [{name: row[name] for name in row if name != "traceback"} for row in failures],
             "finished": finished,
         }
+        if compared:
+            told["check"] = {
+                "recorded": str(compared.folder),
+                "compared": len(compared.tasks),
+                "not_recorded": compared.added,
+                "gone": compared.gone,
+                "measures": compared.counted(),
+                "moved": [task.found["task"] for task in compared.moved],
+            }
         print(json.dumps(told))
     else:
         before = f", {reached.before:,} of them before" if reached.before else ""
@@ -244,9 +272,14 @@ def _tell(
             say(f"Tracebacks: {store.path('failures')}; --retry does them again")
         if not finished:
             say("Interrupted; the same command goes on with what is missing.")
+        for line in compared.lines(MOVED_SHOWN) if compared else ():
+            say(line)
         for path in filter(None, (store.path("tasks") if page else None, page)):
             say(f"Written: {path}")
-    raise typer.Exit(130 if not finished else 1 if failures else 0)
+    wrong = bool(failures)
+    if compared:
+        wrong = bool(compared.moved or {row["task"] for row in failures} - compared.failures)
+    raise typer.Exit(130 if not finished else int(wrong))
 
 
 def _point(todo: Sweep, row: dict[str, Any]) -> str:

@@ -93,11 +93,11 @@ def _measure_moves(
     for name in spent:
         for column in MEASURES[name]:
             was, now = _number(old, column), _number(new, column)
-            part = budgets[name].spent(_difference(was, now), was)
+            part = budgets[name].spent(off_by(was, now), was)
             spent[name] = max(spent[name], part)
             if not part <= 1:  # as it is for a value that is not a number
                 allowed = budgets[name].allowed(was)
-                yield Move(_step(old), who, column, _text(was), _text(now), _difference(was, now), allowed, part)
+                yield Move(_step(old), who, column, _text(was), _text(now), off_by(was, now), allowed, part)
     # A bound is free to be within the budget of what it bounds. Beyond that ten times are allowed, for the bound of one
     # pair depends on the order of operations: moving a scene multiplied one by 4.7, another way of cutting one by 14.
     was, now = (_number(row, "volume_error_m3") for row in (old, new))
@@ -186,7 +186,7 @@ def _number(row: Row, column: str) -> float:
     return float(value) if value is not None else 0.0
 
 
-def _difference(was: float, now: float) -> float:
+def off_by(was: float, now: float) -> float:
     """Of a measure; what is not a number differs from every number, and not from itself."""
     return 0.0 if was == now or (math.isnan(was) and math.isnan(now)) else abs(now - was)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,29 +76,31 @@ def _edges(middles: Values) -> Values:
     return np.concatenate([[2 * middles[0] - between[0]], between, [2 * middles[-1] - between[-1]]])
 
 
-def lines(across: Axis, measured: Sequence[tuple[Measure, Values]]) -> str:
-    """Each measure over a parameter: the median of the tasks with a value, and the band that holds all of them."""
+def lines(across: Axis, measured: Sequence[tuple[Measure, Values]], middle: Callable[[Values], Any] = np.median) -> str:
+    """Each measure over a parameter: the middle of the tasks with a value, and the band that holds all of them."""
     figure = _figure(3.1 * len(measured), 2.5)
     for axes, (measure, values) in zip(np.atleast_1d(figure.subplots(1, len(measured))), measured):
         groups = [values[across.group == k] * measure.factor for k in range(len(across.middles))]
         there = [k for k, group in enumerate(groups) if len(group)]
         x = across.middles[there]
-        medians, least, most = ([of(groups[k]) for k in there] for of in (np.median, np.min, np.max))
+        middles, least, most = ([of(groups[k]) for k in there] for of in (middle, np.min, np.max))
         axes.fill_between(x, least, most, alpha=0.2, linewidth=0)
-        axes.plot(x, medians, ".-", markersize=4, linewidth=1.2)
+        axes.plot(x, middles, ".-", markersize=4, linewidth=1.2)
         axes.set(xlabel=across.name, title=measure.label)
         _scaled(axes.xaxis, axes.set_xscale, across)
         axes.grid(alpha=0.3)
     return _svg(figure)
 
 
-def heat_map(across: Axis, up: Axis, measured: Sequence[tuple[Measure, Values]]) -> str:
-    """The median of each measure for each pair of values of two parameters; what no task has is left white."""
+def heat_map(
+    across: Axis, up: Axis, measured: Sequence[tuple[Measure, Values]], middle: Callable[[Values], Any] = np.median
+) -> str:
+    """The middle of each measure for each pair of values of two parameters; what no task has is left white."""
     figure = _figure(4.2 * len(measured), 3.1)
     for axes, (measure, values) in zip(np.atleast_1d(figure.subplots(1, len(measured))), measured):
         cells = np.full((len(up.middles), len(across.middles)), np.nan)
         for i, j in set(zip(up.group.tolist(), across.group.tolist())):
-            cells[i, j] = np.median(values[(up.group == i) & (across.group == j)]) * measure.factor
+            cells[i, j] = middle(values[(up.group == i) & (across.group == j)]) * measure.factor
         drawn = axes.pcolormesh(across.edges, up.edges, cells, cmap="viridis", edgecolors="face", linewidth=0.2)
         figure.colorbar(drawn, ax=axes)
         axes.set(xlabel=across.name, ylabel=up.name, title=measure.label)

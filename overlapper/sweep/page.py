@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import html
+import math
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ import numpy as np
 from overlapper.scenes.outputs import recorder
 from overlapper.scenes.run import run
 from overlapper.sweep import charts
+from overlapper.sweep.comparison import Comparison
 from overlapper.sweep.part import FAILURES, TASKS
 from overlapper.sweep.store import Store
 from overlapper.sweep.sweep import Sweep
@@ -32,16 +35,23 @@ DRAWN = 5
 DEFAULTS = {"tolerance": 1e-3, "method": "auto", "concave": "decompose", "concave_threshold": 0.05}
 DEFAULTS |= {"surface": "nominal", "pairs": None}
 
+MOVED = charts.Measure("moved", "tasks that moved, %", 100.0)
+
 Row = Mapping[str, Any]
 
 
 def write(
-    sweep: Sweep, store: Store, scene: str, pages: int = 0, heard: Callable[[int], object] = lambda number: None
+    sweep: Sweep,
+    store: Store,
+    scene: str,
+    pages: int = 0,
+    heard: Callable[[int], object] = lambda number: None,
+    comparison: Comparison | None = None,
 ) -> Path:
     """Write the summary of the tasks of a sweep that are done, of which there is one; returns where.
 
     `scene` is the name or path that commands give to it. Of the `pages` worst tasks the pages are written, too, and
-    `heard` is told of each.
+    `heard` is told of each. With a `comparison`, it shows what has moved.
     """
     rows = [row for row in store.rows(TASKS) if row["task"] in sweep.tasks]
     worst = sorted(rows, key=lambda row: (-row["largest_volume_m3"], row["task"]))[: max(WORST, pages)]
@@ -52,6 +62,7 @@ def write(
     texts = {
         "title": html.escape(f"Sweep of {sweep.study.scene}"),
         "opening": html.escape(_opening(sweep, rows)),
+        "moved": "\n".join(_moved(sweep, comparison)) if comparison else "",
         "worst": _worst(sweep, store, scene, worst),
         "failed": _failed(sweep, store),
         "charts": "\n".join(_charts(sweep, rows)),
@@ -124,6 +135,38 @@ def _worst(sweep: Sweep, store: Store, scene: str, worst: Sequence[Row]) -> str:
             f"<td>{link}<br><code>{how}</code></td></tr>"
         )
     return "\n".join(lines)
+
+
+def _moved(sweep: Sweep, comparison: Comparison) -> Iterable[str]:
+    """What has moved since another sweep: how much of it, where over the parameters, and the worst tasks."""
+    first, *more = comparison.lines(0)
+    said = " ".join([first, *(line for line in more if not line.startswith(" "))])
+    yield f"<h2>What has moved</h2><p>{html.escape(said)}</p>"
+    if not comparison.moved:
+        return
+    varied = _varied(sweep, [task.found for task in comparison.tasks])
+    heading = [*varied, "measure", "recorded", "now", "times its budget"]
+    lines = ["<tr>" + "".join(f"<th>{html.escape(name)}</th>" for name in heading) + "</tr>"]
+    for task in comparison.moved[:WORST]:
+        worst = max(task.changes, key=lambda change: change.part)
+        part = f"{worst.part:.3g}" if math.isfinite(worst.part) else ""
+        cells = [*(_figure(task.found[name]) for name in varied), worst.measure, worst.recorded, worst.found, part]
+        lines.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
+    yield f'<div class="wide"><table>{"".join(lines)}</table></div>'
+    columns = [(MOVED, np.array([float(bool(task.changes)) for task in comparison.tasks]))]
+    for measure in charts.MEASURES[:2]:
+        change = replace(measure, label=f"change of {measure.label}")
+        columns.append((change, np.array([task.difference(measure.column) for task in comparison.tasks])))
+    axes = [charts.axis(name, [task.found[name] for task in comparison.tasks]) for name in varied[:DRAWN]]
+    if axes:
+        means = (
+            "The mean of all tasks with a value, and the band that holds them; nothing of measures where one failed."
+        )
+        yield f'<h2>Where it has moved</h2><p class="quiet">{means}</p>'
+    for axis in axes:
+        yield charts.lines(axis, columns, np.mean)
+    for across, up in combinations((axis for axis in axes if axis.name != "seed"), 2):
+        yield charts.heat_map(across, up, columns, np.mean)
 
 
 def _failed(sweep: Sweep, store: Store) -> str:

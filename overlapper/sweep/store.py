@@ -15,7 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from overlapper.sweep.part import FAILURES, STEPS, TASKS
+from overlapper.sweep.part import FAILURES, STEPS, TASKS, arrow
 from overlapper.whole_file import beside
 
 TABLES = (TASKS, STEPS, FAILURES)
@@ -108,12 +108,7 @@ class Store:
 
     def rows(self, table: str) -> list[dict[str, Any]]:
         """All rows of a table, by the names of their tasks; none if there is no such table."""
-        from overlapper.sweep.part import arrow
-
-        if not self.path(table).is_dir():
-            return []
-        rows = arrow().parquet.read_table(self.path(table)).to_pylist()
-        return sorted(rows, key=lambda row: str(row["task"]))
+        return rows_in(self.folder, table)
 
     def close(self) -> None:
         """Let another sweep at it."""
@@ -127,6 +122,15 @@ class Store:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def rows_in(folder: Path, table: str) -> list[dict[str, Any]]:
+    """All rows of a table in the folder of a sweep, by the names of their tasks; none if there is no such table."""
+    place = folder / f"{table}.parquet"
+    if not place.is_dir():
+        return []
+    rows = arrow().parquet.read_table(place).to_pylist()
+    return sorted(rows, key=lambda row: str(row["task"]))
 
 
 def _whole(part: Path) -> bool:

@@ -65,6 +65,53 @@ def test_json_says_what_failed_with_exit_code_1():
     assert text[3] == "Tracebacks: runs/failures.parquet; --retry does them again"
 
 
+def test_a_sweep_says_what_has_moved_since_another():
+    words = ["--grid", "apart=0.1:0.3:3", "--grid", "fate=good,raises", "--grid", "seed=0,1"]
+    assert sweep(*words, "--out", "before").returncode == 1
+    # What failed has failed before.
+    same = sweep(*words, "--out", "same", "--check", "before")
+    assert same.returncode == 0 and "\n12 of 12 tasks are as in before.\nWritten: " in same.stdout
+    Path("balls.py").write_text(BALLS.replace("radius=0.1", "radius=0.101"))
+    moved = sweep(*words, "--out", "after", "--check", "before")
+    lines = moved.stdout.splitlines()
+    start = next(k for k, line in enumerate(lines) if "have moved" in line)
+    assert moved.returncode == 1
+    assert lines[start].startswith("4 of 12 tasks have moved since before: largest_volume_m3 in 4, mean_volume_m3 in 4")
+    assert all(line.startswith("    apart=0.") for line in lines[start + 1 : start + 5])
+    assert lines[start + 5] == "Written: after/tasks.parquet"
+    page = Path("after/summary.html").read_text()
+    assert "<p>4 of 12 tasks have moved since before: " in page and "tasks that moved, %" in page
+    told = json.loads(sweep(*words[:2], "--out", "after", "--check", "before", "--json").stdout)["check"]
+    assert told.pop("measures")["largest_depth_m"] == 2 and len(told.pop("moved")) == 2
+    assert told == {"recorded": "before", "compared": 3, "not_recorded": 0, "gone": 9}
+
+
+def test_a_failure_that_was_not_recorded_has_moved():
+    assert sweep("--seeds", "2", "--out", "before").returncode == 0
+    Path("balls.py").write_text(BALLS.replace('fate == "raises"', "seed"))
+    moved = sweep("--seeds", "2", "--out", "after", "--check", "before")
+    assert moved.returncode == 1
+    assert "\n1 of 2 tasks have moved since before: task in 1.\n    apart=0.15, seed=1, fate=good" in moved.stdout
+    more = sweep("--set", "seed=0", "--out", "after", "--check", "before")
+    assert more.returncode == 0 and "\nNot compared: 0 that were not recorded, 1 that are no more.\n" in more.stdout
+
+
+def test_a_sweep_with_nothing_to_compare_is_refused_before_it_begins():
+    assert sweep("--seeds", "2", "--out", "before").returncode == 0
+    for words, sentence in (
+        (["--set", "seed=7", "--check", "before"], "--check before: it has none of the tasks of this sweep"),
+        (["--check", "nowhere"], "--check nowhere: there is no sweep in it"),
+        (["--check", "./runs"], "--check and --out are the same folder"),
+    ):
+        done = sweep(*words, "--out", "runs")
+        assert (done.returncode, done.stdout, done.stderr) == (2, "", f"overlapper: {sentence}\n")
+    Path("expected").mkdir()
+    Path("expected/balls.csv").write_text("# budget mass: relative 1 absolute 1\n")
+    done = sweep("--seeds", "2", "--check", "before", "--out", "runs")
+    assert done.returncode == 2 and "expected/balls.csv has a budget of 'mass', which is none of volume" in done.stderr
+    assert not Path("runs").exists()
+
+
 def test_ctrl_c_ends_a_sweep_that_goes_on_later():
     words = ["--seeds", "40", "--set", "seconds=0.1", "--out", "runs", "--workers", "2"]
     command = [sys.executable, "-m", "overlapper", "sweep", "balls.py", *words]

@@ -1,0 +1,212 @@
+"""A sweep is held against a recorded one: task by task of the same parameters, measure by measure, by its budgets."""
+
+import math
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+from sweeping import BALLS, rows, sweep_of, swept
+
+from overlapper.sweep import page
+from overlapper.sweep.comparison import Recorded
+
+GRIDS = ["apart=0.1:0.19:4", "seed=0,1"]
+NOWHERE = Path("expected/balls.csv")
+
+pytestmark = pytest.mark.usefixtures("balls")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """The folder of a sweep, which tests do not write to."""
+    folder = tmp_path_factory.mktemp("recorded")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        Path("balls.py").write_text(BALLS)
+        swept("runs", GRIDS)
+    return folder / "runs"
+
+
+@pytest.fixture
+def other(recorded, balls):
+    """A copy of it of which rows can be edited."""
+    shutil.copytree(recorded, "other")
+    return edit
+
+
+def edit(**changes):
+    """Rows of the folder `other` with some columns as functions of the row say."""
+    for part in Path("other/tasks.parquet").iterdir():
+        table = pyarrow.parquet.read_table(part)
+        (row,) = table.to_pylist()
+        for name, change in changes.items():
+            row[name] = change(row)
+        pyarrow.parquet.write_table(pyarrow.Table.from_pylist([row], schema=table.schema), part)
+
+
+def compared(check, runs, grids=GRIDS, expected=NOWHERE):
+    sweep = sweep_of(grids)
+    held = Recorded(Path(check), Path(expected), sweep)
+    with sweep.opened(Path(runs)) as store:
+        return held.compare(store)
+
+
+def test_a_sweep_is_as_it_was_recorded(recorded):
+    comparison = compared(recorded, recorded)
+    assert comparison.lines(10) == [f"8 of 8 tasks are as in {recorded}."]
+    assert comparison.moved == [] and comparison.counted() == {}
+
+
+@pytest.mark.parametrize(
+    ("measure", "factor", "moved"),
+    [
+        ("largest_volume_m3", 1 + 0.5e-9, False),
+        ("largest_volume_m3", 1 + 2e-9, True),
+        ("mean_volume_m3", 1 - 2e-9, True),
+        ("largest_depth_m", 1 + 2e-9, True),
+        ("contact_time_s", 1 + 1e-12, False),
+        ("contact_time_s", 2 / 3, True),
+    ],
+)
+def test_a_measure_moves_by_more_than_its_budget(recorded, other, measure, factor, moved):
+    other(**{measure: lambda row: row[measure] * (factor if row["seed"] else 1.0)})
+    comparison = compared("other", recorded)
+    assert comparison.counted() == ({measure: 4} if moved else {})
+    assert {task.found["seed"] for task in comparison.moved} == ({1} if moved else set())
+
+
+def test_forces_are_compared_as_vectors_and_their_rounding_is_that_of_the_surface(recorded, other):
+    row = max(rows(recorded), key=lambda row: row["largest_volume_m3"])
+    surface = row["largest_volume_m3"] ** (2 / 3)
+    other(mean_force_y_m2=lambda row: (row["mean_force_y_m2"] or 0.0) + 1e-12 * surface)
+    assert compared("other", recorded).counted() == {}
+    other(mean_force_y_m2=lambda row: 0.1 * surface)
+    assert compared("other", recorded).counted() == {"mean_force_m2": 8}
+
+
+def test_what_is_not_a_number_differs_from_numbers_and_not_from_itself(recorded, other):
+    other(largest_depth_m=lambda row: math.nan if row["seed"] else row["largest_depth_m"])
+    comparison = compared("other", recorded)
+    assert comparison.counted() == {"largest_depth_m": 4}
+    assert comparison.lines(1)[1].endswith(", recorded as nan")
+    shutil.copytree("other", "same")
+    assert compared("other", "same").moved == []
+
+
+def test_budgets_are_those_of_the_expected_file(recorded, other):
+    other(largest_volume_m3=lambda row: row["largest_volume_m3"] * 1.01)
+    assert len(compared("other", recorded).moved) == 8
+    NOWHERE.parent.mkdir()
+    NOWHERE.write_text("# budget volume: relative 0.02 absolute 0.0\n")
+    assert compared("other", recorded).moved == []
+
+
+def test_the_worst_is_told_first_with_its_parameters(recorded, other):
+    other(largest_volume_m3=lambda row: row["largest_volume_m3"] * (1 + 1e-3 * row["apart"]))
+    first, *worst, more = compared("other", recorded).lines(2)
+    assert first == "8 of 8 tasks have moved since other: largest_volume_m3 in 8."
+    words = r" +apart=0.19, seed=\d, fate=good, seconds=0.0: largest_volume_m3 is (\S+), recorded as (\S+): "
+    words += r"1.9e\+05 times its budget"
+    figures = [tuple(map(float, re.fullmatch(words, each).groups())) for each in worst]
+    assert [was / now for now, was in figures] == pytest.approx([1 + 1.9e-4] * 2)
+    assert more == "    and 6 more"
+
+
+def test_a_task_that_failed_on_one_side_has_moved(tmp_path):
+    grids = ["apart=0.1,0.12", "fate=good,raises"]
+    swept("before", grids)
+    Path("balls.py").write_text(BALLS.replace('fate == "raises"', "apart == 0.12"))
+    swept("after", grids)
+    comparison = compared("before", "after", grids)
+    assert comparison.counted() == {"task": 2}
+    assert sorted(comparison.lines(10)[1:]) == [
+        "    apart=0.1, seed=0, fate=raises, seconds=0.0: task is done, recorded as raised",
+        "    apart=0.12, seed=0, fate=good, seconds=0.0: task is raised, recorded as done",
+    ]
+    failed = {row["task"]: row["fate"] for row in rows("after", "failures")}
+    assert {failed[name] for name in comparison.failures} == {"raises"}
+
+
+def test_tasks_are_matched_by_the_parameters_that_both_have(recorded):
+    Path("balls.py").write_text(BALLS.replace('fate="good"', 'fate="good", colour="red"'))
+    grids = ["apart=0.1:0.19:4", "seed=1,2"]
+    swept("after", grids, steps=3)
+    comparison = compared(recorded, "after", grids)
+    assert comparison.lines(10) == [
+        f"4 of 4 tasks are as in {recorded}.",
+        "Not compared: 4 that were not recorded, 4 that are no more.",
+    ]
+    with pytest.raises(
+        ValueError, match=r": by the parameters of both, tasks of this sweep have the same apart, seed, "
+    ):
+        compared(recorded, "after", [*grids, "colour=red,blue"])
+
+
+def test_a_scene_without_parameters_is_compared(other):
+    plain = re.sub(r"\*, .*\):", "):", BALLS.partition('    if fate == "raises"')[0]).replace("seconds)", "0)")
+    Path("balls.py").write_text(plain.replace("apart + 1e-3 * seed", "0.15"))
+    swept("before", [])
+    Path("balls.py").write_text(plain.replace("apart + 1e-3 * seed", "0.16"))
+    swept("after", [])
+    assert compared("before", "after", []).lines(1)[1].startswith("    the scene: ")
+    with pytest.raises(
+        ValueError, match=r"^--check other: by the parameters of both, tasks of the sweep in it have noth"
+    ):
+        compared("other", "after", [])
+
+
+def spoiled(table, data=b"none"):
+    Path("other", table).mkdir(exist_ok=True)
+    Path("other", table, "a.parquet").write_bytes(data)
+
+
+def without(column):
+    for part in Path("other/tasks.parquet").iterdir():
+        pyarrow.parquet.write_table(pyarrow.parquet.read_table(part).drop_columns([column]), part)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "sentence"),
+    [
+        (lambda: shutil.rmtree("other"), "there is no sweep in it"),
+        (lambda: spoiled("tasks.parquet"), "tasks.parquet cannot be read: .*[Pp]arquet"),
+        (lambda: spoiled("failures.parquet"), "failures.parquet cannot be read: .*[Pp]arquet"),
+        (lambda: without("task"), "tasks.parquet cannot be read: it has no column 'task'"),
+        (lambda: without("largest_depth_m"), "tasks.parquet has no column 'largest_depth_m'"),
+    ],
+)
+@pytest.mark.usefixtures("other")
+def test_what_is_no_sweep_is_refused(spoil, sentence):
+    spoil()
+    with pytest.raises(ValueError, match=rf"^--check other: {sentence}"):
+        Recorded(Path("other"), NOWHERE, sweep_of(GRIDS))
+
+
+def test_a_sweep_of_other_points_is_refused(recorded):
+    with pytest.raises(ValueError, match=r": it has none of the tasks of this sweep$"):
+        Recorded(recorded, NOWHERE, sweep_of(["seed=7"]))
+
+
+def test_the_page_has_a_map_of_where_it_has_moved():
+    grids = ["apart=0.1:0.19:3", "seconds=0.0,0.001", "fate=good,raises"]
+    swept("runs", grids)
+    shutil.copytree("runs", "other")
+    edit(largest_volume_m3=lambda row: row["largest_volume_m3"] * (1 + 1e-3 * (row["apart"] > 0.14)))
+    next(Path("other/failures.parquet").iterdir()).unlink()
+    sweep = sweep_of(grids)
+    held = Recorded(Path("other"), NOWHERE, sweep)
+    with sweep.opened(Path("runs")) as store:
+        comparison = held.compare(store)
+        plain = page.write(sweep, store, "balls.py").read_text()
+        text = page.write(sweep, store, "balls.py", comparison=comparison).read_text()
+    assert "What has moved" not in plain
+    told = "<p>4 of 11 tasks have moved since other: largest_volume_m3 in 4. Not compared: 1 that were not recorded"
+    assert told in text and text.count("<td>largest_volume_m3</td>") == 4
+    # Lines over each of the three parameters, maps over each two.
+    assert text.count("<svg") == plain.count("<svg") + 6 and "change of largest volume, cm³" in text
+    assert "tasks that moved, %" in text
+    assert {np.sign(task.difference("largest_volume_m3")) for task in comparison.moved} == {-1}
+    assert sum(np.isnan(task.difference("largest_volume_m3")) for task in comparison.tasks) == 5
