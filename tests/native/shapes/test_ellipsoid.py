@@ -415,3 +415,20 @@ def test_the_least_way_out_of_a_halfspace_is_straight_up():
     found = overlap(body, HalfSpace((0, 0, 1), 0))
     assert found.depth == pytest.approx(-body.bounds[0, 2], rel=1e-15)
     assert_array_equal(found.normal, [0, 0, 1])
+
+
+@pytest.mark.parametrize("seed", [4300658, 4301494, 4301676])
+def test_octants_of_a_needle_have_the_area_that_is_stated(seed):
+    """As given, and turned so that the slices lie across other axes."""
+    case = make("ellipsoids", seed)
+    body, box = sorted(case.placed, key=lambda placed: isinstance(placed.shape, Box))
+    a, b, c = body.shape.half_axes
+    cut = box.position != body.position
+    flat = np.pi * np.array([b * c, c * a, a * b])[cut].sum() / 2 ** (cut.sum() - 1)
+    truth = surface(body.shape.half_axes) / 2 ** cut.sum() + flat
+    rng = np.random.default_rng(seed)
+    for q in ([0.0, 0.0, 0.0, 1.0], *rng.normal(size=(4, 4))):
+        at = rotation(q) @ (box.position - body.position)
+        found = overlap(Placed(body.shape, orientation=q), Placed(box.shape, at, q))
+        assert abs(found.area - truth) <= found.errors.area + 1e-15 * truth
+        assert found.errors.area <= 1e-10 * truth

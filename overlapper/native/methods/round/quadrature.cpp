@@ -60,6 +60,8 @@ static_assert(2 * kNodes24.size() == kMostNodes);
 
 /// The relative errors of a rule that are not worth another one, at first.
 constexpr double kVolumeError = 1e-14, kAreaError = 1e-12;
+/// The same of the area of a stretched ball, by the worst that its terms may do.
+constexpr double kStretchedAreaError = 1e-11;
 /// The relative size at which the last coefficients of the series leave no error worth halving for: a rule of n nodes
 /// integrates the first 2 n terms, so that its error is as small as the square of the n-th.
 constexpr double kVolumeTail = 2e-9, kAreaTail = 1e-7;
@@ -89,6 +91,14 @@ struct Series {
   /// A rule of n nodes integrates the first 2 n terms. From the middle to the n-th, terms have become smaller by a
   /// factor; to the last, they do so twice again, and more if the integrand has no singularity nearby.
   double error() const { return 30 * tail() * ratio() * ratio(); }
+  /// The same where an element is sharp near an end of the interval: terms, which begin at about `whole`, fall fast at
+  /// first and then as slowly as those of a root. They are taken to fall once again, not twice, as they did to the
+  /// end, and by as much less, squared, as that was less than they fell to the middle.
+  double stretched_error(double whole) const {
+    const double middle = std::max(std::abs(even), std::abs(odd)), second = ratio();
+    const double slowing = middle > 0 ? std::max(1.0, second * whole / middle) : 1;
+    return 30 * tail() * std::min(1.0, second * slowing * slowing);
+  }
   /// How many times half the nodes it takes until the error is that, if terms go on like that.
   double halves_until(double small) const {
     const double now = error();
@@ -166,7 +176,11 @@ class Integrating {
       return series.halves_until(limit * whole);
     };
     const double volume = of(part.volume, part.integrals.volume, volume_, kVolumeError, kVolumeTail);
-    if (stack_.stretch && sum_.rules > kMostRulesForStretch) return volume;
+    if (stack_.stretch) {
+      if (sum_.rules > kMostRulesForStretch) return volume;
+      // Where terms fall slowly, more nodes would help little.
+      if (part.area.stretched_error(part.integrals.area) > kStretchedAreaError * area_) return kHopeless;
+    }
     return std::max(volume, of(part.area, part.integrals.area, area_, kAreaError, kAreaTail));
   }
 
@@ -190,10 +204,10 @@ class Integrating {
     }
     sum_.integrals.add(1, part.integrals);
     sum_.samples.insert(sum_.samples.end(), part.samples.begin(), part.samples.begin() + 2 * part.rule.size());
-    // Terms of a stretched area may go on more slowly than they have begun.
-    const bool ended = stack_.stretch && sum_.rules > kMostRulesForStretch;
-    const double area_error = ended ? 30 * part.area.tail() : part.area.error();
-    sum_.area_error += stack_.stretch ? 10 * area_error : area_error;
+    // Of what was not halved for its area's sake, no fall of terms is taken for granted.
+    const bool ended = sum_.rules > kMostRulesForStretch;
+    const double of_stretched = ended ? 30 * part.area.tail() : part.area.stretched_error(part.integrals.area);
+    sum_.area_error += stack_.stretch ? of_stretched : part.area.error();
     const double ratio = volume_ > 0 ? part.volume.tail() / volume_ : 0;
     sum_.error += strictness_ > 0 ? volume_ * std::min(ratio, 30 * ratio * std::sqrt(ratio)) : part.volume.error();
     return true;
