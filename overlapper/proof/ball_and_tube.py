@@ -287,7 +287,11 @@ class BallAndTube(Slices):
                 turn = -acb(0, 1) * ((height + other) / disc).log(analytic=analytic)
             else:
                 turn = arb.pi() + acb(0, 1) * ((other - height) / disc).log(analytic=analytic)
-            return (disc * disc * turn - height * reach) * short
+            found = (disc * disc * turn - height * reach) * short
+            if not analytic and not found.is_finite():
+                # Near a pole of the ball no angle is known: between nothing and all of the disc.
+                return acb((arb.pi() * disc * disc * short).real.union(arb(0)))
+            return found
 
         ends = [arb.atan2(t, (least * least - t * t).nonnegative_part().sqrt()) for t in (low, high)]
         return integrated(slice_, ends[0], ends[1], 8 * thick * least, goal)

@@ -38,9 +38,9 @@ SHARE = fmpq(3331, 7919)
 
 # Of the bits of a number, those to which what is not elementary is integrated.
 INTEGRATED = 0.75
-# Bits that roundings of what is integrated may take, and by what the square of the bits is divided to be the number of
-# evaluations after which there is no hope of more.
-SPARE, EVALUATIONS = 16, 2
+# Bits that roundings of what is integrated may take, by what the square of the bits is divided to be the number of
+# evaluations after which there is no hope of more, and the most of these, which take seconds.
+SPARE, EVALUATIONS, MOST_EVALUATIONS = 16, 2, 1 << 16
 
 Form = list[fmpq]  # coefficients of 1, t, t², ρ₁, t ρ₁, ρ₁², ρ₂, t ρ₂, ρ₂², ρ₁ ρ₂
 
@@ -284,12 +284,21 @@ def of_form(squares: tuple[fmpq_poly, ...], low: arb, high: arb) -> list[arb]:
 def integrated(f: Callable[[acb, bool], acb], low: arb, high: arb, most: arb, goal: int) -> arb:
     """Between ends that are known to rounding, of what is not more than `most`.
 
-    Below the rounding of the most there is nothing to be had by smaller steps, and of these there is an end.
+    Below the rounding of the most there is nothing to be had by smaller steps, and of these there is an end. The worst
+    interval is halved first, so that where a root begins at an end, what is left when evaluations are spent is narrow.
     """
     start, end = low.mid(), high.mid()
     rounding = most * (end - start) * arb(2) ** (SPARE - ctx.prec)
+    evaluations = min(ctx.prec**2 // EVALUATIONS, MOST_EVALUATIONS)
     inner = acb.integral(
-        f, start, end, rel_tol=arb(2) ** -goal, abs_tol=rounding, eval_limit=ctx.prec**2 // EVALUATIONS
+        f,
+        start,
+        end,
+        rel_tol=arb(2) ** -goal,
+        abs_tol=rounding,
+        eval_limit=evaluations,
+        depth_limit=evaluations,
+        use_heap=True,
     ).real
     return inner + (low.rad() + high.rad()) * most.union(-most)
 

@@ -103,10 +103,7 @@ class OrBetween:
                 raise
         off = fmpq(1, 1 << bits // 4)
         thin, thick = (self.slices(replace(self.tube, square=self.tube.square * x)) for x in (1 - off, 1 + off))
-        between = thin(bits).union(thick(bits))
-        if not between.is_finite():
-            raise CertificateError("the common volume could not be bounded: surfaces meet all along a curve")
-        return between
+        return finite(thin(bits).union(thick(bits)))
 
 
 def finite(number: arb) -> arb:

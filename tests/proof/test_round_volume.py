@@ -3,6 +3,7 @@
 import sys
 from fractions import Fraction
 
+import families
 import numpy as np
 import pytest
 from flint import arb, ctx
@@ -262,6 +263,19 @@ def test_a_lie_in_the_last_digit_is_found():
     for low, high in ((upper, upper + step), (lower - step, lower), (lower - 2 * step, lower - step)):
         with pytest.raises(CertificateError, match="the common volume must lie between"):
             Bracketed((a, b), low, high).verify()
+
+
+def test_a_side_of_slices_may_go_through_the_pole_of_a_ball():
+    case = families.make("special_poses", 4002152)
+    found = overlap(*case.placed)
+    lower, upper = bounds(*case.placed)
+    assert found.volume - found.volume_error <= lower <= upper <= found.volume + found.volume_error
+
+
+def test_bodies_that_only_touch_are_not_proved_to_share_anything():
+    a, b = Placed(Sphere(1.0)), Placed(Sphere(1.0), (2.0, 0, 0))
+    with pytest.raises(CertificateError, match=r"^the common volume could not be bounded: the bodies may only touch$"):
+        proved_bounds(a, b, lambda found: found[0] > 0)
 
 
 def test_without_its_library_a_certificate_says_what_to_install(monkeypatch):
