@@ -6,6 +6,7 @@ that were under way there, and these are sent once more.
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Sequence
 from typing import Any
@@ -39,7 +40,7 @@ class Cluster:
         self._ray: Any = ray
         self._asked = workers
         try:
-            ray.init(address or "local", log_to_driver=False, logging_level="ERROR", include_dashboard=False)
+            ray.init(address or "local", log_to_driver=False, logging_level=logging.ERROR, include_dashboard=False)
         except (ConnectionError, RuntimeError, ValueError, OSError) as error:
             raise NotStarted(f"there is no Ray cluster at {address}: {first_line(error)}") from error
 
