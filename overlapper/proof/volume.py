@@ -69,7 +69,7 @@ class Common:
             for k in wide or range(len(self._parts)):
                 known = self._known[k]
                 with suppress(Undecided):
-                    found = self._parts[k](bits)
+                    found = finite(self._parts[k](bits))
                     if known is None or found.rad() < known.rad():
                         self._known[k] = found
             volumes = [volume for volume in self._known if volume is not None]
@@ -103,7 +103,7 @@ class OrBetween:
                 raise
         off = fmpq(1, 1 << bits // 4)
         thin, thick = (self.slices(replace(self.tube, square=self.tube.square * x)) for x in (1 - off, 1 + off))
-        return finite(thin(bits).union(thick(bits)))
+        return thin(bits).union(thick(bits))
 
 
 def finite(number: arb) -> arb:

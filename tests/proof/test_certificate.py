@@ -200,6 +200,7 @@ def test_touching_round_bodies_are_proved_to_share_no_more_than_is_stated(seed):
         ("special_poses", 4000331),
         ("special_poses", 4002098),  # a ball whose centre is on a cylinder, where the segment of a slice ends in a root
         ("folded_hulls", 4001109),
+        ("special_poses", 5000475),  # of one part so few bits tell nothing at all
     ],
 )
 def test_where_segments_of_slices_end_in_a_root_volumes_are_proved(family, seed):
