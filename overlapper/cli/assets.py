@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
+from overlapper.cli.figures import plain_table, show
 from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Interrupted, input_refusals, quiet, say
 from overlapper.printable import printable
@@ -43,8 +40,7 @@ def audit_folder(folder: Path, units: str, least_depth: float, settings: Mapping
 
 
 def _show(assets: Sequence[Asset]) -> None:
-    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
-    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
+    table = plain_table()
     table.add_column("asset", overflow="fold")
     for header in ("", "bodies", "convex\nshapes", "closed", "their\nvolume", "overlap\nat rest"):
         table.add_column(header, justify="right" if header else "left", no_wrap=True)
@@ -53,7 +49,7 @@ def _show(assets: Sequence[Asset]) -> None:
         row += ["" if asset.excess is None else f"{asset.excess:+.1%}", str(len(asset.overlaps))]
         status = "sound" if asset.sound else "not read" if asset.failure else "not sound"
         table.add_row(Text(printable(asset.name)), status, *(row if not asset.failure else [""] * 5))
-    console.print(table)
+    show(table)
     for asset in assets:
         if asset.failure:
             say(f"{asset.name} is not read: {asset.failure}.")

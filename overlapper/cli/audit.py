@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from overlapper.cli.assets import audit_folder
 from overlapper.cli.engine import AddressOption, EngineOption, WorkersOption, engine_of, refuse_address
-from overlapper.cli.figures import VOLUME_UNITS, volume_unit
+from overlapper.cli.figures import VOLUME_UNITS, plain_table, show, volume_unit
 from overlapper.cli.options import (
     ConcaveOption,
     ExpectOption,
@@ -90,9 +87,6 @@ def audit(
 
     [bold]overlapper audit assets --units mm[/bold]  a folder of models and meshes
     """
-    from overlapper.scenes.table_file import must_be_a_table
-    from overlapper.whole_file import must_be_writable
-
     refuse_out_of_range(tolerance, concave_threshold, out)
     refuse_address(engine, address)
     pairs = expected_pairs(expect)
@@ -123,15 +117,10 @@ def audit(
             from overlapper.audit.table import facts, write_table
             from overlapper.audit.verdicts import audit as look
             from overlapper.scenes.allowed import must_name_some
+            from overlapper.scenes.outputs import can_be_written
             from overlapper.simulation.model_file import NotRead
 
-            if out:
-                must_be_a_table(out)
-            if html:
-                import overlapper.viewer.recording  # noqa: F401  # which says now what to install
-            for path in filter(None, (out, html, srdf)):
-                path.parent.mkdir(parents=True, exist_ok=True)
-                must_be_writable(path)
+            can_be_written(out, html, srdf)
             disabled = read_srdf(against) if against else {}
             try:
                 read = read_robot(robot, concave=concave, concave_threshold=concave_threshold, surface=surface)
@@ -176,10 +165,9 @@ def audit(
 def _show(found: Audit, wrong: list[str], written: list[Path]) -> None:
     from overlapper.audit.findings import remarks
 
-    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
     met = [each for each in found.verdicts if each.met and not each.pair.adjacent]
     if met:
-        console.print(_list(found, sorted(met, key=lambda each: (-_often(each), each.names))))
+        show(_list(found, sorted(met, key=lambda each: (-_often(each), each.names))))
     counts = {status: len(found.of_status(status)) for status in ("never", "sometimes", "always")}
     adjacent = len(found.verdicts) - sum(counts.values())
     words = [f"{adjacent:,} {'are' if adjacent != 1 else 'is'} adjacent"]
@@ -203,14 +191,9 @@ def _list(found: Audit, met: list[Verdict]) -> Table:
     """The pairs that overlap most often, two lines each."""
     unit = volume_unit(max(each.largest.contact.volume for each in met if each.largest))
     left_out = f" The {LISTED} of {len(met):,} pairs that overlap most often." if len(met) > LISTED else ""
-    table = Table(
+    table = plain_table(
         title="Links that overlap and are not adjacent",
         caption=CAPTION + left_out,
-        caption_justify="left",
-        box=SIMPLE_HEAD,
-        show_edge=False,
-        pad_edge=False,
-        collapse_padding=True,
     )
     table.add_column("pair of links", overflow="fold")
     for header in ("", "fraction\n%", "95 %\n%", f"volume\n{unit}", "depth\nmm"):

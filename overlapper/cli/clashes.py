@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from overlapper.cli.figures import ROUNDED_UP, VOLUME_UNITS, volume_unit
+from overlapper.cli.figures import ROUNDED_UP, VOLUME_UNITS, plain_table, show, volume_unit
 from overlapper.cli.options import (
     ExpectOption,
     HtmlOption,
@@ -70,9 +68,6 @@ def clashes(
 
     [bold]overlapper clashes gearbox.step --expect "bolt*,plate" --least-depth 1e-5[/bold]  what CI asks of an assembly
     """
-    from overlapper.scenes.table_file import must_be_a_table
-    from overlapper.whole_file import must_be_writable
-
     refuse_out_of_range(0.5, concave_threshold, out)
     pairs = expected_pairs(expect)
     settings: dict[str, Any] = {
@@ -86,14 +81,9 @@ def clashes(
     try:
         with input_refusals(), quiet():
             from overlapper.scenes import clashes as scene
+            from overlapper.scenes.outputs import can_be_written
 
-            if out:
-                must_be_a_table(out)
-            if html:
-                import overlapper.viewer.recording  # noqa: F401  # which says now what to install
-            for path in filter(None, (out, html)):
-                path.parent.mkdir(parents=True, exist_ok=True)
-                must_be_writable(path)
+            can_be_written(out, html)
             parts, failures = scene.read(sources, units)
             if len(parts) < 2:
                 for failure in failures:
@@ -156,14 +146,13 @@ def _facts(found: Clashes) -> dict[str, Any]:
 def _show(found: Clashes, written: list[Path]) -> None:
     from overlapper.scenes.clashes import Status
 
-    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
     count = len(found.bodies)
     if found.pairs:
         if count <= IN_MATRIX:
             say(f"Volumes in {volume_unit(found.pairs[0].volume)} above the diagonal, depths in mm below it:")
-            console.print(_matrix(found))
+            show(_matrix(found))
             say("")
-        console.print(_list(found))
+        show(_list(found))
         say(CAPTION + (f" The {LISTED} largest of {len(found.pairs):,} pairs." if len(found.pairs) > LISTED else ""))
     clashing, expected, shallow, touching = (len(found.of_status(status)) for status in get_args(Status))
     words = [f"{clashing or 'none'} {'clash' if clashing > 1 else 'clashes'}"]
@@ -179,7 +168,7 @@ def _show(found: Clashes, written: list[Path]) -> None:
 def _matrix(found: Clashes) -> Table:
     """Volumes above the diagonal, depths below it."""
     unit = volume_unit(found.pairs[0].volume)
-    table = _table()
+    table = plain_table()
     table.add_column("body", overflow="fold")
     for k in range(len(found.bodies)):
         table.add_column(str(k + 1), justify="right", no_wrap=True)
@@ -196,7 +185,7 @@ def _matrix(found: Clashes) -> Table:
 def _list(found: Clashes) -> Table:
     """The largest pairs, two lines each."""
     unit = volume_unit(found.pairs[0].volume)
-    table = _table("Pairs that overlap or touch")
+    table = plain_table("Pairs that overlap or touch")
     table.add_column("pair", overflow="fold")
     for header in ("", f"volume\n{unit}", f"±\n{unit}", "depth\nmm", "convex\nparts"):
         table.add_column(header, justify="right" if header else "left", no_wrap=True)
@@ -211,10 +200,6 @@ def _list(found: Clashes) -> Table:
             f"{parts_text(first)}\n{parts_text(second)}" if pair.parts is not None else "",
         )
     return table
-
-
-def _table(title: str | None = None) -> Table:
-    return Table(title=title, box=SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
 
 
 def _volume(pair: Clash, unit: str) -> str:

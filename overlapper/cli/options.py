@@ -10,6 +10,10 @@ import typer
 
 from overlapper.cli.refusals import Refused
 
+SceneArgument = Annotated[
+    str, typer.Argument(help="Name of a scene, or path of a scene file (.py).", show_default=False)
+]
+
 OutOption = Annotated[Path | None, typer.Option(help="Table of all pairs in all steps: .csv, .parquet, .sqlite.")]
 
 HtmlOption = Annotated[Path | None, typer.Option(help="Recording to look at in a browser, one file.")]
@@ -40,6 +44,11 @@ ConcaveOption = Annotated[
 
 ThresholdOption = Annotated[
     float, typer.Option(help="Concavity that may be left, from 0.01 (many parts) to 1 (the hull).")
+]
+
+PairsOption = Annotated[
+    Literal["simulated", "all"] | None,
+    typer.Option(help="Pairs that the simulator lets collide, or all of different bodies; by default PAIRS."),
 ]
 
 SetOption = Annotated[

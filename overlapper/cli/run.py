@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.console import Console
 
+from overlapper.cli.figures import show
 from overlapper.cli.options import (
     CheckOption,
     ConcaveOption,
     HtmlOption,
     MethodOption,
     OutOption,
+    PairsOption,
     PerOption,
+    SceneArgument,
     SetOption,
     SurfaceOption,
     ThresholdOption,
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 
 def run(
-    scene: Annotated[str, typer.Argument(help="Name of a scene, or path of a scene file (.py).", show_default=False)],
+    scene: SceneArgument,
     given: SetOption = None,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Steps to simulate; by default as many as the scene says.")
@@ -50,10 +51,7 @@ def run(
     concave: ConcaveOption = "decompose",
     concave_threshold: ThresholdOption = 0.05,
     surface: SurfaceOption = "nominal",
-    pairs: Annotated[
-        Literal["simulated", "all"] | None,
-        typer.Option(help="Pairs that the simulator lets collide, or all of different bodies; by default PAIRS."),
-    ] = None,
+    pairs: PairsOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
     """Simulate a scene and measure what its bodies have in common in every step.
@@ -143,10 +141,7 @@ def _measure(
 def _show(title: str, summary: Summary, finished: bool, written: Sequence[Path]) -> None:
     from overlapper.cli.summary import overlaps_table, remarks
 
-    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
-    console.print(
-        overlaps_table(summary, title=title) if summary.pairs else f"Nothing overlaps in {summary.steps} steps."
-    )
+    show(overlaps_table(summary, title=title) if summary.pairs else f"Nothing overlaps in {summary.steps} steps.")
     for line in remarks(summary):
         say(line)
     if not finished:

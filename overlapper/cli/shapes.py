@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from overlapper.cli.figures import plain_table, show
 from overlapper.cli.options import ConcaveOption, SurfaceOption, ThresholdOption
 from overlapper.cli.refusals import Refused, say
 from overlapper.printable import printable
@@ -54,9 +52,8 @@ def shapes(
     if as_json:
         print(json.dumps(found.as_dict()))
     else:
-        console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
         if found.links:
-            console.print(_table(found))
+            show(_table(found))
         for line in _remarks(found):
             say(line)
     raise typer.Exit(1 if found.skipped else 0)
@@ -64,14 +61,9 @@ def shapes(
 
 def _table(found: Inventory) -> Table:
     """The links that have shapes."""
-    table = Table(
+    table = plain_table(
         caption="Sizes in m. Volume: of each shape by itself, added up. Meets: how many other links in the file "
         "pybullet lets the link collide with.",
-        caption_justify="left",
-        box=SIMPLE_HEAD,
-        show_edge=False,
-        pad_edge=False,
-        collapse_padding=True,
     )
     table.add_column("link", overflow="fold")
     table.add_column("shapes", no_wrap=True)

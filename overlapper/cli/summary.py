@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from overlapper.cli.figures import ROUNDED_UP, VOLUME_UNITS, volume_unit
+from overlapper.cli.figures import ROUNDED_UP, VOLUME_UNITS, plain_table, volume_unit
 from overlapper.printable import printable
 from overlapper.scenes.summary import Summary
 from overlapper.simulation import Decomposed
@@ -22,16 +21,11 @@ def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
     unit = volume_unit(pairs[0].volume)
     left_out = f"\nThe {limit} largest of {len(pairs)} pairs." if len(pairs) > limit else ""
     name = escape(printable(title or summary.scene))
-    table = Table(
+    table = plain_table(
         title=f"Overlaps of {name} in {summary.steps} steps, {summary.seconds:.3g} s",
         caption="Volume: the largest in any step, true to within ±. Depth: the shortest way to part the two, or the "
         "deepest of their shapes, in the step where that is longest. Normal: that way, for the first of them."
         + left_out,
-        caption_justify="left",
-        box=SIMPLE_HEAD,
-        show_edge=False,
-        pad_edge=False,
-        collapse_padding=True,
     )
     # Two lines a pair and narrow numbers, so that a terminal of 80 columns holds the table.
     table.add_column("pair of links", overflow="fold")

@@ -6,7 +6,7 @@ import json
 import re
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -16,6 +16,8 @@ from overlapper.cli.engine import AddressOption, EngineOption, WorkersOption, en
 from overlapper.cli.options import (
     ConcaveOption,
     MethodOption,
+    PairsOption,
+    SceneArgument,
     SetOption,
     SurfaceOption,
     ThresholdOption,
@@ -38,7 +40,7 @@ MOVED_SHOWN = 10
 
 
 def sweep(
-    scene: Annotated[str, typer.Argument(help="Name of a scene, or path of a scene file (.py).", show_default=False)],
+    scene: SceneArgument,
     out: Annotated[
         Path, typer.Option(help="Folder of the sweep; what is there is not done again.", show_default=False)
     ],
@@ -90,10 +92,7 @@ def sweep(
     concave: ConcaveOption = "decompose",
     concave_threshold: ThresholdOption = 0.05,
     surface: SurfaceOption = "nominal",
-    pairs: Annotated[
-        Literal["simulated", "all"] | None,
-        typer.Option(help="Pairs that the simulator lets collide, or all of different bodies; by default PAIRS."),
-    ] = None,
+    pairs: PairsOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the text.")] = False,
 ) -> None:
     """Run a scene with many parameters, and keep what each run came to.

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
-from rich.console import Console
 
+from overlapper.cli.figures import show
 from overlapper.cli.options import (
     CheckOption,
     ConcaveOption,
@@ -89,7 +89,8 @@ def watch(
     }
     try:
         from overlapper.reference import Fcl
-        from overlapper.scenes.watching import Watches, can_be_written
+        from overlapper.scenes.outputs import can_be_written
+        from overlapper.scenes.watching import Watches
         from overlapper.simulation.windows import open_no_window, tell_of_windows
 
         if check:
@@ -136,13 +137,13 @@ def _run(script: Path, arguments: list[str], watches: Watches, how: How, as_json
 def _show(watches: Watches, interrupted: bool) -> None:
     from overlapper.cli.summary import overlaps_table, remarks
 
-    console = Console(stderr=True, width=None if sys.stderr.isatty() else 140, highlight=False)
     for watch in watches.all:
         summary = watch.summary
-        console.print(
+        show(
             overlaps_table(summary)
             if summary.pairs
             else f"Nothing overlaps in {summary.steps} steps of {summary.scene}.",
+            stderr=True,
             markup=False,
         )
         for line in remarks(summary):

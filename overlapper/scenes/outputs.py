@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -23,6 +24,20 @@ if TYPE_CHECKING:
 PICTURES_PER_SECOND = 30  # of simulated time: as smooth as a film, and a tenth of the size that every step would take
 
 Per = Literal["shape", "link"]
+
+
+def can_be_written(out: Path | None, html: Path | None, *others: Path | None) -> None:
+    """Now, not when much has been computed: ValueError, OSError or ImportError of a table, a page or a file that cannot
+    be."""
+    if out:
+        must_be_a_table(out)
+    if html:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of meshcat's imports, and no business of the user's
+            import overlapper.viewer.recording  # noqa: F401
+    for path in filter(None, (out, html, *others)):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        must_be_writable(path)
 
 
 class StepTable:

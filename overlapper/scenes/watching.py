@@ -13,14 +13,12 @@ from types import FrameType, TracebackType
 from typing import Any, Literal, TypedDict, get_args
 
 from overlapper.reference import Fcl
-from overlapper.scenes.outputs import Per, outputs
+from overlapper.scenes.outputs import Per, can_be_written, outputs
 from overlapper.scenes.run import Frame
 from overlapper.scenes.summary import Summary
-from overlapper.scenes.table_file import must_be_a_table
 from overlapper.simulation import Among, Bodies, Concave, Recorder, SelfCollisionWarning, SkippedShapeWarning, Surface
 from overlapper.simulation.calls import Arguments, listen, unlisten
 from overlapper.simulation.extraction.model import Settings
-from overlapper.whole_file import must_be_writable
 
 import pybullet  # isort: skip  # after the simulation, which says what to install
 
@@ -279,19 +277,6 @@ class _Kept(Watch):
             super().close()
         except Exception as error:
             self._failed.append((self, error))
-
-
-def can_be_written(out: Path | None, html: Path | None) -> None:
-    """Now, not when much has been simulated: ValueError, OSError or ImportError of a table or a page that cannot be."""
-    for path in filter(None, (out, html)):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        must_be_writable(path)
-    if out:
-        must_be_a_table(out)
-    if html:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # of meshcat's imports, and no business of the user's
-            import overlapper.viewer.recording  # noqa: F401
 
 
 @contextmanager
