@@ -57,9 +57,9 @@ class Compared:
     changes: list[Change]
 
     @property
-    def worst(self) -> float:
-        """The largest part of a budget by which it has moved; 0 if it has not."""
-        return max((change.part for change in self.changes), default=0.0)
+    def worst(self) -> Change:
+        """The change that takes most of its budget; there must be one."""
+        return max(self.changes, key=lambda change: change.part)
 
     def difference(self, measure: str) -> float:
         """How much more of a measure it is than recorded; not a number where the task failed."""
@@ -79,7 +79,7 @@ class Comparison:
     @property
     def moved(self) -> list[Compared]:
         """The tasks that have moved, the worst first."""
-        return sorted((task for task in self.tasks if task.changes), key=lambda task: -task.worst)
+        return sorted((task for task in self.tasks if task.changes), key=lambda task: -task.worst.part)
 
     @property
     def failures(self) -> set[str]:
@@ -97,7 +97,7 @@ class Comparison:
         by_measure = ", ".join(f"{name} in {count:,}" for name, count in self.counted().items())
         said = f"{len(moved):,} of {len(self.tasks):,} tasks have moved since {self.folder}: {by_measure}."
         lines = [said if moved else f"{len(self.tasks):,} of {len(self.tasks):,} tasks are as in {self.folder}."]
-        lines += [f"    {max(task.changes, key=lambda change: change.part)}" for task in moved[:limit]]
+        lines += [f"    {task.worst}" for task in moved[:limit]]
         if len(moved) > limit:
             lines.append(f"    and {len(moved) - limit:,} more")
         if self.added or self.gone:
@@ -164,7 +164,7 @@ def _measured(was: Row, now: Row, budgets: Mapping[str, Budget]) -> Iterator[tup
         yield measure, a, b, _part(budgets[quantity], off_by(a, b), a)
     # Forces that cancel leave the rounding of all the surface that they are of, which is not less than this.
     surface = float(was["largest_volume_m3"]) ** (2 / 3)
-    forces = _force(was), _force(now)
+    forces = mean_force(was), mean_force(now)
     a, b = (float(np.linalg.norm(force)) for force in forces)
     yield FORCE, a, b, _part(budgets["area"], float(np.linalg.norm(forces[1] - forces[0])), max(a, surface))
     # It is a number of steps, and times are sums: half of one is none.
@@ -178,7 +178,8 @@ def _part(budget: Budget, difference: float, recorded: float) -> float:
     return math.inf if math.isnan(part) else part
 
 
-def _force(row: Row) -> NDArray[np.float64]:
+def mean_force(row: Row) -> NDArray[np.float64]:
+    """(3,) m², of a task that is done; zeros of one in which nothing overlapped."""
     return np.array([row[f"mean_force_{axis}_m2"] or 0.0 for axis in "xyz"])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import math
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from itertools import combinations
@@ -17,7 +17,7 @@ import numpy as np
 from overlapper.scenes.outputs import recorder
 from overlapper.scenes.run import run
 from overlapper.sweep import charts
-from overlapper.sweep.comparison import Comparison
+from overlapper.sweep.comparison import Comparison, mean_force
 from overlapper.sweep.part import FAILURES, TASKS
 from overlapper.sweep.store import Store
 from overlapper.sweep.sweep import Sweep
@@ -45,19 +45,17 @@ def write(
     store: Store,
     scene: str,
     pages: int = 0,
-    heard: Callable[[int], object] = lambda number: None,
     comparison: Comparison | None = None,
 ) -> Path:
     """Write the summary of the tasks of a sweep that are done, of which there is one; returns where.
 
-    `scene` is the name or path that commands give to it. Of the `pages` worst tasks the pages are written, too, and
-    `heard` is told of each. With a `comparison`, it shows what has moved.
+    `scene` is the name or path that commands give to it. Of the `pages` worst tasks the pages are written, too. With a
+    `comparison`, it shows what has moved.
     """
     rows = [row for row in store.rows(TASKS) if row["task"] in sweep.tasks]
     worst = sorted(rows, key=lambda row: (-row["largest_volume_m3"], row["task"]))[: max(WORST, pages)]
-    for number, row in enumerate(worst[:pages], 1):
+    for row in worst[:pages]:
         _show(sweep, row, store.folder / _view(row))
-        heard(number)
     place = store.folder / "summary.html"
     texts = {
         "title": html.escape(f"Sweep of {sweep.study.scene}"),
@@ -148,7 +146,7 @@ def _moved(sweep: Sweep, comparison: Comparison) -> Iterable[str]:
     heading = [*varied, "measure", "recorded", "now", "times its budget"]
     lines = ["<tr>" + "".join(f"<th>{html.escape(name)}</th>" for name in heading) + "</tr>"]
     for task in comparison.moved[:WORST]:
-        worst = max(task.changes, key=lambda change: change.part)
+        worst = task.worst
         part = f"{worst.part:.3g}" if math.isfinite(worst.part) else ""
         cells = [*(_figure(task.found[name]) for name in varied), worst.measure, worst.recorded, worst.found, part]
         lines.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
@@ -205,7 +203,7 @@ def _charts(sweep: Sweep, rows: Sequence[Row]) -> Iterable[str]:
 
 def _measured(row: Row, column: str) -> float:
     if column == "mean_force_m2":
-        return float(np.linalg.norm([row[f"mean_force_{axis}_m2"] or 0.0 for axis in "xyz"]))
+        return float(np.linalg.norm(mean_force(row)))
     return float(row[column])
 
 
