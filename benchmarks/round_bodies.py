@@ -62,7 +62,7 @@ MEDIAN, TAIL, BATCH, WITH_MARGIN = 10, 40, 1.5, 3
 
 MEASURES = (
     "volume", "volume_error", "centroid", "area", "normal", "depth", "gradient", "patch_area", "patch_centre",
-    "patch_moments",
+    "patch_moments", "patch_distance",
 )  # fmt: skip
 COLUMNS = ("part", "name", "figure", "value")
 

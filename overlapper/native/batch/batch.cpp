@@ -152,11 +152,13 @@ const Overlaps::Patches& Overlaps::patches() const {
     Patches found;
     found.centre.reserve(size());
     found.moments.reserve(size());
+    found.distance.reserve(size());
     for (size_t row = 0; row < size(); ++row) {
       const bool any = status[row] == static_cast<std::int8_t>(Status::kOverlapping);
       const Patch patch = any ? overlap(row)->patch() : PatchSums({}, {}).patch();
       found.centre.push_back(patch.centre);
       found.moments.push_back(patch.moments);
+      found.distance.push_back(patch.distance);
     }
     return found;
   });

@@ -51,6 +51,7 @@ struct Overlaps {
   struct Patches {
     std::vector<Vec3> centre;
     std::vector<Mat3> moments;
+    std::vector<double> distance;
   };
 
   size_t size() const { return pairs.size(); }

@@ -244,6 +244,14 @@ void check_boundary(const Boundary& boundary, int bodies, Method method) {
   }
 }
 
+void check_patch(const Patch& patch) {
+  require(finite(patch.area), "the area of the patch is finite");
+  for (Vec3 row : {patch.moments.row0, patch.moments.row1, patch.moments.row2})
+    require(finite(row), "the moments of the patch are finite");
+  require(std::isnan(patch.distance) ? std::isnan(patch.centre.x) : finite(patch.centre) && sound(patch.distance),
+          "where there is a patch, it has a centre and a distance");
+}
+
 void check_contact(const Overlap& overlap) {
   const Contact& c = overlap.contact();
   const Placed &a = overlap.bodies()[0], &b = overlap.bodies()[1];
@@ -296,6 +304,7 @@ void check(const Overlap& overlap) {
     check_boundary(overlap.boundary(), static_cast<int>(overlap.bodies().size()), overlap.method());
   }
   if (overlap.pair()) check_contact(overlap);
+  if (overlap.pair() && any_bounded(overlap.bodies())) check_patch(overlap.patch());
 }
 
 void check_order(const Overlap& overlap) {

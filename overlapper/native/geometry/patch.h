@@ -1,8 +1,5 @@
 #pragma once
 
-#include <cmath>
-#include <limits>
-
 #include "geometry/vec.h"
 
 namespace overlapper {
@@ -13,18 +10,24 @@ struct Patch {
   Vec3 area;    ///< m²: the area vector of the second body's part of the surface, so that it points to the first
   Vec3 centre;  ///< of that area, in the plane through the centroid of the volume; not a number without an area
   Mat3 moments{{}, {}, {}};  ///< m⁴: ∫ x xᵀ dA about the centre
+  double distance = 0;       ///< m: the mean of its points from the centroid; not a number without an area
 };
 
 /// The same in other coordinates.
 inline Patch turned(const Patch& patch, const Mat3& rotation, Vec3 translation) {
-  return {rotation * patch.area, rotation * patch.centre + translation,
-          rotation * patch.moments * transposed(rotation)};
+  return {rotation * patch.area, rotation * patch.centre + translation, rotation * patch.moments * transposed(rotation),
+          patch.distance};
 }
 
-/// The plane that a patch is seen in, with integrals over it of 1, u, v, u², uv and v², right-handed coordinates there.
+/// ∫ |x| dA over the triangle from the origin to the edge from (a, b) to (c, d), negative where that goes clockwise.
+double distance_over_edge(double a, double b, double c, double d);
+
+/// The plane that a patch is seen in, with integrals over it of 1, u, v, u², uv and v², right-handed coordinates there
+/// about the centroid. Where edges alone bound the patch, that of the distance from there is summed, too; parts of
+/// either body's surface differ, so that a patch of parts counts as an ellipse, which is the same for both.
 class PatchSums {
  public:
-  PatchSums(Vec3 origin, Vec3 area) : origin_(origin), area_(area), size_(norm(area)) {
+  PatchSums(Vec3 centroid, Vec3 area) : origin_(centroid), area_(area), size_(norm(area)) {
     normal_ = size_ > 0 ? area / size_ : Vec3{0, 0, 1};
     u_ = any_orthogonal(normal_);
     v_ = cross(normal_, u_);
@@ -37,15 +40,17 @@ class PatchSums {
 
   /// Integrals over a part, or over all that is on the left of a line.
   void add(double one, double u, double v, double uu, double uv, double vv) {
-    one_ += one, u1_ += u, v1_ += v, uu_ += uu, uv_ += uv, vv_ += vv;
+    sum(one, u, v, uu, uv, vv);
+    edges_alone_ = false;
   }
 
   /// Along an edge of the border, counter-clockwise seen against the normal (Green).
   void add_edge(Vec3 from, Vec3 to) {
     const double a = dot(from - origin_, u_), b = dot(from - origin_, v_);
     const double c = dot(to - origin_, u_), d = dot(to - origin_, v_), twice = a * d - b * c;
-    add(twice / 2, twice / 6 * (a + c), twice / 6 * (b + d), twice / 12 * (a * a + a * c + c * c),
+    sum(twice / 2, twice / 6 * (a + c), twice / 6 * (b + d), twice / 12 * (a * a + a * c + c * c),
         twice / 24 * (a * d + 2 * a * b + 2 * c * d + c * b), twice / 12 * (b * b + b * d + d * d));
+    distance_ += distance_over_edge(a, b, c, d);
   }
 
   /// A triangle of which that is the area vector.
@@ -61,24 +66,18 @@ class PatchSums {
     add(w, w / 3 * su, w / 3 * sv, second(au, au, su * su), second(au, av, su * sv), second(av, av, sv * sv));
   }
 
-  Patch patch() const {
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-    Patch result{area_, {kNone, kNone, kNone}};
-    // What is nothing but rounding is another area each time that it is summed.
-    if (!(size_ > 0 && one_ > size_ / 2 && one_ < 2 * size_)) return result;
-    const double u = u1_ / one_, v = v1_ / one_;
-    result.centre = origin_ + (u * u_ + v * v_);
-    const double uu = uu_ - u * u1_, uv = uv_ - u * v1_, vv = vv_ - v * v1_;
-    const Vec3 along_u = uu * u_ + uv * v_, along_v = uv * u_ + vv * v_;
-    result.moments = {u_.x * along_u + v_.x * along_v, u_.y * along_u + v_.y * along_v,
-                      u_.z * along_u + v_.z * along_v};
-    return result;
-  }
+  Patch patch() const;
 
  private:
+  void sum(double one, double u, double v, double uu, double uv, double vv) {
+    one_ += one, u1_ += u, v1_ += v, uu_ += uu, uv_ += uv, vv_ += vv;
+  }
+
   Vec3 origin_, area_, normal_, u_, v_;
   double size_;
   double one_ = 0, u1_ = 0, v1_ = 0, uu_ = 0, uv_ = 0, vv_ = 0;
+  double distance_ = 0;  ///< of what edges border
+  bool edges_alone_ = true;
 };
 
 }  // namespace overlapper

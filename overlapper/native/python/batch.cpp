@@ -158,6 +158,10 @@ void define_columns(nb::class_<Overlaps>& cls) {
 take some microseconds a pair when one of them is first asked for.)");
   patch_column(cls, "patch_moments", &Overlaps::Patches::moments, {3, 3},
                "(p, 3, 3) m⁴, ∫ x xᵀ dA of that area about its centre; zeros without an area.");
+  patch_column(
+      cls, "patch_distance", &Overlaps::Patches::distance, {},
+      R"((p,) m, how far points of that area are on the average from the centroid, seen along the area vector; not a number
+without an area.)");
   column<int>(cls, "facets_touched", &Overlaps::facets_touched, {}, "int32",
               "(p,) how many planes of the shapes took part in building the polytope.");
   column<bool>(cls, "widened", &Overlaps::widened, {}, "bool_",

@@ -302,15 +302,15 @@ void define_boundary(nb::class_<Overlap>& cls) {
       nb::sig("def patch(self) -> list[numpy.typing.NDArray[numpy.float64]]"),
       R"(Closed polygons (k, 3) along the ridges where the owner changes, the first point not repeated. For a pair they go
 counter-clockwise around a's part of the surface; for more bodies, around the part of each.)");
+  const auto has_area = [](const Overlap& o) { return !std::isnan(computed(o, &Overlap::patch).distance); };
   patch_property(
       cls, "patch_area", [](const Overlap&) { return true; }, [](const Patch& p) { return to_numpy(p.area); },
       nb::sig("def patch_area(self) -> numpy.typing.NDArray[numpy.float64] | None"),
       R"((3,) m², the area vector of b's part of the surface, which points to a as `normal` does: its length is the area within
 `patch`, seen along it, and for small overlaps what the volume grows by per metre of depth. The same as gradient[1, :3],
-and opposite to gradient[0, :3]; zeros unless overlapping. None for three or more bodies, as are the next two.)");
+and opposite to gradient[0, :3]; zeros unless overlapping. None for three or more bodies, as are the next three.)");
   patch_property(
-      cls, "patch_centre", [](const Overlap& o) { return !std::isnan(computed(o, &Overlap::patch).centre.x); },
-      [](const Patch& p) { return to_numpy(p.centre); },
+      cls, "patch_centre", has_area, [](const Patch& p) { return to_numpy(p.centre); },
       nb::sig("def patch_centre(self) -> numpy.typing.NDArray[numpy.float64] | None"),
       R"((3,) m, the centre of that area, in the plane through the centroid of the volume. None, too, without an area: unless
 the bodies overlap, and of a body inside the other.)");
@@ -320,6 +320,14 @@ the bodies overlap, and of a body inside the other.)");
       R"((3, 3) m⁴, ∫ x xᵀ dA of that area about its centre, world axes; nothing along the area vector. Its eigenvectors and the
 roots of its eigenvalues over the area are the axes of the patch and its radii of gyration. Where formulas or slices
 measure round bodies it is that of the round patch, not of polygons.)");
+  patch_property(
+      cls, "patch_distance", has_area, [](const Patch& p) { return p.distance; },
+      nb::sig("def patch_distance(self) -> float | None"),
+      R"(m, how far the points of that area are on the average from the centroid of the volume, in the plane through it:
+with friction mu and a normal force N, the torque that resists spinning is at most mu * N * patch_distance. Exact of
+polyhedra, discs and ellipses. Where formulas or slices measure round bodies, other patches count as the ellipse that
+has the same centre and moments: of a long rectangle that is 2 % less than the truth, of a stadium or a half disc within
+1 %, of a triangle 2 % more, and of a thin ring 6 % less. None without an area, as the centre.)");
   cls.def_prop_ro(
       "bounds",
       [](const Overlap& o) -> nb::object {

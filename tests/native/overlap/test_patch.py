@@ -1,10 +1,11 @@
-"""What is said of the patch that two bodies share a border along: its area vector, centre and second moments."""
+"""What is said of the patch that two bodies share a border along: its area vector, centre, second moments and mean
+distance from the centroid."""
 
 import exact
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import directions, overlapping_points, quaternion
+from strategies import directions, overlapping_points, quaternion, rotation
 
 from overlapper import Batch, Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
@@ -68,14 +69,16 @@ def test_the_patch_is_that_of_the_exact_polytope():
         if answer.patch_centre is None:
             assert len({facet.owners for facet in truth.facets}) == 1
             continue
-        area, centre, moments = truth_of_patch(truth)
+        area, centre, moments, distance = truth_of_patch(truth)
         assert_allclose(answer.patch_area, area, atol=1e-12)
         assert_allclose(answer.patch_centre, centre, atol=1e-12)
         assert_allclose(answer.patch_moments, moments, atol=1e-12)
+        assert answer.patch_distance == pytest.approx(max(distance, 0), rel=1e-3)
 
 
 def truth_of_patch(truth):
-    """By triangles of the second body's facets, seen along their area vector, about the centroid."""
+    """By triangles of the second body's facets, seen along their area vector, about the centroid; the mean distance by
+    points in the middle of 10,000 parts of each."""
     about = np.array(truth.centroid, float)
     triangles, areas = [], []
     for facet in truth.facets:
@@ -93,7 +96,76 @@ def truth_of_patch(truth):
     weights, sums = areas @ normal, seen.sum(axis=1)
     centre = (weights / 3) @ sums / weights.sum()
     second = np.einsum("t,tki,tkj->ij", weights / 12, seen, seen) + np.einsum("t,ti,tj->ij", weights / 12, sums, sums)
-    return area, about + centre, second - weights.sum() * np.outer(centre, centre)
+    far = np.linalg.norm(parts_of_triangle(100) @ seen, axis=2).mean(axis=1) @ weights / weights.sum()
+    return area, about + centre, second - weights.sum() * np.outer(centre, centre), far
+
+
+def parts_of_triangle(count):
+    """The middles of count² triangles that are alike, as weights of the corners."""
+    i, j = np.divmod(np.arange(count**2), count)
+    turned = i + j >= count
+    i, j = np.where(turned, count - 1 - i, i) + (1 + turned) / 3, np.where(turned, count - 1 - j, j) + (1 + turned) / 3
+    return np.stack([i, j, count - i - j], axis=1) / count
+
+
+SQUARE = (np.sqrt(2) + np.arcsinh(1)) / 6  # of side 1: the mean distance from the middle
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "distance"),
+    [
+        (Placed(CUBE, (1, 2, 0.4)), FLOOR, SQUARE),
+        (Placed(CUBE, (1, 2, 0.5 - 1e-9)), FLOOR, SQUARE),
+        (Placed(CUBE, (0.6, 0, 0)), Box([0.5, 2, 1]), SQUARE),
+        (Placed(Sphere(0.5), (1, 2, 0.4)), FLOOR, 0.2),
+        (Placed(Sphere(0.5), (0.6, 0, 0)), Sphere(0.5), 0.8 / 3),
+        (Placed(Cylinder(0.5, 2), (1, 2, 0.9)), FLOOR, 1 / 3),
+        (Placed(Ellipsoid([0.5, 0.5, 0.2]), (1, 2, 0.16)), FLOOR, 0.2),
+    ],
+)
+def test_mean_distances_of_squares_and_discs_have_all_digits(a, b, distance):
+    assert overlap(a, b).patch_distance == pytest.approx(distance, rel=1e-7 if a.position[2] > 0.49 else 1e-13)
+
+
+def beyond_box(half_extents):
+    return lambda x: np.linalg.norm(np.maximum(np.abs(x) - half_extents, 0), axis=1)
+
+
+def beyond_axis(length):
+    return lambda x: np.linalg.norm(x - [0, 0, 1] * np.clip(x[:, 2:], -length / 2, length / 2), axis=1)
+
+
+ON_FLOOR = {  # what a point must be to be inside, and how far from the truth the mean distance may be
+    "ball": (Sphere(0.5), lambda x: np.linalg.norm(x, axis=1) <= 0.5, 1e-3),
+    "ellipsoid": (Ellipsoid([0.3, 0.2, 0.6]), lambda x: np.linalg.norm(x / [0.3, 0.2, 0.6], axis=1) <= 1, 1e-3),
+    "box": (Box([0.5, 0.2, 0.3]), lambda x: beyond_box([0.5, 0.2, 0.3])(x) == 0, 1e-3),
+    "long box": (Box([0.8, 0.05, 0.3]), lambda x: beyond_box([0.8, 0.05, 0.3])(x) == 0, 3e-3),
+    "capsule": (Capsule(0.3, 0.8), lambda x: beyond_axis(0.8)(x) <= 0.3, 0.02),
+    "cylinder": (
+        Cylinder(0.3, 0.9), lambda x: (np.hypot(x[:, 0], x[:, 1]) <= 0.3) & (np.abs(x[:, 2]) <= 0.45), 0.025
+    ),
+    "box with margin": (
+        RoundedHull(np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * [0.5, 0.2, 0.3], 0.02),
+        lambda x: beyond_box([0.5, 0.2, 0.3])(x) <= 0.02, 0.04,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("body", ON_FLOOR)
+def test_mean_distances_are_those_of_points_of_the_floor_inside_the_body(body):
+    """Tilted, so that the centroid is not over the centre; flat, and on a side, too."""
+    shape, inside, off = ON_FLOOR[body]
+    rng = np.random.default_rng(len(body))
+    for turned in ((0, 0, 0, 1), TO_X, *(quaternion(rng) for _ in range(4))):
+        reach = overlap(Placed(shape, (0, 0, 0), turned), FLOOR).depth
+        for sunk in (0.1, 0.6):
+            height = reach * (1 - sunk)
+            answer = overlap(Placed(shape, (1, 2, height), turned), FLOOR)
+            centroid = answer.centroid[:2] - [1, 2]
+            grid = np.stack(np.meshgrid(*2 * [(np.arange(1000) + 0.5) / 500 - 1], [-height]), axis=-1).reshape(-1, 3)
+            points = grid[inside(grid @ rotation(turned))][:, :2]
+            truth = np.linalg.norm(points - centroid, axis=1).mean()
+            assert answer.patch_distance == pytest.approx(truth, rel=off)
 
 
 def second_moments(answer, about):
@@ -138,9 +210,11 @@ def test_the_patch_turns_with_the_bodies_and_knows_no_order(first, second):
     assert_allclose(swapped.patch_area, -answer.patch_area, atol=1e-12)
     assert_allclose(swapped.patch_centre, answer.patch_centre, atol=1e-12)
     assert_allclose(swapped.patch_moments, answer.patch_moments, atol=1e-12)
+    assert swapped.patch_distance == pytest.approx(answer.patch_distance, abs=1e-12)
     far = Placed(a.shape, np.add(a.position, 64), a.orientation), Placed(b.shape, (64, 64, 64), b.orientation)
     assert_allclose(overlap(*far).patch_moments, answer.patch_moments, atol=1e-11)
     assert_allclose(overlap(*far).patch_centre - 64, answer.patch_centre, atol=1e-11)
+    assert overlap(*far).patch_distance == pytest.approx(answer.patch_distance, abs=1e-11)
 
 
 def test_a_round_body_inside_another_has_no_patch_but_rounding():
@@ -157,17 +231,17 @@ def test_a_round_body_inside_another_has_no_patch_but_rounding():
                 )
                 assert found.volume == pytest.approx(a.volume, rel=1e-12)
                 assert_array_equal(found.patch_area, np.zeros(3))
-                assert found.patch_centre is None
+                assert found.patch_centre is found.patch_distance is None
 
 
 def test_where_there_is_no_patch():
     apart, inside = overlap(CUBE, Placed(CUBE, (3, 0, 0))), overlap(Placed(Sphere(0.1), (0.1, 0, 0)), CUBE)
     for answer in (apart, inside):
         assert_array_equal(answer.patch_area, np.zeros(3))
-        assert answer.patch_centre is None
+        assert answer.patch_centre is answer.patch_distance is None
         assert_array_equal(answer.patch_moments, np.zeros((3, 3)))
     three = overlap(CUBE, CUBE, Sphere(0.2))
-    assert three.patch_area is three.patch_centre is three.patch_moments is None
+    assert three.patch_area is three.patch_centre is three.patch_moments is three.patch_distance is None
 
 
 def test_patches_of_a_batch_are_those_of_its_pairs():
@@ -176,20 +250,24 @@ def test_patches_of_a_batch_are_those_of_its_pairs():
     positions = rng.uniform(-0.3, 0.3, (len(shapes), 3))
     found = Batch(shapes).overlaps(positions, np.array([quaternion(rng) for _ in shapes]), separated=True)
     assert found.patch_area.shape == found.patch_centre.shape == (len(found), 3)
-    for row, area, centre, moments in zip(found, found.patch_area, found.patch_centre, found.patch_moments):
+    columns = found.patch_area, found.patch_centre, found.patch_moments, found.patch_distance
+    for row, area, centre, moments, distance in zip(found, *columns):
         assert_array_equal(area, row.patch_area)
         assert_array_equal(centre, np.full(3, np.nan) if row.patch_centre is None else row.patch_centre)
         assert_array_equal(moments, row.patch_moments)
+        assert_array_equal(distance, np.nan if row.patch_distance is None else row.patch_distance)
     few = found[found.volume > np.median(found.volume)]
     assert_array_equal(few.patch_moments, found.patch_moments[found.volume > np.median(found.volume)])
     nothing = found[:0]
     assert (nothing.patch_area.shape, nothing.patch_moments.shape) == ((0, 3), (0, 3, 3))
+    assert nothing.patch_distance.shape == (0,)
 
 
 def test_the_patch_of_the_articles_method_is_that_of_its_polytope():
     a, b = Placed(CUBE, (0.1, 0.2, 0.8), rotation_of(3)), Placed(CUBE, (0, 0, 0), rotation_of(4))
     paper, auto = overlap(a, b, method="paper"), overlap(a, b)
     assert_allclose(paper.patch_moments, auto.patch_moments, atol=1e-9)
+    assert paper.patch_distance == pytest.approx(auto.patch_distance, abs=1e-9)
 
 
 def rotation_of(seed):

@@ -600,7 +600,7 @@ class Overlap:
         """
         (3,) m², the area vector of b's part of the surface, which points to a as `normal` does: its length is the area within
         `patch`, seen along it, and for small overlaps what the volume grows by per metre of depth. The same as gradient[1, :3],
-        and opposite to gradient[0, :3]; zeros unless overlapping. None for three or more bodies, as are the next two.
+        and opposite to gradient[0, :3]; zeros unless overlapping. None for three or more bodies, as are the next three.
         """
 
     @property
@@ -616,6 +616,16 @@ class Overlap:
         (3, 3) m⁴, ∫ x xᵀ dA of that area about its centre, world axes; nothing along the area vector. Its eigenvectors and the
         roots of its eigenvalues over the area are the axes of the patch and its radii of gyration. Where formulas or slices
         measure round bodies it is that of the round patch, not of polygons.
+        """
+
+    @property
+    def patch_distance(self) -> float | None:
+        """
+        m, how far the points of that area are on the average from the centroid of the volume, in the plane through it:
+        with friction mu and a normal force N, the torque that resists spinning is at most mu * N * patch_distance. Exact of
+        polyhedra, discs and ellipses. Where formulas or slices measure round bodies, other patches count as the ellipse that
+        has the same centre and moments: of a long rectangle that is 2 % less than the truth, of a stadium or a half disc within
+        1 %, of a triangle 2 % more, and of a thin ring 6 % less. None without an area, as the centre.
         """
 
     @property
@@ -792,6 +802,13 @@ class Overlaps:
     def patch_moments(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (p, 3, 3) m⁴, ∫ x xᵀ dA of that area about its centre; zeros without an area.
+        """
+
+    @property
+    def patch_distance(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (p,) m, how far points of that area are on the average from the centroid, seen along the area vector; not a number
+        without an area.
         """
 
     @property

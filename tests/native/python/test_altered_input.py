@@ -98,7 +98,8 @@ def some_overlaps(**options):
 def test_pickled_overlaps_are_the_same_to_the_last_bit(options):
     found = some_overlaps(tolerance=0.01, **options)
     again = pickle.loads(pickle.dumps(found))
-    for name in ("pairs", "status", "way", "volume", "volume_error", "centroid", "normal", "gradient", "patch_moments"):
+    columns = ("pairs", "status", "way", "volume", "volume_error", "centroid", "normal", "gradient")
+    for name in (*columns, "patch_centre", "patch_moments", "patch_distance"):
         assert getattr(again, name).tobytes() == getattr(found, name).tobytes()
     for name in ("examined", "planes_asked", "tolerance", "method"):
         assert getattr(again, name) == getattr(found, name)
