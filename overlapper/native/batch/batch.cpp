@@ -12,6 +12,7 @@
 #include "distance/box_axes.h"
 #include "distance/gjk.h"
 #include "geometry/rounding.h"
+#include "methods/clipping/clip.h"
 #include "shapes/planes_asked.h"
 
 namespace overlapper {
@@ -137,14 +138,14 @@ void Overlaps::reserve(size_t rows) {
   source.reserve(rows);
 }
 
+Placed Overlaps::placed(int body) const {
+  const PoseNumbers& p = (*poses)[body];
+  return make_placed((*shapes)[body], {p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]});
+}
+
 std::shared_ptr<Overlap> Overlaps::overlap(size_t row) const {
   if (auto known = source[row].lock()) return known;
-  std::vector<Placed> bodies;
-  for (int i : pairs[row]) {
-    const PoseNumbers& p = (*poses)[i];
-    bodies.push_back(make_placed((*shapes)[i], {p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}));
-  }
-  return std::make_shared<Overlap>(std::move(bodies), tolerance, method);
+  return std::make_shared<Overlap>(placed(pairs[row][0]), placed(pairs[row][1]), tolerance, method);
 }
 
 const Overlaps::Patches& Overlaps::patches() const {
@@ -153,9 +154,16 @@ const Overlaps::Patches& Overlaps::patches() const {
     found.centre.reserve(size());
     found.moments.reserve(size());
     found.distance.reserve(size());
+    // What Overlap::patch() says, without an Overlap where it takes the same way.
+    const auto patch_of_row = [&](size_t row) {
+      if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) return PatchSums({}, {}).patch();
+      const Way by = static_cast<Way>(way[row]);
+      if (by == Way::kClipping || by == Way::kWideClipping)
+        if (const auto clipped = clipped_patch(placed(pairs[row][0]), placed(pairs[row][1]))) return *clipped;
+      return overlap(row)->patch();
+    };
     for (size_t row = 0; row < size(); ++row) {
-      const bool any = status[row] == static_cast<std::int8_t>(Status::kOverlapping);
-      const Patch patch = any ? overlap(row)->patch() : PatchSums({}, {}).patch();
+      const Patch patch = patch_of_row(row);
       found.centre.push_back(patch.centre);
       found.moments.push_back(patch.moments);
       found.distance.push_back(patch.distance);

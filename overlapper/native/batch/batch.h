@@ -64,6 +64,8 @@ struct Overlaps {
   const Patches& patches() const;
 
  private:
+  Placed placed(int body) const;
+
   std::shared_ptr<Once<Patches>> patches_ = std::make_shared<Once<Patches>>();
 };
 

@@ -154,8 +154,8 @@ void define_columns(nb::class_<Overlaps>& cls) {
       "(p, 3) m², the area vector of the patch, from b to a; zeros unless overlapping.");
   patch_column(
       cls, "patch_centre", &Overlaps::Patches::centre, {3},
-      R"((p, 3) m, the centre of that area in the plane through the centroid; not a number without an area. It and the moments
-take some microseconds a pair when one of them is first asked for.)");
+      R"((p, 3) m, the centre of that area in the plane through the centroid; not a number without an area. It, the
+moments and the distance take some microseconds a pair when one of them is first asked for.)");
   patch_column(cls, "patch_moments", &Overlaps::Patches::moments, {3, 3},
                "(p, 3, 3) m⁴, ∫ x xᵀ dA of that area about its centre; zeros without an area.");
   patch_column(

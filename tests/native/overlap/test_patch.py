@@ -1,6 +1,8 @@
 """What is said of the patch that two bodies share a border along: its area vector, centre, second moments and mean
 distance from the centroid."""
 
+import operator
+
 import exact
 import numpy as np
 import pytest
@@ -261,6 +263,38 @@ def test_patches_of_a_batch_are_those_of_its_pairs():
     nothing = found[:0]
     assert (nothing.patch_area.shape, nothing.patch_moments.shape) == ((0, 3), (0, 3, 3))
     assert nothing.patch_distance.shape == (0,)
+
+
+def test_patches_of_a_batch_have_the_bits_of_single_answers_whatever_way_they_came():
+    """Of rows that their batch remembers, of rows of a batch that is gone, and of few of them."""
+    rng = np.random.default_rng(3)
+    shapes, pairs = [FLOOR], []
+    bodies = [(make, depth) for make in SHAPES for depth in (0.3, 1e-2, 1e-5)]
+    positions, orientations = [np.zeros(3)], [np.array([0, 0, 0, 1.0])]
+    for make, depth in bodies:
+        for other in (FLOOR, CUBE):
+            turned, at = quaternion(rng), (0, 0, 0.4)
+            reach = overlap(Placed(SHAPES[make], at, turned), Placed(other))
+            position = at + max(0, reach.depth - depth) * reach.normal
+            for shape, where, how in ((SHAPES[make], position, turned), (other, np.zeros(3), (0, 0, 0, 1))):
+                shapes.append(shape), positions.append(where), orientations.append(how)
+            pairs.append((len(shapes) - 2, len(shapes) - 1))
+    batch = Batch(shapes)
+    found = batch.overlaps(positions, orientations, pairs)
+    assert {"clipping", "wide clipping", "closed form", "slicing"} <= {found.WAYS[way] for way in found.way}
+    remembered = [column(found) for column in COLUMNS]
+    again = batch.overlaps(positions, orientations, pairs)
+    del batch
+    for kept, column in zip(remembered, COLUMNS):
+        assert_array_equal(kept, column(Batch(shapes).overlaps(positions, orientations, pairs)))
+        assert_array_equal(kept[::7], column(again[::7]))
+    for k, (i, j) in enumerate(pairs):
+        single = overlap(*(Placed(shapes[n], positions[n], orientations[n]) for n in (i, j)))
+        for kept, column in zip(remembered, COLUMNS):
+            assert_array_equal(kept[k], column(single))
+
+
+COLUMNS = [operator.attrgetter(name) for name in ("patch_area", "patch_centre", "patch_moments", "patch_distance")]
 
 
 def test_the_patch_of_the_articles_method_is_that_of_its_polytope():

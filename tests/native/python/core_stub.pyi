@@ -794,8 +794,8 @@ class Overlaps:
     @property
     def patch_centre(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (p, 3) m, the centre of that area in the plane through the centroid; not a number without an area. It and the moments
-        take some microseconds a pair when one of them is first asked for.
+        (p, 3) m, the centre of that area in the plane through the centroid; not a number without an area. It, the
+        moments and the distance take some microseconds a pair when one of them is first asked for.
         """
 
     @property
