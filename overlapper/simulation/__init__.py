@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from overlapper.simulation.bodies import Bodies, SelfCollisionWarning, SkippedShapeWarning
     from overlapper.simulation.contacts import Contact, Contacts
     from overlapper.simulation.extraction.model import Concave, Decomposed, Skipped, Surface
+    from overlapper.simulation.forces.contact import NoDirectionWarning, SubstepsWarning, VolumetricContact
+    from overlapper.simulation.forces.forces import Forces
     from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
     from overlapper.simulation.recorder import Recorder
     from overlapper.simulation.report import Report
@@ -27,15 +29,19 @@ __all__ = [
     "Contact",
     "Contacts",
     "Decomposed",
+    "Forces",
     "LinkContact",
     "LinkContacts",
     "Log",
+    "NoDirectionWarning",
     "Recorder",
     "Report",
     "SelfCollisionWarning",
     "Skipped",
     "SkippedShapeWarning",
+    "SubstepsWarning",
     "Surface",
+    "VolumetricContact",
     "link_contacts",
 ]
 
@@ -47,6 +53,8 @@ __getattr__ = lazily(
         "bodies": ("Bodies", "SelfCollisionWarning", "SkippedShapeWarning"),
         "contacts": ("Contact", "Contacts"),
         "extraction.model": ("Concave", "Decomposed", "Skipped", "Surface"),
+        "forces.contact": ("NoDirectionWarning", "SubstepsWarning", "VolumetricContact"),
+        "forces.forces": ("Forces",),
         "links": ("LinkContact", "LinkContacts", "link_contacts"),
         "recorder": ("Recorder",),
         ".scenes.log": ("Log",),  # a table, which is above what it is of

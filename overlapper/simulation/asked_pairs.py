@@ -56,6 +56,17 @@ class AskedPairs:
         of_each = np.unique(self.layout.owners, return_counts=True)[1]
         return int(len(self.layout.owners) ** 2 - (of_each**2).sum()) // 2
 
+    def colliders(self, among: Numbered, rules: CollisionRules) -> NDArray[np.intp]:
+        """(n, 2) the pairs of links that are asked for, wherever they are, as values of `layout.collider_rows`."""
+        layout = self.layout
+        if not isinstance(among, str):
+            pairs = layout.colliders[np.array(np.divmod(self._codes(among), len(layout.keys)))].T
+            return np.unique(np.sort(pairs, axis=1), axis=0)
+        first, second = np.triu_indices(len(layout.collider_rows), 1)
+        body = np.array([id for id, _ in layout.collider_rows])
+        chosen = body[first] != body[second] if among == "all" else rules.allow(first, second)
+        return np.stack([first[chosen], second[chosen]], axis=1)
+
     def _codes(self, among: Iterable[tuple[Who, Who]]) -> Codes:
         """The pairs of a list, as `pair_codes` has them."""
         if isinstance(among, str):

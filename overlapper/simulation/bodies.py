@@ -31,7 +31,7 @@ from overlapper.simulation.extraction.naming import named
 from overlapper.simulation.ground import Grounds
 from overlapper.simulation.known_bodies import KnownBodies
 from overlapper.simulation.layout import Layout
-from overlapper.simulation.recorder import Recorder
+from overlapper.simulation.recorder import Link, Recorder
 from overlapper.simulation.report import Report
 
 
@@ -191,6 +191,12 @@ class Bodies:
             pairs_within_margins=self._within_margins(),
         )
 
+    def link_pairs(self, among: Among = "simulated") -> list[tuple[Link, Link]]:
+        """The pairs of links ((body, link), (body, link)) whose shapes `pairs` looks at, wherever they are; sorted."""
+        asked: Numbered = among if isinstance(among, str) else self._asked_for(among)
+        links = [*self._layout.collider_rows]
+        return [(links[a], links[b]) for a, b in self._pairs.colliders(asked, self._in_force.rules).tolist()]
+
     def close(self) -> None:
         """Take the marks off the bodies, unless another `Bodies` needs them. What was read stays; no update follows."""
         self._closed = True
@@ -254,6 +260,11 @@ class Bodies:
         """`concave`, `concave_threshold` and `surface`, as they were given."""
         given = self._settings
         return {"concave": given.concave, "concave_threshold": given.threshold, "surface": given.surface}
+
+    @property
+    def recorder(self) -> Recorder | None:
+        """As it was given."""
+        return self._recorder
 
     @property
     def skipped(self) -> list[Skipped]:

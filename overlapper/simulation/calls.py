@@ -43,6 +43,28 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("heightfieldData", "numHeightfieldRows", "numHeightfieldColumns", "replaceHeightfieldIndex"),
         "physicsClientId",
     ),
+    "setJointMotorControl2": (
+        *("bodyUniqueId", "jointIndex", "controlMode", "targetPosition", "targetVelocity", "force", "positionGain"),
+        *("velocityGain", "maxVelocity", "physicsClientId"),
+    ),
+    "setJointMotorControlArray": (
+        *("bodyUniqueId", "jointIndices", "controlMode", "targetPositions", "targetVelocities", "forces"),
+        *("positionGains", "velocityGains", "physicsClientId"),
+    ),
+    "setJointMotorControlMultiDof": (
+        *("bodyUniqueId", "jointIndex", "controlMode", "targetPosition", "targetVelocity", "force", "positionGain"),
+        *("velocityGain", "maxVelocity", "physicsClientId"),
+    ),
+    "setJointMotorControlMultiDofArray": (
+        *("bodyUniqueId", "jointIndices", "controlMode", "targetPositions", "targetVelocities", "forces"),
+        *("positionGains", "velocityGains", "maxVelocities", "physicsClientId"),
+    ),
+    "applyExternalForce": ("objectUniqueId", "linkIndex", "forceObj", "posObj", "flags", "physicsClientId"),
+    "applyExternalTorque": ("objectUniqueId", "linkIndex", "torqueObj", "flags", "physicsClientId"),
+    "changeConstraint": (
+        *("userConstraintUniqueId", "jointChildPivot", "jointChildFrameOrientation", "maxForce", "gearRatio"),
+        *("gearAuxLink", "relativePositionTarget", "erp", "physicsClientId"),
+    ),
     "loadBullet": ("bulletFileName", "physicsClientId"),
     "removeBody": ("bodyUniqueId", "physicsClientId"),
     "resetSimulation": ("flags", "physicsClientId"),
@@ -73,6 +95,12 @@ def unlisten(listener: Listener) -> None:
         if not _listeners:
             for name, original in _ORIGINALS.items():
                 setattr(pybullet, name, original)
+
+
+def unheard(name: str) -> Callable[..., Any]:
+    """The function of pybullet of that name, of whose calls no listener hears."""
+    function: Callable[..., Any] = _ORIGINALS[name] if _listeners else getattr(pybullet, name)
+    return function
 
 
 class _Heard:

@@ -159,10 +159,10 @@ def _joints(client: int, id: int, name: str) -> list[Joint]:
         raise NotRead(f"pybullet tells no poses of the {len(told)} links of {name}") from error
     frames = [tuple(map(np.array, each[:2])) for each in (base, *(states or ()))]
     root = Joint("", "held", frames[0][0], frames[0][1], np.zeros(3), np.zeros(3), 0.0, -1.0)
-    return [root, *(_joint(client, id, each, frames[1 + each[16]], frames[1 + each[0]]) for each in told)]
+    return [root, *(joint_between(client, id, each, frames[1 + each[16]], frames[1 + each[0]]) for each in told)]
 
 
-def _joint(client: int, id: int, told: Any, parent: Any, link: Any) -> Joint:
+def joint_between(client: int, id: int, told: Any, parent: Any, link: Any) -> Joint:
     """A joint by what pybullet tells of it, and by the inertial frames of its two links as they are now."""
     import pybullet
 

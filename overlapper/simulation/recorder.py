@@ -8,12 +8,19 @@ from typing import Any, NamedTuple
 import pybullet
 
 from overlapper.simulation.calls import Arguments, listen, unlisten
+from overlapper.simulation.commands import Commands
 from overlapper.simulation.extraction.height_field import HeightField
 
 Link = tuple[int, int]  # body and link, -1 for the base
 
 # What is heard, and says nothing of collisions.
-UNNOTED = frozenset({"connect", "stepSimulation", "setRealTimeSimulation"})
+UNNOTED = frozenset(
+    {
+        *("connect", "stepSimulation", "setRealTimeSimulation", "changeConstraint", "applyExternalForce"),
+        *("applyExternalTorque", "setJointMotorControl2", "setJointMotorControlArray", "setJointMotorControlMultiDof"),
+        "setJointMotorControlMultiDofArray",
+    }
+)
 
 # The parameters of the functions that make bodies from a file.
 FILE_NAMES = ("fileName", "sdfFileName", "mjcfFileName")
@@ -49,6 +56,8 @@ class Recorder:
         """How often groups and masks were set."""
         self.scenes_loaded = 0
         """How often bodies may have come or gone that pybullet tells nothing of: those of loadBullet."""
+        self.commands = Commands(physicsClientId)
+        """What motors, constraints and bodies were told to do."""
         self._forget()
         listen(self._hear)
 
@@ -79,6 +88,7 @@ class Recorder:
         self.close()
 
     def _hear(self, name: str, arguments: Arguments, result: Any) -> None:
+        self.commands.hear(name, arguments, result)
         if arguments.get("physicsClientId", 0) == self.physicsClientId and name not in UNNOTED:
             self._note(name, arguments, result)
 

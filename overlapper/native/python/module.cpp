@@ -37,4 +37,5 @@ NB_MODULE(_core, m) {
   overlapper::python::define_overlaps(m);
   overlapper::python::define_batch(m);
   overlapper::python::define_poses(m);
+  overlapper::python::define_forces(m);
 }

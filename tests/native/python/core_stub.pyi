@@ -924,3 +924,37 @@ def world_poses(frames: Sequence[Any], which: numpy.typing.NDArray[numpy.int64],
     `positions[i]` and `orientations[i]` of it. Quaternions are of any length but 0; those in the world are as long as
     `orientations`. Of a frame that is not a number, neither are they.
     """
+
+class ContactSolver:
+    """
+    The forces of patches on bodies of links; `simulation.VolumetricContact` is made of it.
+
+    A link is a row of each array: the place of its parent, before it, or -1 of a base, with which a body begins; its joint,
+    0 held, 1 revolute, 2 prismatic, 3 spherical; axis and pivot of the joint in the parent's inertial frame; mass, 0 of a
+    base that is held; principal moments of inertia. Coordinates are those of each body: of its base, linear and angular, in
+    the world, then of its joints.
+    """
+
+    def __init__(self, parents: numpy.typing.ArrayLike, joints: numpy.typing.ArrayLike, axes: numpy.typing.ArrayLike, pivots: numpy.typing.ArrayLike, masses: numpy.typing.ArrayLike, inertias: numpy.typing.ArrayLike) -> None: ...
+
+    @property
+    def coordinates(self) -> int: ...
+
+    def place(self, frames: Sequence[Any], overlaps: Overlaps, links: numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Put the links where they are, and take what their shapes share; `links` (k,) is the place of each shape's link.
+
+        `frames` begin with position and quaternion of the inertial frame, as pybullet's answers do. By row of `overlaps` (p,):
+        stiffness in Pa/m, dissipation in s, and the coefficient of friction. The answer (p,) is the square of a frequency,
+        (rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.
+        """
+
+    def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike, distributed: bool) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int]:
+        """
+        The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
+        without the patches; rows that are `damped` choose stability over energy.
+
+        (p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
+        last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and
+        how often the patches were gone through.
+        """

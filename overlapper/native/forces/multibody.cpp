@@ -1,0 +1,178 @@
+#include "forces/multibody.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+namespace overlapper {
+namespace {
+
+constexpr int kOfBase = 6;
+
+constexpr std::array<Vec3, 3> kAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+
+int coordinates_of(Joint joint) {
+  switch (joint) {
+    case Joint::kHeld: return 0;
+    case Joint::kRevolute:
+    case Joint::kPrismatic: return 1;
+    case Joint::kSpherical: return 3;
+  }
+  return 0;
+}
+
+/// Inverts the symmetric matrix in place by Cholesky's method. A coordinate that has no mass is one that nothing moves.
+void invert(std::vector<double>& m, int n) {
+  const auto at = [&](int i, int j) -> double& { return m[size_t(i) * n + j]; };
+  double largest = 0;
+  for (int i = 0; i < n; ++i) largest = std::max(largest, at(i, i));
+  std::vector<char> held(n);
+  for (int j = 0; j < n; ++j) {
+    double pivot = at(j, j);
+    for (int k = 0; k < j; ++k) pivot -= at(j, k) * at(j, k);
+    held[j] = !(pivot > 1e-14 * largest);
+    at(j, j) = held[j] ? 1 : std::sqrt(pivot);
+    for (int i = j + 1; i < n; ++i) {
+      double sum = at(i, j);
+      for (int k = 0; k < j; ++k) sum -= at(i, k) * at(j, k);
+      at(i, j) = held[j] ? 0 : sum / at(j, j);
+    }
+  }
+  std::vector<double> inverse(size_t(n) * n);
+  std::vector<double> column(n);
+  for (int c = 0; c < n; ++c) {
+    if (held[c]) continue;
+    for (int i = 0; i < n; ++i) {
+      double sum = i == c ? 1 : 0;
+      for (int k = 0; k < i; ++k) sum -= at(i, k) * column[k];
+      column[i] = held[i] ? 0 : sum / at(i, i);
+    }
+    for (int i = n - 1; i >= 0; --i) {
+      double sum = column[i];
+      for (int k = i + 1; k < n; ++k) sum -= at(k, i) * column[k];
+      column[i] = held[i] ? 0 : sum / at(i, i);
+      inverse[size_t(i) * n + c] = column[i];
+    }
+  }
+  m = std::move(inverse);
+}
+
+}  // namespace
+
+Multibodies::Multibodies(std::vector<Link> links) : links_(std::move(links)) {
+  for (int i = 0; i < int(links_.size()); ++i) {
+    const Link& link = links_[i];
+    if (link.parent < 0) bodies_.push_back({i, 0, coordinates_, 0, link.mass > 0});
+    if (bodies_.empty() || link.parent >= i || (link.parent >= 0 && link.parent < bodies_.back().first_link))
+      throw std::invalid_argument("links must begin with a base, and come after their parents");
+    Body& body = bodies_.back();
+    body_.push_back(int(bodies_.size()) - 1);
+    moved_.push_back(link.parent < 0 ? std::vector<int>{} : moved_[link.parent]);
+    const int own = link.parent < 0 ? kOfBase : coordinates_of(link.joint);
+    for (int k = 0; link.parent >= 0 && k < own; ++k) moved_.back().push_back(body.coordinates + k);
+    body.movable = body.movable || (link.parent >= 0 && own > 0);
+    ++body.links;
+    body.coordinates += own;
+    coordinates_ += own;
+  }
+  frames_.resize(links_.size());
+  moving_.resize(coordinates_);
+  for (const Body& body : bodies_) inverse_mass_.emplace_back(size_t(body.coordinates) * body.coordinates);
+}
+
+void Multibodies::place(std::span<const Pose> frames) {
+  frames_.assign(frames.begin(), frames.end());
+  for (int i = 0; i < int(links_.size()); ++i) {
+    const Link& link = links_[i];
+    const int own = link.parent < 0 ? 0 : coordinates_of(link.joint);
+    for (int k = 0; k < own; ++k) {
+      const int coordinate = moved_[i][moved_[i].size() - own + k];
+      const Pose& parent = frames_[link.parent];
+      const bool spherical = link.joint == Joint::kSpherical;
+      const Vec3 axis = spherical ? frames_[i].rotation * kAxes[k] : parent.rotation * link.axis;
+      moving_[bodies_[body_[i]].first_coordinate + coordinate] = {link.joint != Joint::kPrismatic, axis,
+                                                                  parent * link.pivot};
+    }
+  }
+  for (int body = 0; body < int(bodies_.size()); ++body)
+    if (bodies_[body].movable) find_inverse_mass(body);
+}
+
+void Multibodies::jacobian(int link, Vec3 point, std::span<double> rows) const {
+  const Body& body = bodies_[body_[link]];
+  const int n = body.coordinates;
+  std::fill(rows.begin(), rows.end(), 0.0);
+  const auto put = [&](int column, Vec3 linear, Vec3 angular) {
+    for (int axis = 0; axis < 3; ++axis) {
+      rows[size_t(axis) * n + column] = linear[axis];
+      rows[size_t(axis + 3) * n + column] = angular[axis];
+    }
+  };
+  const Vec3 arm = point - frames_[body.first_link].translation;
+  for (int k = 0; k < 3; ++k) {
+    put(k, kAxes[k], {});
+    put(3 + k, cross(kAxes[k], arm), kAxes[k]);
+  }
+  for (int column : moved_[link]) {
+    const Moving& by = moving_[body.first_coordinate + column];
+    if (by.turns) put(column, cross(by.axis, point - by.pivot), by.axis);
+    else put(column, by.axis, {});
+  }
+}
+
+void Multibodies::find_inverse_mass(int number) {
+  const Body& body = bodies_[number];
+  const int n = body.coordinates;
+  std::vector<double>& m = inverse_mass_[number];
+  std::fill(m.begin(), m.end(), 0.0);
+  if (body.links == 1) {
+    const Link& link = links_[body.first_link];
+    const Mat3& turn = frames_[body.first_link].rotation;
+    const auto inverse = [](double x) { return x > 0 ? 1 / x : 0; };
+    const Vec3 mobility{inverse(link.inertia.x), inverse(link.inertia.y), inverse(link.inertia.z)};
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 column = turn * scaled(mobility, apply_transposed(turn, kAxes[i]));
+      m[size_t(i) * n + i] = inverse(link.mass);
+      for (int j = 0; j < 3; ++j) m[size_t(j + 3) * n + i + 3] = column[j];
+    }
+    return;
+  }
+  std::vector<double> rows(size_t(6) * n);
+  for (int i = body.first_link; i < body.first_link + body.links; ++i) {
+    const Link& link = links_[i];
+    if (!(link.mass > 0)) continue;
+    jacobian(i, frames_[i].translation, rows);
+    const Mat3& turn = frames_[i].rotation;
+    // Of the angular rows: their components along the principal axes, times the roots of the moments.
+    for (int c = 0; c < n; ++c) {
+      const Vec3 spin{rows[size_t(3) * n + c], rows[size_t(4) * n + c], rows[size_t(5) * n + c]};
+      const Vec3 own = apply_transposed(turn, spin);
+      for (int axis = 0; axis < 3; ++axis) {
+        rows[size_t(3 + axis) * n + c] = std::sqrt(std::max(link.inertia[axis], 0.0)) * own[axis];
+        rows[size_t(axis) * n + c] *= std::sqrt(link.mass);
+      }
+    }
+    for (int r = 0; r < 6; ++r)
+      for (int a = 0; a < n; ++a) {
+        const double left = rows[size_t(r) * n + a];
+        if (left == 0) continue;
+        for (int b = 0; b < n; ++b) m[size_t(a) * n + b] += left * rows[size_t(r) * n + b];
+      }
+  }
+  if (!(links_[body.first_link].mass > 0)) {
+    // Nothing moves the base: the joints are moved by themselves.
+    const int joints = n - kOfBase;
+    std::vector<double> own(size_t(joints) * joints);
+    for (int i = 0; i < joints; ++i)
+      for (int j = 0; j < joints; ++j) own[size_t(i) * joints + j] = m[size_t(i + kOfBase) * n + j + kOfBase];
+    invert(own, joints);
+    std::fill(m.begin(), m.end(), 0.0);
+    for (int i = 0; i < joints; ++i)
+      for (int j = 0; j < joints; ++j) m[size_t(i + kOfBase) * n + j + kOfBase] = own[size_t(i) * joints + j];
+  } else {
+    invert(m, n);
+  }
+}
+
+}  // namespace overlapper

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "geometry/vec.h"
+
+namespace overlapper {
+
+enum class Joint { kHeld, kRevolute, kPrismatic, kSpherical };
+
+/// A link and the joint that moves it in its parent. Frames are inertial frames: at the centre of mass, along the
+/// principal axes.
+struct Link {
+  int parent = -1;  ///< its place among all links, before this one; -1 of a base, with which a body begins
+  Joint joint = Joint::kHeld;
+  Vec3 axis;   ///< unit, in the frame of the parent; a spherical joint turns about the axes of the link's own frame
+  Vec3 pivot;  ///< m, in the frame of the parent: a point that the joint leaves where it is
+  double mass = 0;  ///< kg; of a base, 0 if nothing moves it
+  Vec3 inertia;     ///< kg m², principal
+};
+
+/// Bodies of links, each with so many coordinates of velocity: of its base, linear at the centre of mass and angular,
+/// in the world, and of its joints in the order of their links. A base that is held has the six, too: it may be moved
+/// by hand.
+class Multibodies {
+ public:
+  struct Body {
+    int first_link, links, first_coordinate, coordinates;
+    bool movable;  ///< by forces
+  };
+
+  /// Throws std::invalid_argument unless parents come before their children.
+  explicit Multibodies(std::vector<Link> links);
+
+  std::span<const Link> links() const { return links_; }
+  std::span<const Body> bodies() const { return bodies_; }
+  int body_of(int link) const { return body_[link]; }
+  int coordinates() const { return coordinates_; }
+
+  /// Puts the links where they are, and finds the inverse mass matrices there.
+  void place(std::span<const Pose> frames);
+
+  Vec3 centre(int link) const { return frames_[link].translation; }
+
+  /// Writes 6 rows: the linear velocity of the point of a link, then its angular velocity, by its body's coordinates.
+  void jacobian(int link, Vec3 point, std::span<double> rows) const;
+
+  /// By rows, as many as the body has coordinates; zeros for what forces do not move.
+  std::span<const double> inverse_mass(int body) const { return inverse_mass_[body]; }
+
+ private:
+  /// A coordinate of a joint, in the world.
+  struct Moving {
+    bool turns;
+    Vec3 axis, pivot;
+  };
+
+  void find_inverse_mass(int body);
+
+  std::vector<Link> links_;
+  std::vector<Body> bodies_;
+  std::vector<int> body_;                ///< of each link
+  std::vector<std::vector<int>> moved_;  ///< of each link: the coordinates of the joints between it and its base
+  int coordinates_ = 0;
+  std::vector<Pose> frames_;
+  std::vector<Moving> moving_;  ///< per coordinate of all bodies; those of bases are not used
+  std::vector<std::vector<double>> inverse_mass_;
+};
+
+}  // namespace overlapper

@@ -1,0 +1,155 @@
+#include "batch/batch.h"
+#include "forces/contact_solver.h"
+#include "python/arrays.h"
+#include "python/frames.h"
+
+namespace overlapper::python {
+namespace {
+
+/// A patch has no direction if its area vector is less than this fraction of the surface of what is shared.
+constexpr double kNoDirection = 1e-6;
+
+std::vector<double> numbers(nb::handle given, const char* name, size_t rows, size_t columns = 1) {
+  const Doubles array = to_doubles(given, name, "an array of numbers");
+  if (array.size() != rows * columns)
+    fail(name, "must have " + std::to_string(rows * columns) + " numbers, not " + std::to_string(array.size()));
+  return {array.data(), array.data() + array.size()};
+}
+
+ContactSolver to_solver(nb::handle parents_given, nb::handle joints_given, nb::handle axes_given,
+                        nb::handle pivots_given, nb::handle masses_given, nb::handle inertias_given) {
+  const auto parents = to_indices(parents_given, "parents"), joints = to_indices(joints_given, "joints");
+  const size_t n = parents.size();
+  const std::vector<Vec3> axes = to_rows(axes_given, "axes"), pivots = to_rows(pivots_given, "pivots"),
+                          inertias = to_rows(inertias_given, "inertias");
+  const std::vector<double> masses = numbers(masses_given, "masses", n);
+  if (joints.size() != n || axes.size() != n || pivots.size() != n || inertias.size() != n)
+    fail("links", "must have a row in each array");
+  std::vector<Link> links(n);
+  for (size_t i = 0; i < n; ++i) {
+    if (joints[i] < 0 || joints[i] > int(Joint::kSpherical)) fail("joints", "must be from 0 to 3");
+    links[i] = {int(parents[i]), Joint(joints[i]), axes[i], pivots[i], masses[i], inertias[i]};
+  }
+  return ContactSolver(std::move(links));
+}
+
+nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps& found, nb::handle links_given,
+                 nb::handle stiffness_given, nb::handle dissipation_given, nb::handle friction_given) {
+  std::vector<Pose> frames;
+  for (nb::handle each : frames_given) {
+    const Frame frame = to_frame(each);
+    frames.push_back(make_placed(Sphere{1}, frame.position, frame.orientation).pose);
+  }
+  const size_t count = found.size(), links = solver.bodies().links().size();
+  if (frames.size() != links) fail("frames", "must be one for each link");
+  const auto link_of = to_indices(links_given, "links");
+  const auto stiffness = numbers(stiffness_given, "stiffness", count);
+  const auto dissipation = numbers(dissipation_given, "dissipation", count);
+  const auto friction = numbers(friction_given, "friction", count);
+  const auto& [centre, moments, distance] = unlocked([&]() -> const Overlaps::Patches& { return found.patches(); });
+  std::vector<ElasticPatch> patches(count);
+  for (size_t i = 0; i < count; ++i) {
+    const auto [a, b] = found.pairs[i];
+    for (int shape : {a, b})
+      if (shape >= int(link_of.size()) || link_of[shape] < 0 || link_of[shape] >= std::int64_t(links))
+        fail("links", "must be places of links, one for each shape");
+    ElasticPatch& patch = patches[i];
+    patch.key = std::int64_t(a) << 32 | b;
+    patch.link_a = int(link_of[a]), patch.link_b = int(link_of[b]);
+    patch.normal = found.normal[i];
+    patch.stiffness = stiffness[i], patch.dissipation = dissipation[i], patch.friction = friction[i];
+    if (found.status[i] != std::int8_t(Status::kOverlapping)) continue;
+    patch.force = stiffness[i] * found.volume[i];
+    patch.centroid = found.centroid[i];
+    const auto& pull = found.gradient[i][1];
+    const Vec3 area{pull[0], pull[1], pull[2]};
+    if (!(norm(area) > kNoDirection * found.area[i]) || !finite(centre[i])) continue;
+    patch.area = norm(area);
+    patch.normal = unit(area);
+    patch.centre = centre[i], patch.moments = moments[i], patch.distance = distance[i];
+  }
+  std::vector<double> frequency2 = solver.place(frames, std::move(patches));
+  const size_t rows = frequency2.size();
+  return nb::cast(to_numpy<Vector>(std::move(frequency2), {rows}), nb::rv_policy::move);
+}
+
+nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_given, nb::handle acceleration_given,
+                nb::handle damped_given, bool distributed) {
+  const size_t coordinates = solver.bodies().coordinates(), count = solver.patches().size();
+  const auto velocity = numbers(velocity_given, "velocity", coordinates);
+  const auto acceleration = numbers(acceleration_given, "acceleration", coordinates);
+  std::vector<char> damped;
+  for (double each : numbers(damped_given, "damped", count)) damped.push_back(each != 0);
+  ContactSolver::Solution solution;
+  {
+    const nb::gil_scoped_release release;
+    solution = solver.solve(
+        {duration, velocity, acceleration, damped, distributed ? Friction::kDistributed : Friction::kEllipsoid});
+  }
+  std::vector<Vec3> force, torque, slip, normal;
+  for (const PatchForce& each : solution.patches)
+    force.push_back(each.force), torque.push_back(each.torque), slip.push_back(each.slip);
+  std::vector<char> directed;
+  for (const ElasticPatch& each : solver.patches())
+    normal.push_back(each.normal), directed.push_back(each.area > 0 || !(each.force > 0));
+  std::vector<double> links;
+  for (const auto& [f, t] : solution.links) links.insert(links.end(), {f.x, f.y, f.z, t.x, t.y, t.z});
+  const size_t rows = solution.links.size();
+  const auto array = [](const std::vector<Vec3>& values) { return to_numpy(std::span<const Vec3>(values)); };
+  using Flags = nb::ndarray<nb::numpy, const bool, nb::ndim<1>>;
+  auto* flags = new std::vector<char>(std::move(directed));
+  const nb::capsule owner(flags, [](void* p) noexcept { delete static_cast<std::vector<char>*>(p); });
+  return nb::make_tuple(array(force), array(torque), array(slip), array(normal),
+                        Flags(reinterpret_cast<const bool*>(flags->data()), {count}, owner),
+                        to_numpy<Matrix>(std::move(links), {rows, 6}),
+                        to_numpy<Vector>(std::move(solution.acceleration), {coordinates}), solution.sweeps);
+}
+
+}  // namespace
+
+void define_forces(nb::module_& m) {
+  nb::class_<ContactSolver> cls(
+      m, "ContactSolver",
+      R"(The forces of patches on bodies of links; `simulation.VolumetricContact` is made of it.
+
+A link is a row of each array: the place of its parent, before it, or -1 of a base, with which a body begins; its joint,
+0 held, 1 revolute, 2 prismatic, 3 spherical; axis and pivot of the joint in the parent's inertial frame; mass, 0 of a
+base that is held; principal moments of inertia. Coordinates are those of each body: of its base, linear and angular, in
+the world, then of its joints.)");
+  cls.def(
+      "__init__",
+      [](ContactSolver* self, nb::handle parents, nb::handle joints, nb::handle axes, nb::handle pivots,
+         nb::handle masses,
+         nb::handle inertias) { new (self) ContactSolver(to_solver(parents, joints, axes, pivots, masses, inertias)); },
+      "parents"_a, "joints"_a, "axes"_a, "pivots"_a, "masses"_a, "inertias"_a,
+      nb::sig("def __init__(self, parents: numpy.typing.ArrayLike, joints: numpy.typing.ArrayLike, axes: "
+              "numpy.typing.ArrayLike, pivots: numpy.typing.ArrayLike, masses: numpy.typing.ArrayLike, inertias: "
+              "numpy.typing.ArrayLike) -> None"));
+  cls.def_prop_ro("coordinates", [](const ContactSolver& self) { return self.bodies().coordinates(); });
+  cls.def(
+      "place", &place, "frames"_a, "overlaps"_a, "links"_a, "stiffness"_a, "dissipation"_a, "friction"_a,
+      nb::sig("def place(self, frames: collections.abc.Sequence[typing.Any], overlaps: Overlaps, links: "
+              "numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: "
+              "numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]"),
+      R"(Put the links where they are, and take what their shapes share; `links` (k,) is the place of each shape's link.
+
+`frames` begin with position and quaternion of the inertial frame, as pybullet's answers do. By row of `overlaps` (p,):
+stiffness in Pa/m, dissipation in s, and the coefficient of friction. The answer (p,) is the square of a frequency,
+(rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.)");
+  cls.def(
+      "solve", &solve, "duration"_a, "velocity"_a, "acceleration"_a, "damped"_a, "distributed"_a,
+      nb::sig("def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: "
+              "numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike, distributed: bool) -> "
+              "tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
+              "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
+              "numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], "
+              "numpy.typing.NDArray[numpy.float64], int]"),
+      R"(The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
+without the patches; rows that are `damped` choose stability over energy.
+
+(p, 3) force, torque about the centroid and slip of a over b, (p, 3) normal, (p,) whether that is one of now and not the
+last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and
+how often the patches were gone through.)");
+}
+
+}  // namespace overlapper::python

@@ -1,0 +1,365 @@
+"""Volumetric contact: forces from the volumes that bodies share, in place of the simulator's contact points."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from overlapper.simulation.asked_pairs import Among
+from overlapper.simulation.bodies import Bodies
+from overlapper.simulation.calls import listen, unheard, unlisten
+from overlapper.simulation.commands import Commands
+from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.extraction.model import Array
+from overlapper.simulation.forces.dynamics import Dynamics
+from overlapper.simulation.forces.forces import Forces
+from overlapper.simulation.forces.response import Response
+from overlapper.simulation.recorder import Link
+
+OfPair = Callable[[Link, Link], float]
+"""What a pair of links ((body, link), (body, link)) has, the lesser first."""
+
+# A swing that turns by more than so many radians in a step is followed by backward Euler.
+COARSE = 2.0
+
+# What is swept in a step at most: stiffness beyond is damped.
+MOST_SUBSTEPS = 200
+
+
+class NoDirectionWarning(UserWarning):
+    """A body lies within another or goes through it: what they share has no side to push to."""
+
+
+class SubstepsWarning(UserWarning):
+    """The substeps are too few for the stiffness: contacts lose energy."""
+
+
+class VolumetricContact:
+    """Contact of pybullet bodies by what they share, instead of Bullet's contact points.
+
+        bodies = Bodies(physicsClientId)
+        contact = VolumetricContact(bodies)
+        with contact:
+            while ...:
+                contact.step()  # instead of pybullet.stepSimulation()
+
+    Bodies are elastic foundations (Winkler): they press with `stiffness` (Pa/m) times the depth, so that a pair is
+    pushed apart by stiffness times the volume that it shares, through that volume's centroid, along the area vector of
+    its patch. A layer of thickness t and modulus E has the stiffness E / t; two bodies in series have
+    1 / (1 / k1 + 1 / k2). A body rests as deep as its weight is stiffness times volume.
+
+    `dissipation` (s) is how far pressures are ahead of the depth, in time (Kelvin and Voigt): the damping ratio of a
+    swing of angular frequency w is w * dissipation / 2, and 0 keeps the energy. `friction` is Coulomb's coefficient, by
+    default that of pybullet: the product of the two links' lateralFriction. A patch resists slip and spin together, as
+    an ellipsoid of force and torque; what sticks does not creep. "distributed" resists at points spread over the patch
+    instead, by pybullet's coefficients, which is more exact where bodies slip and spin at once. Restitution, rolling
+    and spinning friction of pybullet are not used. Each may be a function of the pair of links, as
+    stiffness=lambda a, b: ..., of (body, link) twice, which is asked once for each pair.
+
+    A step of the simulator is taken in `substeps`, by default as many as the stiffness and the masses ask for, and
+    anew in every step. Too few of them are told with one SubstepsWarning for each pair; their contacts are then solved
+    by backward Euler, which loses energy.
+
+    `pairs` are those that `Bodies.pairs` takes, by default all that the simulator lets collide. Within the `with`,
+    Bullet does not respond to these, whether they touch or not, and getContactPoints has none of them; it simulates all
+    else: joints, motors, constraints and other pairs. A `Bodies` with a recorder knows which pairs a script has
+    filtered; without one they are pushed apart, too.
+
+    What else acts on the bodies, as gravity, motors, constraints and forces of the script, is taken to be as it was in
+    the substep before. What a script tells motors and constraints within the `with`, and the forces that it applies, is
+    told again in each substep, so that it lasts for the whole step: pybullet keeps it as an impulse. Motors that were
+    told before, unless a recorder has heard it, are as much stronger as substeps are shorter.
+
+    What has no direction, as a body that lies wholly within another or goes through a plate, is pushed where it was
+    pushed last, or along the least translation that frees it, with one NoDirectionWarning for each pair.
+
+    After `step()` or `forces()` there is a row for each pair of shapes that overlaps, of the last substep, in SI units
+    and the world: `contacts`, and parallel to it `force`, `torque`, `centre`, `energy`, `slip`; `last` has them all.
+
+    ValueError says what is wrong with an argument.
+    """
+
+    def __init__(
+        self,
+        bodies: Bodies,
+        pairs: Among | None = None,
+        stiffness: float | OfPair = 1e7,
+        dissipation: float | OfPair = 1e-3,
+        friction: float | OfPair | Literal["distributed"] | None = None,
+        substeps: int | Literal["auto"] = "auto",
+    ) -> None:
+        self.bodies = bodies
+        self._among: Among = "simulated" if pairs is None else pairs
+        if not isinstance(self._among, str):
+            self._among = [*self._among]
+        bodies.update()
+        bodies.link_pairs(self._among)  # says what is wrong with them
+        distributed = isinstance(friction, str) and friction == "distributed"
+        self._distributed = distributed
+        self._stiffness = _Parameter("stiffness", stiffness, "Pa/m", positive=True)
+        self._dissipation = _Parameter("dissipation", dissipation, "s")
+        self._friction = None
+        if friction is not None and not distributed:
+            self._friction = _Parameter("friction", friction, "")  # type: ignore[arg-type]  # no other text is a number
+        if substeps != "auto" and not (isinstance(substeps, int) and not isinstance(substeps, bool) and substeps >= 1):
+            raise ValueError(f"substeps must be a whole number from 1, or 'auto', not {substeps!r}")
+        self._substeps = substeps
+        self._response = Response(bodies.physicsClientId)
+        self._commands = bodies.recorder.commands if bodies.recorder else Commands(bodies.physicsClientId)
+        self._inside = False
+        self._after: Array | None = None  # the velocity that the last step left
+        self._warned: set[tuple[str, Link, Link]] = set()
+        self._model()
+        none = np.empty((0, 3))
+        self._found = Forces(bodies.overlaps(pairs=[]), none, none, none, none, np.empty(0, dtype=bool), np.empty(0))
+        self.substeps = 0
+        """How many the last step was taken in."""
+        self.sweeps = 0
+        """How often the solver went through all pairs in the last substep."""
+
+    def __enter__(self) -> VolumetricContact:
+        self._inside = True
+        self._response.turn_off(self.bodies.link_pairs(self._among))
+        if not self.bodies.recorder:
+            listen(self._commands.hear)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._inside = False
+        client = self.bodies.physicsClientId
+        if not self.bodies.recorder:
+            unlisten(self._commands.hear)
+        if pybullet.isConnected(client):
+            self._response.turn_on()
+            self._commands.prepare(pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"], first=True)
+
+    def step(self) -> None:
+        """Let the simulation go on by one of its time steps.
+
+        RuntimeError outside of the `with`, where Bullet would push the bodies apart as well.
+        """
+        if not self._inside:
+            raise RuntimeError("step() is for within `with contact:`, where Bullet does not respond to these pairs")
+        client = self.bodies.physicsClientId
+        duration = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
+        self._refresh()
+        left, taken = duration, 0
+        planned = 0 if self._substeps == "auto" else int(self._substeps)
+        try:
+            while left > 1e-9 * duration:
+                if taken:
+                    self.bodies.update()
+                frequency2 = self._place()
+                if planned:
+                    length = duration / planned
+                else:
+                    highest = math.sqrt(frequency2.max(initial=0.0))
+                    length = left / min(max(1, math.ceil(highest * left)), max(1, MOST_SUBSTEPS - taken))
+                wrenches = self._solve(length, frequency2)
+                pybullet.setTimeStep(length, client)
+                self._commands.prepare(length, first=not taken)
+                self._dynamics.apply(wrenches, self._frames)
+                unheard("stepSimulation")(client)
+                left -= length
+                taken += 1
+        finally:
+            pybullet.setTimeStep(duration, client)
+            self._commands.stepped()
+        self.substeps = taken
+        self._after = self._dynamics.velocity()
+
+    def forces(self) -> Forces:
+        """The forces that would act in a step of the simulator, without taking it: for scripts that integrate."""
+        client = self.bodies.physicsClientId
+        self._refresh()
+        self._solve(pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"], self._place())
+        self._after = None
+        return self._found
+
+    @property
+    def last(self) -> Forces:
+        """All of the last substep or `forces()`, which no later step changes."""
+        return self._found
+
+    @property
+    def contacts(self) -> Contacts:
+        """What the bodies share, a row for each pair of shapes."""
+        return self._found.contacts
+
+    @property
+    def pairs(self) -> NDArray[np.int64]:
+        """(p, 6) integers bodyA, linkA, shapeA, bodyB, linkB, shapeB of each row."""
+        return self._found.pairs
+
+    @property
+    def force(self) -> Array:
+        """(p, 3) N, on the first of each pair; on the second the opposite."""
+        return self._found.force
+
+    @property
+    def torque(self) -> Array:
+        """(p, 3) N m, on the first about `centre`: of pressures that change, and of friction that resists a spin."""
+        return self._found.torque
+
+    @property
+    def centre(self) -> Array:
+        """(p, 3) m, the centroid of what is shared: what the force goes through."""
+        return self._found.centre
+
+    @property
+    def energy(self) -> Array:
+        """(p,) J, stored in the pressures; see `Forces.energy`."""
+        return self._found.energy
+
+    @property
+    def slip(self) -> Array:
+        """(p, 3) m/s, of the first over the second at `centre`, along the patch, at the end of the substep."""
+        return self._found.slip
+
+    def on(self, body: int, link: int | None = None) -> tuple[Array, Array]:
+        """Force (3,) in N and torque (3,) in N m about the world's origin, by all pairs, on a body or a link of it."""
+        return self._found.on(body, link)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def __repr__(self) -> str:
+        return f"VolumetricContact({len(self)} pairs of shapes press, {self.substeps} substeps)"
+
+    def _refresh(self) -> None:
+        """See what has come or gone, and how heavy things are."""
+        self.bodies.update()
+        if self._keys is not self.bodies.keys:
+            self._model()
+            if self._inside:
+                self._response.turn_off(self.bodies.link_pairs(self._among))
+        elif self._dynamics.read():
+            self._forget()
+
+    def _model(self) -> None:
+        """Read the masses and joints of the bodies that there are."""
+        self._keys = self.bodies.keys
+        self._dynamics = Dynamics(self.bodies.physicsClientId, sorted({body for body, _, _ in self._keys}))
+        self._links = np.array([self._dynamics.place[body, link] for body, link, _ in self._keys], dtype=np.int64)
+        self._frames = self._dynamics.frames()
+        self._forget()
+
+    def _forget(self) -> None:
+        """What acted before is of other bodies."""
+        self._after = None
+        self._before: tuple[Array, float, Array] | None = None  # velocity, duration and our part of the acceleration
+        self._other = self._dynamics.gravity
+
+    def _place(self) -> Array:
+        """Take what bodies share where they are; the squares of frequencies by row."""
+        dynamics = self._dynamics
+        self._contacts = self.bodies.overlaps(pairs=self._among)
+        found = self._contacts.overlaps
+        links = self._links[found.pairs]
+        self._moduli = self._stiffness.of(links, dynamics.links)
+        if self._friction is None:
+            friction = dynamics.friction[links].prod(axis=1)
+        else:
+            friction = self._friction.of(links, dynamics.links)
+        self._frames = dynamics.frames()
+        dissipation = self._dissipation.of(links, dynamics.links)
+        frequency2: Array = dynamics.solver.place(self._frames, found, self._links, self._moduli, dissipation, friction)
+        return frequency2
+
+    def _solve(self, duration: float, frequency2: Array) -> Array:
+        """The forces of a step as long as that; (n, 6) force and torque on the links."""
+        dynamics = self._dynamics
+        velocity = dynamics.velocity()
+        # What else acts is told by how velocities have changed, unless somebody has set them since.
+        if self._before and (self._after is None or np.array_equal(self._after, velocity)):
+            before, length, ours = self._before
+            self._other = (velocity - before) / length - ours
+        self._after = None
+        damped = frequency2 * duration**2 > COARSE**2
+        if damped.any():
+            self._tell_of_substeps(damped, frequency2, duration)
+        wrenches: Array
+        force, torque, slip, normal, directed, wrenches, ours, self.sweeps = dynamics.solver.solve(
+            duration, velocity, self._other, damped, self._distributed
+        )
+        self._found = Forces(self._contacts, force, torque, slip, normal, directed, self._moduli)
+        if not directed.all():
+            self._tell_of_direction(~directed)
+        self._before = velocity, duration, ours
+        return wrenches
+
+    def _pairs_of(self, rows: NDArray[np.bool_]) -> list[tuple[Link, Link]]:
+        return [((a, la), (b, lb)) for a, la, _, b, lb, _ in self._contacts.keys[rows].tolist()]
+
+    def _tell_of_substeps(self, damped: NDArray[np.bool_], frequency2: Array, duration: float) -> None:
+        for (a, b), square in zip(self._pairs_of(damped), frequency2[damped].tolist()):
+            if ("substeps", a, b) not in self._warned:
+                self._warned.add(("substeps", a, b))
+                needed = math.ceil(math.sqrt(square) * duration * max(1, self._substeps_given))
+                names = self.bodies.names
+                warnings.warn(
+                    f"{self._substeps_given} substeps are too few for the stiffness between {names[a]} and {names[b]}, "
+                    f"which swing at up to {math.sqrt(square):.0f} rad/s: {needed} would follow them; until then their "
+                    "contact loses energy",
+                    SubstepsWarning,
+                    stacklevel=4,
+                )
+
+    @property
+    def _substeps_given(self) -> int:
+        return MOST_SUBSTEPS if self._substeps == "auto" else int(self._substeps)
+
+    def _tell_of_direction(self, lost: NDArray[np.bool_]) -> None:
+        for a, b in self._pairs_of(lost):
+            if ("direction", a, b) not in self._warned:
+                self._warned.add(("direction", a, b))
+                names = self.bodies.names
+                warnings.warn(
+                    f"{names[a]} and {names[b]} share a volume without a side to push to, as one lies within the other "
+                    "or goes through it; they are pushed as they were last",
+                    NoDirectionWarning,
+                    stacklevel=4,
+                )
+
+
+class _Parameter:
+    """A number, or one for each pair of links."""
+
+    def __init__(self, name: str, given: float | OfPair, unit: str, positive: bool = False) -> None:
+        self._name, self._unit, self._positive = name, f" {unit}" if unit else "", positive
+        self._function = given if callable(given) else None
+        self._number = 0.0 if callable(given) else self._checked(given, "")
+        self._known: dict[tuple[int, int], float] = {}
+        self._links: Sequence[Link] = ()
+
+    def of(self, pairs: NDArray[np.int64], links: Sequence[Link]) -> Array:
+        """(p,) of pairs (p, 2) of places in `links`."""
+        if self._function is None:
+            return np.full(len(pairs), self._number)
+        if links is not self._links:
+            self._links, self._known = links, {}
+        return np.array([self._of_pair(a, b) for a, b in pairs.tolist()], dtype=float)
+
+    def _of_pair(self, a: int, b: int) -> float:
+        assert self._function is not None
+        if (a, b) not in self._known:
+            first, second = self._links[a], self._links[b]
+            of = f" of {first} and {second}"
+            self._known[a, b] = self._checked(self._function(first, second), of)
+        return self._known[a, b]
+
+    def _checked(self, given: Any, of: str) -> float:
+        least = "greater than 0" if self._positive else "0 or greater"
+        try:
+            number = float(given)
+        except (TypeError, ValueError):
+            number = math.nan
+        if isinstance(given, str) or not (number > 0 or (number == 0 and not self._positive)) or math.isinf(number):
+            raise ValueError(f"{self._name}{of} must be a number{self._unit} {least}, not {given!r}")
+        return number

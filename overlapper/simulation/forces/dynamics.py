@@ -1,0 +1,135 @@
+"""The bodies of a pybullet client as masses and joints, and how they move."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import repeat
+from typing import Any
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from overlapper import _core
+from overlapper.quaternion import rotated
+from overlapper.simulation.calls import unheard
+from overlapper.simulation.extraction.model import BASE, Array
+from overlapper.simulation.kinematic_tree import joint_between
+
+# By kinematic_tree.Kind: the number that _core.ContactSolver knows it by, and how many coordinates it has.
+JOINTS = {"held": (0, 0), "planar": (0, 0), "revolute": (1, 1), "prismatic": (2, 1), "spherical": (3, 3)}
+MASS, FRICTION, INERTIA = 0, 1, 2  # of getDynamicsInfo
+HELD = (-1, 0, np.zeros(3), np.zeros(3))  # a base: no parent, no joint
+
+
+class Dynamics:
+    """The links of some bodies, base by base, and the `solver` that knows their masses and joints.
+
+    `links` are (body, link) in the solver's order, `place` the place of each there, `friction` (n,) their coefficients.
+    """
+
+    def __init__(self, client: int, bodies: Sequence[int]) -> None:
+        self._client = client
+        self._joints = {id: [*range(pybullet.getNumJoints(id, client))] for id in bodies}
+        self.links = [(id, link) for id, joints in self._joints.items() for link in (BASE, *joints)]
+        self.place = {each: k for k, each in enumerate(self.links)}
+        self._masses: list[Any] = []
+        self.friction: Array = np.zeros(len(self.links))
+        self.read()
+
+    def read(self) -> bool:
+        """Read masses and coefficients of friction anew; True if there is a new solver, as a mass is another."""
+        told = [pybullet.getDynamicsInfo(id, link, self._client) for id, link in self.links]
+        self.friction = np.array([each[FRICTION] for each in told])
+        masses = [(each[MASS], each[INERTIA]) for each in told]
+        if masses == self._masses:
+            return False
+        self._masses = masses
+        self._model()
+        return True
+
+    @property
+    def gravity(self) -> Array:
+        """The acceleration of all coordinates of which it is known before anything has moved: of free bases."""
+        told = pybullet.getPhysicsEngineParameters(self._client)
+        down = [told[f"gravityAcceleration{axis}"] for axis in "XYZ"]
+        found = np.zeros(self.solver.coordinates)
+        for (id, _), first in self._bases.items():
+            if self._masses[self.place[id, BASE]][MASS] > 0:
+                found[first : first + 3] = down
+        return found
+
+    def _model(self) -> None:
+        client = self._client
+        rows: list[tuple[Any, ...]] = []
+        self._bases: dict[tuple[int, int], int] = {}  # the first coordinate of each
+        # By body: joints of one and of three coordinates, and the coordinates that these are.
+        self._single: list[tuple[int, list[int], list[int]]] = []
+        self._spherical: list[tuple[int, list[int], list[int]]] = []
+        at = 0
+        for (id, joints), frames in zip(self._joints.items(), self._frames_by_body()):
+            poses = [tuple(map(np.array, each[:2])) for each in frames]
+            self._bases[id, BASE] = at
+            at += 6
+            first = len(rows)
+            rows.append(HELD)
+            single: tuple[list[int], list[int]] = ([], [])
+            spherical: tuple[list[int], list[int]] = ([], [])
+            for joint in joints:
+                told = pybullet.getJointInfo(id, joint, client)
+                parent = 1 + told[16]
+                between = joint_between(client, id, told, poses[parent], poses[1 + joint])
+                number, coordinates = JOINTS[between.kind]
+                # Bullet turns by the unit axis, but moves by the axis as it is in the file.
+                axis = rotated(between.orientation, np.array(told[13]))
+                rows.append((first + parent, number, axis, between.position))
+                if coordinates:
+                    which = single if coordinates == 1 else spherical
+                    which[0].append(joint)
+                    which[1].extend(range(at, at + coordinates))
+                at += coordinates
+            self._single += [(id, *single)] if single[0] else []
+            self._spherical += [(id, *spherical)] if spherical[0] else []
+        parents, numbers, axes, pivots = zip(*rows) if rows else ([], [], [], [])
+        masses = [mass for mass, _ in self._masses]
+        inertias = np.array([inertia for _, inertia in self._masses]).reshape(-1, 3)
+        self.solver = _core.ContactSolver(
+            parents, numbers, np.reshape(axes, (-1, 3)), np.reshape(pivots, (-1, 3)), masses, inertias
+        )
+
+    def frames(self) -> list[Any]:
+        """The inertial frames of the links: pybullet's answers, which begin with position and quaternion."""
+        return [each for body in self._frames_by_body() for each in body]
+
+    def _frames_by_body(self) -> list[list[Any]]:
+        client = self._client
+        found = []
+        for id, joints in self._joints.items():
+            frames: list[Any] = [pybullet.getBasePositionAndOrientation(id, client)]
+            if joints:
+                frames += pybullet.getLinkStates(id, joints, computeForwardKinematics=1, physicsClientId=client)
+            found.append(frames)
+        return found
+
+    def velocity(self) -> Array:
+        """Of all coordinates: of bases in m/s and rad/s, in the world, and of joints in rad/s or m/s."""
+        client = self._client
+        velocity = np.empty(self.solver.coordinates)
+        bases = np.array([*map(pybullet.getBaseVelocity, self._joints, repeat(client))]).reshape(-1, 6)
+        velocity[np.add.outer([*self._bases.values()], range(6))] = bases
+        for id, joints, at in self._single:
+            velocity[at] = [state[1] for state in pybullet.getJointStates(id, joints, client)]
+        for id, joints, at in self._spherical:
+            states = pybullet.getJointStatesMultiDof(id, joints, client)
+            velocity[at] = [each for state in states for each in state[1]]
+        return velocity
+
+    def apply(self, wrenches: NDArray[np.float64], frames: Sequence[Any]) -> None:
+        """Let forces and torques (n, 6) about their centres of mass act on the links in the simulator's next step."""
+        client, axes = self._client, pybullet.WORLD_FRAME
+        push, turn = unheard("applyExternalForce"), unheard("applyExternalTorque")
+        for k in np.flatnonzero(wrenches.any(axis=1)).tolist():
+            id, link = self.links[k]
+            wrench = wrenches[k].tolist()
+            push(id, link, wrench[:3], frames[k][0], axes, client)
+            turn(id, link, wrench[3:], axes, client)
