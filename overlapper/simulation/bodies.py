@@ -128,6 +128,11 @@ class Bodies:
         """
         self._refresh()
 
+    def follow(self) -> None:
+        """Read all poses, as `update()` does, of the bodies that there were then; those that come or go are missed."""
+        if self._pose() != self._nowhere:
+            self._refresh()
+
     def overlaps(
         self,
         tolerance: float = 1e-3,

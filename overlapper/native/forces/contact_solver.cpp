@@ -18,8 +18,8 @@ constexpr double kDamping = 1;
 constexpr double kSettled = 1e-9;
 
 /// Patches visited in all sweeps of a step, but so many sweeps at least and at most.
-constexpr int kVisits = 20000;
-constexpr int kFewest = 20;
+constexpr int kVisits = 10000;
+constexpr int kFewest = 10;
 constexpr int kMost = 2000;
 
 /// The centre of pressure stays within this many radii of gyration: the half width of a rectangle.
@@ -88,9 +88,11 @@ struct ContactSolver::Law {
   double distance = 0;
   ThreeByThree grip{};  ///< what friction does to the slip, the third scaled by the distance
   std::array<double, 6> wrench{};
+  double shift = 0;
   struct Point {
     double u, v, share;
     std::array<double, 2> force;
+    double shift = 0;
   };
   std::vector<Point> points;
 
@@ -110,17 +112,42 @@ struct ContactSolver::Law {
   }
 };
 
+/// How the point of a body of one link is moved by a wrench at that point; times the sign, as are both.
+ContactSolver::Screw ContactSolver::answer(const Side& side, const Screw& wrench) const {
+  const Mobility& mobility = mobilities_[side.body];
+  const Vec3 turn = mobility.angular * (wrench.about + cross(side.arm, wrench.along));
+  return {mobility.linear * wrench.along, turn};
+}
+
+void ContactSolver::add_single(Row& row, int link, double sign, Vec3 centroid) {
+  const int number = bodies_.body_of(link);
+  const Multibodies::Body& body = bodies_.bodies()[number];
+  const Side side{number, body.first_coordinate, 6, body.movable, true, sign, centroid - bodies_.centre(link), 0, 0};
+  const Vec3 normal = row.normal;
+  if (side.moves) {
+    const std::array<Screw, 6> wrenches{
+        {{normal, {}}, {{}, row.along}, {{}, row.across}, {row.along, {}}, {row.across, {}}, {{}, normal}}};
+    for (int k = 0; k < 6; ++k) {
+      const Screw moved = answer(side, wrenches[k]);
+      const Vec3 point = moved.along + cross(moved.about, side.arm);
+      const Six slip{dot(normal, point),    dot(row.along, moved.about), dot(row.across, moved.about),
+                     dot(row.along, point), dot(row.across, point),      dot(normal, moved.about)};
+      for (int i = 0; i < 6; ++i) row.mobility[i][k] += slip[i];
+    }
+  }
+  row.sides[row.sides_used++] = side;
+}
+
 void ContactSolver::add_side(Row& row, int number, const std::vector<double>& jacobian) {
   const Multibodies::Body& body = bodies_.bodies()[number];
   const int n = body.coordinates;
-  Side side{body.first_coordinate, n, pool_.size(), 0, body.movable};
-  const auto normal = cross(row.along, row.across);
+  Side side{number, body.first_coordinate, n, body.movable, false, 1, {}, pool_.size(), 0};
   const auto along = [&](Vec3 axis, int from, int c) {
     const auto at = [&](int r) { return jacobian[size_t(from + r) * n + c]; };
     return axis.x * at(0) + axis.y * at(1) + axis.z * at(2);
   };
   const std::array<std::pair<Vec3, int>, 6> rows{
-      {{normal, 0}, {row.along, 3}, {row.across, 3}, {row.along, 0}, {row.across, 0}, {normal, 3}}};
+      {{row.normal, 0}, {row.along, 3}, {row.across, 3}, {row.along, 0}, {row.across, 0}, {row.normal, 3}}};
   for (const auto& [axis, from] : rows)
     for (int c = 0; c < n; ++c) pool_.push_back(along(axis, from, c));
   if (side.moves) {
@@ -152,6 +179,12 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
   std::vector<double> frequency2(patches_.size());
   std::vector<double> of_body(bodies_.bodies().size());
   std::vector<double> of_a, of_b;
+  mobilities_.assign(bodies_.bodies().size(), {});
+  for (size_t i = 0; i < mobilities_.size(); ++i) {
+    if (bodies_.bodies()[i].links > 1 || !bodies_.bodies()[i].movable) continue;
+    const std::span<const double> m = bodies_.inverse_mass(int(i));
+    mobilities_[i] = {m[0], {{m[21], m[22], m[23]}, {m[27], m[28], m[29]}, {m[33], m[34], m[35]}}};
+  }
   for (ElasticPatch& patch : patches_) {
     if (!(patch.area > 0)) {
       // What has no direction now is pushed where it was pushed last.
@@ -159,20 +192,30 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
       if (at != directed_.end() && at->key == patch.key) patch.normal = at->normal;
     }
     Row row{};
+    row.normal = patch.normal;
     row.along = any_orthogonal(patch.normal);
     row.across = cross(patch.normal, row.along);
     const int a = bodies_.body_of(patch.link_a), b = bodies_.body_of(patch.link_b);
-    of_a.resize(size_t(6) * bodies_.bodies()[a].coordinates);
-    of_b.resize(size_t(6) * bodies_.bodies()[b].coordinates);
-    bodies_.jacobian(patch.link_a, patch.centroid, of_a);
-    bodies_.jacobian(patch.link_b, patch.centroid, of_b);
-    for (double& each : of_b) each = -each;
+    const auto rows_of = [&](int link, double sign, std::vector<double>& rows) {
+      rows.resize(size_t(6) * bodies_.bodies()[bodies_.body_of(link)].coordinates);
+      bodies_.jacobian(link, patch.centroid, rows);
+      for (double& each : rows) each *= sign;
+    };
     if (a == b) {
+      rows_of(patch.link_a, 1, of_a);
+      rows_of(patch.link_b, -1, of_b);
       for (size_t i = 0; i < of_a.size(); ++i) of_a[i] += of_b[i];
       add_side(row, a, of_a);
     } else {
-      add_side(row, a, of_a);
-      add_side(row, b, of_b);
+      for (const auto& [link, sign] : {std::pair{patch.link_a, 1.0}, std::pair{patch.link_b, -1.0}}) {
+        const int body = bodies_.body_of(link);
+        if (bodies_.bodies()[body].links == 1) {
+          add_single(row, link, sign, patch.centroid);
+        } else {
+          rows_of(link, sign, of_a);
+          add_side(row, body, of_a);
+        }
+      }
     }
     if (patch.area > 0) {
       const Vec3 to = patch.centre - patch.centroid, m1 = patch.moments * row.along, m2 = patch.moments * row.across;
@@ -202,10 +245,17 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
 
 ContactSolver::Six ContactSolver::slip_of(const Row& row, std::span<const double> velocity) const {
   Six slip{};
+  Screw single{};
   for (int s = 0; s < row.sides_used; ++s) {
     const Side& side = row.sides[s];
-    const double* rows = &pool_[side.rows];
     const double* v = &velocity[side.first];
+    if (side.single) {
+      const Vec3 about{v[3], v[4], v[5]};
+      single.along += side.sign * (Vec3{v[0], v[1], v[2]} + cross(about, side.arm));
+      single.about += side.sign * about;
+      continue;
+    }
+    const double* rows = &pool_[side.rows];
     const int n = side.coordinates;
     for (int i = 0; i < 6; ++i) {
       double sum = 0;
@@ -213,15 +263,26 @@ ContactSolver::Six ContactSolver::slip_of(const Row& row, std::span<const double
       slip[i] += sum;
     }
   }
+  slip[0] += dot(row.normal, single.along), slip[1] += dot(row.along, single.about);
+  slip[2] += dot(row.across, single.about), slip[3] += dot(row.along, single.along);
+  slip[4] += dot(row.across, single.along), slip[5] += dot(row.normal, single.about);
   return slip;
 }
 
 void ContactSolver::push(const Row& row, const Six& wrench, double factor, std::span<double> velocity) const {
+  const Screw whole{factor * (wrench[0] * row.normal + wrench[3] * row.along + wrench[4] * row.across),
+                    factor * (wrench[1] * row.along + wrench[2] * row.across + wrench[5] * row.normal)};
   for (int s = 0; s < row.sides_used; ++s) {
     const Side& side = row.sides[s];
     if (!side.moves) continue;
-    const double* answers = &pool_[side.answers];
     double* v = &velocity[side.first];
+    if (side.single) {
+      const Screw moved = answer(side, whole);
+      v[0] += side.sign * moved.along.x, v[1] += side.sign * moved.along.y, v[2] += side.sign * moved.along.z;
+      v[3] += side.sign * moved.about.x, v[4] += side.sign * moved.about.y, v[5] += side.sign * moved.about.z;
+      continue;
+    }
+    const double* answers = &pool_[side.answers];
     for (int c = 0; c < side.coordinates; ++c) {
       double sum = 0;
       for (int k = 0; k < 6; ++k) sum += answers[c * 6 + k] * wrench[k];
@@ -283,7 +344,7 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
         for (int p = 0; p < kPoints; ++p) {
           const double x = a * kNodes[p / kSide], y = b * kNodes[p % kSide];
           const double du = c * x - s * y, dv = s * x + c * y, share = kWeights[p / kSide] * kWeights[p % kSide];
-          law.points.push_back({du, dv, share, {}});
+          law.points.push_back({du, dv, share, {}, 0});
           reach += share * std::hypot(law.u + du, law.v + dv);
         }
         // As far from the centroid as the area is in the mean, so that what resists a spin is right.
@@ -358,7 +419,7 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
         const Three tangential{slip[3], slip[4], slip[5]};
         Three free{along(tangential, 0), along(tangential, 1), 0};
         for (int r = 0; r < 2; ++r) free[r] -= grip[r][0] * p.force[0] + grip[r][1] * p.force[1];
-        const Three force = opposing(grip, free, limit * p.share);
+        const Three force = opposing(grip, free, limit * p.share, p.shift);
         const double du = force[0] - p.force[0], dv = force[1] - p.force[1];
         p.force = {force[0], force[1]};
         for (int r = 0; r < 3; ++r) slip[r + 3] += of_u[r] * du + of_v[r] * dv;
@@ -371,7 +432,7 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
       Three free{slip[3], slip[4], d * slip[5]};
       for (int r = 0; r < 3; ++r)
         for (int k = 0; k < 3; ++k) free[r] -= law.grip[r][k] * had[k];
-      const Three force = opposing(law.grip, free, limit);
+      const Three force = opposing(law.grip, free, limit, law.shift);
       add(3, {force[0], force[1], d * force[2]});
     }
     push(row, change, h, velocity);

@@ -69,18 +69,26 @@ class ContactSolver {
   using Six = std::array<double, 6>;
   using Block = std::array<Six, 6>;
 
-  /// The velocity of a over b by the coordinates of one body, and what a wrench does to these.
+  /// The part of one body in the velocity of a over b, and what a wrench does to its coordinates.
   struct Side {
-    int first, coordinates;
-    size_t rows;     ///< in `pool_`: 6 rows of so many
-    size_t answers;  ///< in `pool_`: so many rows of 6; none of what does not move
+    int body, first, coordinates;
     bool moves;
+    bool single;     ///< a body of one link, for which the next two suffice; what follows them is of others
+    double sign;     ///< 1 of a, -1 of b
+    Vec3 arm;        ///< m, from its centre of mass to the centroid
+    size_t rows;     ///< in `pool_`: 6 rows of so many coordinates
+    size_t answers;  ///< in `pool_`: so many rows of 6; none of what does not move
+  };
+
+  /// A force or a velocity, with the torque or the angular velocity about the same point.
+  struct Screw {
+    Vec3 along, about;
   };
 
   /// Everything in the frame of the patch: along the normal, then about two axes in the plane, then along these, then
   /// about the normal.
   struct Row {
-    Vec3 along, across;  ///< in the plane
+    Vec3 normal, along, across;  ///< unit, the latter two in the plane
     std::array<Side, 2> sides;
     int sides_used;
     Block mobility;
@@ -89,7 +97,15 @@ class ContactSolver {
 
   struct Law;
 
+  /// Of a body of one link.
+  struct Mobility {
+    double linear = 0;  ///< 1/kg
+    Mat3 angular;       ///< 1/(kg m²), in the world
+  };
+
+  void add_single(Row& row, int link, double sign, Vec3 centroid);
   void add_side(Row& row, int body, const std::vector<double>& rows);
+  Screw answer(const Side& side, const Screw& wrench) const;
   Six slip_of(const Row& row, std::span<const double> velocity) const;
   void push(const Row& row, const Six& wrench, double factor, std::span<double> velocity) const;
 
@@ -103,6 +119,7 @@ class ContactSolver {
   std::vector<ElasticPatch> patches_;
   std::vector<Row> rows_;
   std::vector<double> pool_;
+  std::vector<Mobility> mobilities_;  ///< per body
   /// Of the last solution, sorted by key: forces and torques in the world.
   std::vector<std::int64_t> known_;
   std::vector<std::array<Vec3, 2>> wrenches_;

@@ -33,24 +33,24 @@ double square(const Three& v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; 
 
 }  // namespace
 
-Three opposing(const ThreeByThree& mobility, const Three& slip, double limit) {
+Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, double& shift) {
   if (!(limit > 0) || square(slip) == 0) return {};
   // The force is -(mobility + shift)⁻¹ slip: what is left of the slip is then -shift times the force. Newton's method
-  // on the inverse of its size comes to the shift from below (Moré and Sorensen 1983).
-  double shift = 0;
+  // on the inverse of its size finds the shift, if any (Moré and Sorensen 1983).
+  constexpr double kClose = 1e-12;
   Three force{};
+  double size = 0;
   for (int step = 0; step < 50; ++step) {
     const Factor factor(mobility, shift);
-    const Three half = factor.lower(slip);
-    force = factor.upper(half);
-    const double size = std::sqrt(square(force));
-    if (size <= limit * (1 + 1e-14)) break;
+    force = factor.upper(factor.lower(slip));
+    size = std::sqrt(square(force));
+    if (std::abs(size - limit) <= kClose * limit || (shift == 0 && size <= limit)) break;
     const double slope = square(factor.lower(force));
-    const double more = size * size / slope * (size - limit) / limit;
-    if (!(shift + more > shift)) break;
-    shift += more;
+    const double next = std::max(0.0, shift + size * size / slope * (size - limit) / limit);
+    if (next == shift) break;
+    shift = next;
   }
-  const double size = std::sqrt(square(force)), factor = size > limit ? -limit / size : -1;
+  const double factor = size > limit ? -limit / size : -1;
   return {factor * force[0], factor * force[1], factor * force[2]};
 }
 

@@ -154,7 +154,7 @@ class VolumetricContact:
         try:
             while left > 1e-9 * duration:
                 if taken:
-                    self.bodies.update()
+                    self.bodies.follow()
                 frequency2 = self._place()
                 if planned:
                     length = duration / planned
