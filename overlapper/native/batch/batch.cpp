@@ -13,6 +13,7 @@
 #include "distance/gjk.h"
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
+#include "methods/closed_forms.h"
 #include "shapes/planes_asked.h"
 
 namespace overlapper {
@@ -158,9 +159,14 @@ const Overlaps::Patches& Overlaps::patches() const {
     const auto patch_of_row = [&](size_t row) {
       if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) return PatchSums({}, {}).patch();
       const Way by = static_cast<Way>(way[row]);
+      std::optional<Patch> patch;
       if (by == Way::kClipping || by == Way::kWideClipping)
-        if (const auto clipped = clipped_patch(placed(pairs[row][0]), placed(pairs[row][1]))) return *clipped;
-      return overlap(row)->patch();
+        patch = clipped_patch(placed(pairs[row][0]), placed(pairs[row][1]));
+      if (by == Way::kClosedForm) {
+        const std::array<double, 6>& pull = gradient[row][1];
+        patch = section_patch(placed(pairs[row][0]), placed(pairs[row][1]), centroid[row], {pull[0], pull[1], pull[2]});
+      }
+      return patch ? *patch : overlap(row)->patch();
     };
     for (size_t row = 0; row < size(); ++row) {
       const Patch patch = patch_of_row(row);

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "geometry/measures.h"
+#include "geometry/patch.h"
 #include "shapes/shape.h"
 
 namespace overlapper {
@@ -22,5 +23,9 @@ namespace overlapper {
 /// Nothing for every other pair. Bodies relative to `reference`, in any order; `rounding` is how far a surface may be
 /// off, in m.
 std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference);
+
+/// The patch of a half-space and a ball, a capsule or a cylinder that overlap: the section of that by the plane.
+/// Nothing for every other pair. `centroid` and `area` are those of the patch.
+std::optional<Patch> section_patch(const Placed& a, const Placed& b, Vec3 centroid, Vec3 area);
 
 }  // namespace overlapper

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "methods/clipping/clip.h"
+#include "methods/closed_forms.h"
 #include "methods/paper.h"
 #include "methods/tracing/trace.h"
 
@@ -115,9 +116,12 @@ Patch Overlap::patch_of_overlap() const {
   if (status_ != Status::kOverlapping) return PatchSums({}, {}).patch();
   std::optional<Patch> exact;
   if (way() == Way::kClipping || way() == Way::kWideClipping) exact = clipped_patch(two_[0], two_[1]);
-  if (way() == Way::kClosedForm || way() == Way::kSlicing) exact = sliced_patch(overlapping_bodies(), measures());
+  const Vec3 area = Vec3{} + measures().pulls[1].force;
+  if (way() == Way::kClosedForm) exact = section_patch(two_[0], two_[1], centroid(), area);
+  if (!exact && (way() == Way::kClosedForm || way() == Way::kSlicing))
+    exact = sliced_patch(overlapping_bodies(), measures());
   Patch patch = exact ? *exact : patch_of(drawn(), centroid());
-  patch.area = Vec3{} + measures().pulls[1].force;
+  patch.area = area;
   return patch;
 }
 

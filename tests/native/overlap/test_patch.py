@@ -168,6 +168,32 @@ def test_mean_distances_are_those_of_points_of_the_floor_inside_the_body(body):
             points = grid[inside(grid @ rotation(turned))][:, :2]
             truth = np.linalg.norm(points - centroid, axis=1).mean()
             assert answer.patch_distance == pytest.approx(truth, rel=off)
+            spread = np.cov(points.T, bias=True) * np.linalg.norm(answer.patch_area)
+            assert_allclose(answer.patch_moments[:2, :2], spread, atol=5e-3 * np.trace(spread))
+            assert_allclose(answer.patch_centre[:2] - [1, 2], points.mean(axis=0), atol=2e-3)
+            swapped = overlap(FLOOR, Placed(shape, (1, 2, height), turned))
+            assert_allclose(swapped.patch_moments, answer.patch_moments, atol=1e-14)
+            assert swapped.patch_distance == pytest.approx(answer.patch_distance, abs=1e-14)
+
+
+@pytest.mark.parametrize("depth", [1e-2, 1e-5, 1e-8])
+def test_the_patch_of_a_tilted_capsule_on_the_floor_is_a_disc_however_shallow(depth):
+    tilt = (0, np.sin(0.3), 0, np.cos(0.3))
+    answer = overlap(Placed(Capsule(0.3, 0.8), (0, 0, 0.3 - depth + 0.4 * np.cos(0.6)), tilt), FLOOR)
+    area, moments = disc(np.sqrt(depth * (0.6 - depth)), (0, 0, 1))
+    assert answer.way == "closed form"
+    assert_allclose(answer.patch_moments, moments, atol=1e-7 * np.trace(moments))
+    assert answer.patch_distance == pytest.approx(2 / 3 * np.sqrt(area[2] / np.pi), rel=1e-7)
+    assert_allclose(answer.patch_centre[:2], [-0.4 * np.sin(0.6), 0], atol=1e-12)
+
+
+def test_round_bodies_under_the_floor_have_no_patch():
+    for shape in (Sphere(0.5), Capsule(0.3, 0.8), Cylinder(0.4, 0.9)):
+        for turned in ((0, 0, 0, 1), TO_X, (0.1, 0.2, 0.3, 1)):
+            answer = overlap(Placed(shape, (0, 0, -2), turned), FLOOR)
+            assert answer.volume == pytest.approx(shape.volume)
+            assert not answer.patch_area.any()
+            assert answer.patch_distance is None
 
 
 def second_moments(answer, about):
