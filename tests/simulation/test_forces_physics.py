@@ -1,0 +1,134 @@
+"""Volumetric contact beside textbooks: each experiment beside the formula that foretells it."""
+
+import math
+
+import contact_experiments as experiments
+import pytest
+from contact_experiments import FRICTION, STEP, G
+from scipy.optimize import brentq
+
+# One substep is asked where more would be needed, to see what is left of the law.
+pytestmark = pytest.mark.filterwarnings("ignore::overlapper.simulation.forces.contact.SubstepsWarning")
+
+
+@pytest.mark.parametrize("stiffness", [1e7, 1e8])
+def test_the_cube_of_drake_22213_comes_to_rest(stiffness):
+    seen = experiments.rattle(stiffness=stiffness)
+    assert seen["speed"][-1] < 1e-9 and seen["spin"][-1] < 1e-9 and seen["tilt"][-1] < 1e-9
+    assert seen["depth"][-1] / (G / (stiffness * 0.01)) == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("pose", "substeps", "most"), [("face", 16, 1e-3), ("edge", 20, 1e-6), ("corner", 16, 1e-6), ("skew", 16, 1e-3)]
+)
+def test_a_bounce_keeps_the_energy(pose, substeps, most):
+    assert experiments.bounce(pose, substeps) < most
+
+
+def test_what_a_bounce_on_a_face_loses_at_the_kink_is_of_second_order():
+    coarse, fine = (experiments.bounce("face", substeps, phases=7) for substeps in (4, 16))
+    assert fine < coarse / 8
+
+
+@pytest.mark.parametrize("substeps", [1, 4, 20])
+def test_a_box_stops_after_the_way_that_friction_takes(substeps):
+    assert experiments.slide(substeps) == pytest.approx(1, abs=1e-4)
+
+
+@pytest.mark.parametrize("substeps", [1, "auto"])
+def test_what_lies_on_an_incline_below_the_angle_of_friction_does_not_creep(substeps):
+    acceleration, way = experiments.incline(0.999, substeps=substeps)
+    assert abs(acceleration) < 1e-9 and abs(way) < 1e-9
+
+
+@pytest.mark.parametrize("substeps", [1, "auto"])
+def test_what_lies_on_an_incline_above_the_angle_of_friction_slides_as_it_should(substeps):
+    angle = math.atan(1.001 * FRICTION)
+    acceleration, way = experiments.incline(1.001, substeps=substeps)
+    assert acceleration == pytest.approx(G * (math.sin(angle) - FRICTION * math.cos(angle)), rel=1e-3) and way > 0
+
+
+@pytest.mark.parametrize("friction", [None, "distributed"])
+@pytest.mark.parametrize("shape", ["box", "disc"])
+@pytest.mark.parametrize("substeps", [1, 4])
+def test_a_spin_ends_when_the_mean_distance_says(shape, substeps, friction):
+    stopped, foretold = experiments.spin(shape, substeps, friction=friction)
+    assert abs(stopped - foretold) < STEP / substeps + (1e-3 if friction is None else 1e-2) * foretold
+
+
+@pytest.mark.parametrize("shape", ["box", "disc"])
+def test_slip_and_spin_at_once_are_as_of_a_rigid_base_if_friction_is_distributed(shape):
+    rigid = experiments.rigid_slide_and_spin(shape)
+    ours = experiments.slide_and_spin(shape, friction="distributed")
+    assert ours.way == pytest.approx(rigid.way, rel=0.005)
+    assert ours.angle == pytest.approx(rigid.angle, rel=0.015)
+    assert ours.time == pytest.approx(rigid.time, rel=0.01)
+
+
+def test_slip_and_spin_at_once_fall_short_by_a_twentieth_if_friction_is_not_distributed():
+    rigid, ours = experiments.rigid_slide_and_spin("box"), experiments.slide_and_spin("box")
+    assert ours.way / rigid.way == pytest.approx(0.95, abs=0.01)
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "ball"])
+@pytest.mark.parametrize("stiffness", [1e7, 1e9])
+def test_what_rolls_keeps_its_energy_without_dissipation(shape, stiffness):
+    v0, _, e0, e1 = experiments.roll(shape, stiffness=stiffness, substeps=4)
+    assert v0 > 0.9 and abs(e1 / e0 - 1) < 1e-9
+
+
+@pytest.mark.parametrize(("shape", "factor"), [("cylinder", 2 / 3), ("ball", 5 / 7)])
+@pytest.mark.parametrize("stiffness", [1e7, 1e8])
+def test_dissipation_slows_what_rolls_whatever_the_stiffness(shape, factor, stiffness):
+    """The front of a patch comes down and its back goes up: by their velocities w x pressures resist with the torque
+
+    k tau w int x² dA. Of a cylinder or a ball that has sunk in by little, int x² dA = V r, and it is tau w N r; that
+    slows the mass and what of its inertia turns: (1 + I / m r²) dv/dt = -tau g v / r.
+    """
+    tau, r, seconds = 1e-3, experiments.HALF, 1.0
+    v0, v1, _, _ = experiments.roll(shape, stiffness=stiffness, substeps=4, dissipation=tau, seconds=seconds)
+    decay = math.log(v0 / v1) / seconds
+    assert decay / (factor * tau * G / r) == pytest.approx(1, abs=0.02)
+    # Of the depth as it is: friction acts at the centroid of what is shared, which is nearer to the axis.
+    if shape == "cylinder":
+        moment = r**2 / 2
+        depth = brentq(lambda d: 0.1 * (r**2 * math.acos(1 - d / r) - (r - d) * _half(r, d)) - G / stiffness, 0, r / 2)
+        second, centroid = 2 / 3 * _half(r, depth) ** 3 * 0.1, 2 / 5 * depth
+    else:
+        moment = r**2 * 2 / 5
+        depth = brentq(lambda d: math.pi * d**2 * (r - d / 3) - G / stiffness, 0, r / 2)
+        second, centroid = math.pi / 4 * _half(r, depth) ** 4, depth / 3
+    arm = r - depth + centroid
+    assert decay == pytest.approx(stiffness * tau * second / (arm**2 + moment), rel=1e-3)
+
+
+def _half(r, depth):
+    """The half breadth of the patch of a cylinder or a ball."""
+    return math.sqrt(depth * (2 * r - depth))
+
+
+@pytest.mark.parametrize("angle", [0, math.pi / 4, math.pi / 3])
+def test_simbenchmarks_balls_roll_on_the_box_that_is_pushed_in_any_direction(angle):
+    box, balls = experiments.simbenchmark(angle)
+    along, across = [math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]
+    assert [box @ along, balls @ along] == pytest.approx([1, 1], rel=0.01)
+    assert [box @ across, balls @ across] == pytest.approx([0, 0], abs=1e-3)
+
+
+@pytest.mark.parametrize("substeps", [1, "auto"])
+def test_a_box_that_is_gripped_hard_enough_does_not_creep(substeps):
+    held = experiments.grip(1.01, substeps=substeps)
+    assert held.pressing == pytest.approx([10, 10], rel=1e-6)
+    assert abs(held.fallen) < 1e-9 and abs(held.speed) < 1e-9
+
+
+@pytest.mark.parametrize("substeps", [1, "auto"])
+def test_a_box_that_is_not_gripped_hard_enough_slips(substeps):
+    held = experiments.grip(0.99, substeps=substeps)
+    assert held.acceleration == pytest.approx(-0.01 * G, rel=0.01)
+    assert held.fallen < -0.01
+
+
+def test_a_stack_of_five_stands():
+    drift, speed = experiments.stack()
+    assert drift < 1e-5 and speed < 1e-4
