@@ -5,29 +5,13 @@
 #include <span>
 #include <vector>
 
+#include "forces/elastic_patch.h"
+#include "forces/friction.h"
 #include "forces/multibody.h"
+#include "forces/three.h"
 #include "geometry/vec.h"
 
 namespace overlapper {
-
-/// What two links share, as an elastic foundation: a pressure of `stiffness` times the depth.
-struct ElasticPatch {
-  std::int64_t key = 0;  ///< the same in the next step, so that its solution begins with that of this one
-  int link_a = 0, link_b = 0;
-  Vec3 normal;               ///< unit, from b to a
-  Vec3 centroid;             ///< m, of the volume: what the force at rest goes through
-  double force = 0;          ///< N, at rest
-  double stiffness = 0;      ///< Pa/m
-  double dissipation = 0;    ///< s
-  double friction = 0;       ///< coefficient of
-  double area = 0;           ///< m², 0 of what has no direction: its force does not change with the depth
-  Vec3 centre;               ///< m, of that area
-  Mat3 moments{{}, {}, {}};  ///< m⁴, of that area about its centre
-  double distance = 0;       ///< m, mean, of that area's points from the centroid
-};
-
-/// How friction resists: by one law for the slip and the spin of a patch, or at points that are spread over it.
-enum class Friction { kEllipsoid, kDistributed };
 
 struct PatchForce {
   Vec3 force, torque;  ///< N and N m, on a, about the centroid of the volume; on b the opposite
@@ -66,8 +50,16 @@ class ContactSolver {
   Solution solve(const Step& step);
 
  private:
-  using Six = std::array<double, 6>;
-  using Block = std::array<Six, 6>;
+  /// A force or a velocity, with the torque or the angular velocity about the same point, in the world.
+  struct Screw {
+    Vec3 along, about;
+  };
+
+  /// The same in the frame of a patch: of pressures, along the normal and about two axes in the plane, and of friction,
+  /// along these and about the normal.
+  struct Six {
+    Three normal{}, tangential{};
+  };
 
   /// The part of one body in the velocity of a over b, and what a wrench does to its coordinates.
   struct Side {
@@ -80,22 +72,19 @@ class ContactSolver {
     size_t answers;  ///< in `pool_`: so many rows of 6; none of what does not move
   };
 
-  /// A force or a velocity, with the torque or the angular velocity about the same point.
-  struct Screw {
-    Vec3 along, about;
-  };
-
-  /// Everything in the frame of the patch: along the normal, then about two axes in the plane, then along these, then
-  /// about the normal.
   struct Row {
-    Vec3 normal, along, across;  ///< unit, the latter two in the plane
-    std::array<Side, 2> sides;
-    int sides_used;
-    Block mobility;
-    std::array<std::array<double, 3>, 3> foundation;
-  };
+    Row(const ElasticPatch& patch);
 
-  struct Law;
+    Screw world(const Six& of) const;
+    Six local(const Screw& of) const;
+
+    Vec3 normal, along, across;  ///< unit, the latter two in the plane
+    PlaneArea area;
+    std::array<Side, 2> sides{};
+    int sides_used = 0;
+    /// What wrenches do to the slip in 1 s: the normal part to the normal part, and so on.
+    ThreeByThree normal_by_normal{}, normal_by_tangential{}, tangential_by_normal{}, tangential_by_tangential{};
+  };
 
   /// Of a body of one link.
   struct Mobility {
@@ -103,26 +92,34 @@ class ContactSolver {
     Mat3 angular;       ///< 1/(kg m²), in the world
   };
 
+  /// The laws of a patch in a step, and its wrench as it is so far.
+  struct Laws;
+
+  void add_sides(Row& row, const ElasticPatch& patch);
   void add_single(Row& row, int link, double sign, Vec3 centroid);
-  void add_side(Row& row, int body, const std::vector<double>& rows);
+  void add_side(Row& row, int body, std::span<const double> jacobian);
   Screw answer(const Side& side, const Screw& wrench) const;
   Six slip_of(const Row& row, std::span<const double> velocity) const;
   void push(const Row& row, const Six& wrench, double factor, std::span<double> velocity) const;
+  Six known_wrench(size_t patch) const;
+  double visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const;
+  Solution solved(std::span<const Laws> laws, std::span<const double> velocity) const;
+  void remember(const Solution& solution);
 
-  struct Directed {
+  /// What is left of a patch for the next step.
+  struct Known {
     std::int64_t key;
     Vec3 normal;
+    Screw wrench;
   };
+  const Known* known(std::int64_t key) const;
 
   Multibodies bodies_;
-  std::vector<Directed> directed_;  ///< the patches of the last step, sorted
   std::vector<ElasticPatch> patches_;
   std::vector<Row> rows_;
   std::vector<double> pool_;
   std::vector<Mobility> mobilities_;  ///< per body
-  /// Of the last solution, sorted by key: forces and torques in the world.
-  std::vector<std::int64_t> known_;
-  std::vector<std::array<Vec3, 2>> wrenches_;
+  std::vector<Known> known_;          ///< of the last step, sorted by key
 };
 
 }  // namespace overlapper

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+
+#include "forces/three.h"
+#include "geometry/vec.h"
+
+namespace overlapper {
+
+/// What two links share, as an elastic foundation (Winkler): a pressure of `stiffness` times the depth.
+struct ElasticPatch {
+  std::int64_t key = 0;  ///< the same in the next step, so that its solution begins with that of this one
+  int link_a = 0, link_b = 0;
+  Vec3 normal;               ///< unit, from b to a
+  Vec3 centroid;             ///< m, of the volume: what the force at rest goes through
+  double force = 0;          ///< N, at rest
+  double stiffness = 0;      ///< Pa/m
+  double dissipation = 0;    ///< s
+  double friction = 0;       ///< coefficient of
+  double area = 0;           ///< m², 0 of what has no direction: its force does not change with the depth
+  Vec3 centre;               ///< m, of that area
+  Mat3 moments{{}, {}, {}};  ///< m⁴, of that area about its centre
+  double distance = 0;       ///< m, mean, of that area's points from the centroid
+};
+
+/// The area of a patch in its plane, by two axes through the centroid of the volume.
+struct PlaneArea {
+  PlaneArea(const ElasticPatch& patch, Vec3 along, Vec3 across);
+
+  double area;        ///< m²
+  double u, v;        ///< m: its centre
+  double uu, uv, vv;  ///< m²: of its points, mean products of what they are off the centre
+  double distance;    ///< m: of its points, the mean distance from the centroid
+
+  /// N/m, N and N m: what a foundation of that stiffness answers to a motion along the normal and about both axes.
+  ThreeByThree foundation(double stiffness) const;
+};
+
+}  // namespace overlapper

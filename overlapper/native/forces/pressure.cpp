@@ -1,0 +1,69 @@
+#include "forces/pressure.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace overlapper {
+namespace {
+
+/// The centre of pressure stays within this many squared radii of gyration: the half width of a rectangle.
+constexpr double kReach2 = 3;
+
+/// The part of the step by which velocities are ahead of pressures.
+double ahead(Rule rule) { return rule == Rule::kKeeping ? 0.25 : 1; }
+
+}  // namespace
+
+PlaneArea::PlaneArea(const ElasticPatch& patch, Vec3 along, Vec3 across) : area(patch.area), distance(patch.distance) {
+  if (!(area > 0)) {
+    area = u = v = uu = uv = vv = distance = 0;
+    return;
+  }
+  const Vec3 to = patch.centre - patch.centroid, mu = patch.moments * along, mv = patch.moments * across;
+  u = overlapper::dot(to, along), v = overlapper::dot(to, across);
+  uu = overlapper::dot(along, mu) / area, uv = overlapper::dot(along, mv) / area;
+  vv = overlapper::dot(across, mv) / area;
+}
+
+ThreeByThree PlaneArea::foundation(double stiffness) const {
+  // A point at (u, v) moves along the normal by 1, by v about the first axis, and by -u about the second.
+  const double k = stiffness * area;
+  return {{{k, k * v, -k * u},
+           {k * v, k * (vv + v * v), -k * (uv + u * v)},
+           {-k * u, -k * (uv + u * v), k * (uu + u * u)}}};
+}
+
+Pressure::Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, const Three& before,
+                   double duration, Rule rule)
+    : area_(area), mobility_(mobility), duration_(duration) {
+  const ThreeByThree foundation = area.foundation(patch.stiffness);
+  const double lead = ahead(rule) * duration;
+  response_ = (lead + patch.dissipation) * foundation;
+  // Backward Euler is of the velocity at the end, the other rule of how it changes.
+  const Three known = (rule == Rule::kKeeping ? lead : 0) * (foundation * before);
+  rest_ = Three{patch.force, 0, 0} + known;
+  ThreeByThree matrix = duration * (response_ * mobility);
+  for (int i = 0; i < 3; ++i) matrix[i][i] += 1;
+  implicit_ = inverse(matrix);
+  // A line has one radius of gyration alone.
+  const double least = 1e-9 * (area.uu + area.vv), uu = area.uu + least, vv = area.vv + least, uv = area.uv;
+  const double square = uu * vv - uv * uv;
+  in_radii_ = {vv / square, -uv / square, uu / square};
+}
+
+Three Pressure::answer(const Three& slip) const {
+  const Three target = rest_ - response_ * slip;
+  const Three asked = implicit_ * target;
+  const double force = asked[0];
+  if (!(force > 0)) return {};
+  if (!(area_.area > 0)) return {force, 0, 0};
+  const double x = -asked[2] / force - area_.u, y = asked[1] / force - area_.v;
+  const double far = in_radii_[0] * x * x + 2 * in_radii_[1] * x * y + in_radii_[2] * y * y;
+  if (!(far > kReach2)) return asked;
+  const double back = std::sqrt(kReach2 / far);
+  const Three per_force{1, area_.v + back * y, -(area_.u + back * x)};
+  const double moved = overlapper::dot(response_[0], mobility_ * per_force);
+  return std::max(0.0, target[0] / (1 + duration_ * moved)) * per_force;
+}
+
+}  // namespace overlapper

@@ -1,0 +1,31 @@
+#pragma once
+
+#include "forces/elastic_patch.h"
+#include "forces/three.h"
+
+namespace overlapper {
+
+/// How pressures follow the depth within a step: kKeeping keeps the energy of a swing and is stable whatever the step,
+/// kDamping is backward Euler.
+enum class Rule { kKeeping, kDamping };
+
+/// The pressures of a patch in a step: their force along the normal and their torques about two axes in the plane,
+/// through the centroid of the volume.
+class Pressure {
+ public:
+  /// `before` is the slip at the beginning of the step, `mobility` what a force and torques do to the slip in 1 s.
+  Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, const Three& before,
+           double duration, Rule rule);
+
+  /// Of the slip at the end of the step without these pressures. They only push, and their centre stays on the area.
+  Three answer(const Three& slip) const;
+
+ private:
+  PlaneArea area_;
+  ThreeByThree mobility_, response_, implicit_;
+  Three rest_;
+  Three in_radii_;  ///< by u², uv and v²: a squared distance from the centre, in radii of gyration
+  double duration_;
+};
+
+}  // namespace overlapper

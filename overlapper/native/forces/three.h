@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+
+namespace overlapper {
+
+/// Forces and velocities of a patch are threes: along its normal and about two axes in its plane, or along these axes
+/// and about the normal.
+using Three = std::array<double, 3>;
+using ThreeByThree = std::array<Three, 3>;
+
+inline Three operator+(const Three& a, const Three& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+inline Three operator-(const Three& a, const Three& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+inline Three operator*(double s, const Three& a) { return {s * a[0], s * a[1], s * a[2]}; }
+inline double dot(const Three& a, const Three& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+inline Three operator*(const ThreeByThree& m, const Three& v) { return {dot(m[0], v), dot(m[1], v), dot(m[2], v)}; }
+
+inline ThreeByThree operator*(const ThreeByThree& a, const ThreeByThree& b) {
+  ThreeByThree product{};
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k)
+      for (int j = 0; j < 3; ++j) product[i][j] += a[i][k] * b[k][j];
+  return product;
+}
+
+inline ThreeByThree operator*(double s, const ThreeByThree& m) { return {s * m[0], s * m[1], s * m[2]}; }
+
+/// Of a matrix that has one.
+ThreeByThree inverse(const ThreeByThree& m);
+
+/// Of the product of two symmetric matrices without negative eigenvalues.
+double largest_eigenvalue(const ThreeByThree& a, const ThreeByThree& b);
+
+}  // namespace overlapper
