@@ -113,6 +113,7 @@ class VolumetricContact:
         self._response = Response(bodies.physicsClientId)
         self._commands = bodies.recorder.commands if bodies.recorder else Commands(bodies.physicsClientId)
         self._inside = False
+        self._seen: dict[int, object] = {}  # the bodies of which Bullet's response is off
         self._after: Array | None = None  # the velocity that the last step left
         self._warned: set[tuple[str, Link, Link]] = set()
         self._model()
@@ -125,7 +126,8 @@ class VolumetricContact:
 
     def __enter__(self) -> VolumetricContact:
         self._inside = True
-        self._response.turn_off(self.bodies.link_pairs(self._among))
+        self._seen.clear()
+        self._turn_off()
         if not self.bodies.recorder:
             listen(self._commands.hear)
         return self
@@ -136,7 +138,7 @@ class VolumetricContact:
         if not self.bodies.recorder:
             unlisten(self._commands.hear)
         if pybullet.isConnected(client):
-            self._response.turn_on()
+            self._response.turn_on(self.bodies.recorder)
             self._commands.prepare(pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"], first=True)
 
     def step(self) -> None:
@@ -238,9 +240,12 @@ class VolumetricContact:
         if self._keys is not self.bodies.keys:
             self._model()
             if self._inside:
-                self._response.turn_off(self.bodies.link_pairs(self._among))
+                self._turn_off()
         elif self._dynamics.read():
             self._forget()
+
+    def _turn_off(self) -> None:
+        self._response.turn_off(self.bodies.link_pairs(self._among), self.bodies.read_anew(self._seen))
 
     def _model(self) -> None:
         """Read the masses and joints of the bodies that there are."""

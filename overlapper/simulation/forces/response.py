@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 from overlapper.simulation.calls import unheard
-from overlapper.simulation.recorder import Link
+from overlapper.simulation.recorder import Link, Recorder
 
 
 class Response:
@@ -17,20 +17,22 @@ class Response:
 
     def __init__(self, client: int) -> None:
         self._client = client
-        self._off: dict[tuple[Link, Link], None] = {}
+        self._off: set[tuple[Link, Link]] = set()
 
-    def turn_off(self, pairs: Iterable[tuple[Link, Link]]) -> None:
-        """Of those pairs, too."""
+    def turn_off(self, pairs: Iterable[tuple[Link, Link]], new: Container[int]) -> None:
+        """Of those pairs, too; `new` bodies may have the id of one that is gone, of whose pairs Bullet knows."""
         for pair in pairs:
-            if pair not in self._off:
+            if pair not in self._off or pair[0][0] in new or pair[1][0] in new:
                 self._set(pair, 0)
-                self._off[pair] = None
+                self._off.add(pair)
 
-    def turn_on(self) -> None:
-        """Of all pairs of which it is off."""
-        for pair in self._off:
-            self._set(pair, 1)
-        self._off = {}
+    def turn_on(self, recorder: Recorder | None) -> None:
+        """Of all pairs of which it is off, but for those that a script has filtered itself, as a recorder has heard."""
+        filters = recorder.pair_filters if recorder else {}
+        for pair in sorted(self._off):
+            if filters.get(pair, True):
+                self._set(pair, 1)
+        self._off.clear()
 
     def _set(self, pair: tuple[Link, Link], enabled: int) -> None:
         (a, link_a), (b, link_b) = pair
