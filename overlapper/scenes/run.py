@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Container, Generator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
-from overlapper.scenes.scene import Scene, SceneError, Step, broken
+from overlapper.scenes.scene import ContactModel, Scene, SceneError, Step, broken
 from overlapper.scenes.still import Still
-from overlapper.simulation import Among, Bodies, Concave, Recorder, Surface
+from overlapper.simulation import Among, Bodies, Concave, Forces, Recorder, Surface, VolumetricContact
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.extraction.naming import named
 from overlapper.simulation.extraction.saved_scene import NotSaved
@@ -22,17 +23,20 @@ Shown = TypeVar("Shown", bound="Bodies | Still", covariant=True)
 class Frame(Generic[Shown]):
     """The bodies and what they share after `step` steps, `time` seconds into the simulation.
 
-    Of a run, `bodies` is the same object in every frame; of what was recorded or is kept, a Still.
+    Of a run, `bodies` is the same object in every frame; of what was recorded or is kept, a Still. `forces`, with
+    volumetric contact, are those with which the next step begins, between the pairs that it pushes apart: their
+    `contacts` are of these bodies, too, but not of what is only measured.
     """
 
     step: int
     time: float
     bodies: Shown
     contacts: Contacts
+    forces: Forces | None = None
 
     def kept(self) -> Frame[Still]:
         """The same, unmoved by what the simulation does next."""
-        return Frame(self.step, self.time, self.still(), self.contacts)
+        return Frame(self.step, self.time, self.still(), self.contacts, self.forces)
 
     def still(self) -> Still:
         """The bodies apart from the simulation."""
@@ -49,16 +53,20 @@ def run(
     concave_threshold: float = 0.05,
     surface: Surface = "nominal",
     pairs: Among | None = None,
+    contact: ContactModel | None = None,
 ) -> Generator[Frame[Bodies], None, None]:
     """Build the scene in a client of its own and step it, `scene.steps` times by default.
 
     Every step is a frame, the first has number 1; or only those in `only`, if given. `tolerance` and `method` are those
     of `overlapper.overlap`, `concave`, `concave_threshold` and `surface` of `Bodies`, `pairs` of `Bodies.overlaps`, by
-    default as the scene says; a recorder hears all that it tells pybullet. SceneError if the scene itself fails.
+    default as the scene says; a recorder hears all that it tells pybullet. `contact` is what pushes bodies apart, by
+    default as the scene says: "bullet", contact points, or "volumetric", a `VolumetricContact` of what the simulator
+    lets collide. SceneError if the scene itself fails.
     """
     client = pybullet.connect(pybullet.DIRECT)
     recorder = Recorder(client)
     among = scene.pairs if pairs is None else pairs
+    stack = ExitStack()
     try:
         step = _built(scene, client)
         bodies = Bodies(
@@ -70,15 +78,24 @@ def run(
             names=scene.names,
         )
         seconds = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
+        volumetric = (
+            stack.enter_context(VolumetricContact(bodies)) if (contact or scene.contact) == "volumetric" else None
+        )
         for i in range(steps or scene.steps):
             _controlled(scene, step, i)
-            pybullet.stepSimulation(client)
+            if volumetric is not None:
+                volumetric.step()
+            else:
+                pybullet.stepSimulation(client)
             if only is None or i + 1 in only:
                 bodies.update()
-                yield Frame(i + 1, (i + 1) * seconds, bodies, bodies.overlaps(tolerance, method, pairs=among))
+                contacts = bodies.overlaps(tolerance, method, pairs=among)
+                forces = None if volumetric is None else volumetric.look()
+                yield Frame(i + 1, (i + 1) * seconds, bodies, contacts, forces)
     except NotSaved as error:
         raise SceneError(f"the scene {scene.path} cannot be read: {error}") from error
     finally:
+        stack.close()
         recorder.close()
         pybullet.disconnect(client)
 

@@ -4,8 +4,9 @@ A scene is a Python file with a docstring that says what is hard about it, `STEP
 pybullet client and may return `step(i)`, called before every stepSimulation. What `build` takes beside the client,
 `build(client, *, mass=1.0, seed=0)`, are the scene's parameters. `PAIRS`, if it is there, says which pairs
 are looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
-apart. `NAMES`, a dictionary that `build` fills, has names of bodies by their numbers, as `simulation.Bodies` takes
-them.
+apart. `CONTACT`, if it is there, says what pushes them: "bullet", as by default, or "volumetric", for
+`simulation.VolumetricContact`. `NAMES`, a dictionary that `build` fills, has names of bodies by their numbers, as
+`simulation.Bodies` takes them.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import Any
+from typing import Any, Literal, get_args
 
 from overlapper.scenes.parameters import Parameter, described, parameters_of, values_of
 
 Step = Callable[[int], object]
+ContactModel = Literal["bullet", "volumetric"]
+"""What pushes bodies apart."""
 
 
 class SceneError(Exception):
@@ -45,6 +48,7 @@ class Scene:
     pairs: Any = "simulated"
     names: dict[int, str] = field(default_factory=dict)
     parameters: dict[str, Parameter] = field(default_factory=dict)
+    contact: ContactModel = "bullet"
 
     @property
     def expected(self) -> Path:
@@ -127,11 +131,14 @@ def scene_of(path: Path, source: bytes) -> Scene:
     pairs = getattr(module, "PAIRS", "simulated")
     if isinstance(pairs, str) and pairs not in ("simulated", "all"):
         raise SceneError(f"{path} has PAIRS = {pairs!r}, which must be 'simulated', 'all' or a list of pairs")
+    contact: ContactModel = getattr(module, "CONTACT", "bullet")
+    if contact not in get_args(ContactModel):
+        raise SceneError(f"{path} has CONTACT = {contact!r}, which must be 'bullet' or 'volumetric'")
     names = getattr(module, "NAMES", {})
     if not isinstance(names, dict):
         raise SceneError(f"{path} has NAMES = {names!r}, which must be a dictionary of names by the numbers of bodies")
     difficulty = (module.__doc__ or "").strip()
-    return Scene(path.stem, path, difficulty, steps, build, pairs, names, parameters_of(build))
+    return Scene(path.stem, path, difficulty, steps, build, pairs, names, parameters_of(build), contact)
 
 
 def find_scene(name_or_path: str | Path) -> Path:

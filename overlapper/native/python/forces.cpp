@@ -127,6 +127,9 @@ the world, then of its joints.)");
               "numpy.typing.ArrayLike) -> None"));
   cls.def_prop_ro("coordinates", [](const ContactSolver& self) { return self.bodies().coordinates(); });
   cls.def(
+      "copy", [](const ContactSolver& self) { return self; }, nb::sig("def copy(self) -> ContactSolver"),
+      "Another one that knows the same of the last step: what it solves changes nothing here.");
+  cls.def(
       "place", &place, "frames"_a, "overlaps"_a, "links"_a, "stiffness"_a, "dissipation"_a, "friction"_a,
       nb::sig("def place(self, frames: collections.abc.Sequence[typing.Any], overlaps: Overlaps, links: "
               "numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: "

@@ -11,6 +11,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from overlapper._core import ContactSolver
 from overlapper.simulation.asked_pairs import Among
 from overlapper.simulation.bodies import Bodies
 from overlapper.simulation.calls import listen, unheard, unlisten
@@ -152,17 +153,16 @@ class VolumetricContact:
         duration = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
         self._refresh()
         left, taken = duration, 0
-        planned = 0 if self._substeps == "auto" else int(self._substeps)
+        planned = self._planned
         try:
             while left > 1e-9 * duration:
                 if taken:
                     self.bodies.follow()
-                frequency2 = self._place()
+                frequency2 = self._place(self._dynamics.solver)
                 if planned:
                     length = duration / planned
                 else:
-                    highest = math.sqrt(frequency2.max(initial=0.0))
-                    length = left / min(max(1, math.ceil(highest * left)), max(1, MOST_SUBSTEPS - taken))
+                    length = left / min(_followed(frequency2, left), max(1, MOST_SUBSTEPS - taken))
                 wrenches = self._solve(length, frequency2)
                 pybullet.setTimeStep(length, client)
                 self._commands.prepare(length, first=not taken)
@@ -180,9 +180,27 @@ class VolumetricContact:
         """The forces that would act in a step of the simulator, without taking it: for scripts that integrate."""
         client = self.bodies.physicsClientId
         self._refresh()
-        self._solve(pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"], self._place())
+        frequency2 = self._place(self._dynamics.solver)
+        self._solve(pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"], frequency2)
         self._after = None
         return self._found
+
+    def look(self) -> Forces:
+        """The forces with which the next step would begin, of the bodies as they are now.
+
+        Nothing changes by it: steps go on as if nobody had looked, and `last` has what it had.
+        """
+        self._refresh()
+        dynamics = self._dynamics
+        solver = dynamics.solver.copy()
+        frequency2 = self._place(solver)
+        duration = pybullet.getPhysicsEngineParameters(self.bodies.physicsClientId)["fixedTimeStep"]
+        length = duration / (self._planned or min(_followed(frequency2, duration), MOST_SUBSTEPS))
+        velocity = dynamics.velocity()
+        force, torque, slip, normal, directed, *_ = solver.solve(
+            length, velocity, self._others(velocity), frequency2 * length**2 > COARSE**2, self._distributed
+        )
+        return Forces(self._contacts, force, torque, slip, normal, directed, self._moduli)
 
     @property
     def last(self) -> Forces:
@@ -261,8 +279,13 @@ class VolumetricContact:
         self._before: tuple[Array, float, Array] | None = None  # velocity, duration and our part of the acceleration
         self._other = self._dynamics.gravity
 
-    def _place(self) -> Array:
-        """Take what bodies share where they are; the squares of frequencies by row."""
+    @property
+    def _planned(self) -> int:
+        """The substeps that were asked for; 0 if that is left to the stiffness."""
+        return 0 if self._substeps == "auto" else int(self._substeps)
+
+    def _place(self, solver: ContactSolver) -> Array:
+        """Give a solver what bodies share where they are; the squares of frequencies by row."""
         dynamics = self._dynamics
         self._contacts = self.bodies.overlaps(pairs=self._among)
         found = self._contacts.overlaps
@@ -274,17 +297,14 @@ class VolumetricContact:
             friction = self._friction.of(links, dynamics.links)
         self._frames = dynamics.frames()
         dissipation = self._dissipation.of(links, dynamics.links)
-        frequency2: Array = dynamics.solver.place(self._frames, found, self._links, self._moduli, dissipation, friction)
+        frequency2: Array = solver.place(self._frames, found, self._links, self._moduli, dissipation, friction)
         return frequency2
 
     def _solve(self, duration: float, frequency2: Array) -> Array:
         """The forces of a step as long as that; (n, 6) force and torque on the links."""
         dynamics = self._dynamics
         velocity = dynamics.velocity()
-        # What else acts is told by how velocities have changed, unless somebody has set them since.
-        if self._before and (self._after is None or np.array_equal(self._after, velocity)):
-            before, length, ours = self._before
-            self._other = (velocity - before) / length - ours
+        self._other = self._others(velocity)
         self._after = None
         damped = frequency2 * duration**2 > COARSE**2
         if damped.any():
@@ -298,6 +318,14 @@ class VolumetricContact:
             self._tell_of_direction(~directed)
         self._before = velocity, duration, ours
         return wrenches
+
+    def _others(self, velocity: Array) -> Array:
+        """The acceleration of all coordinates by what else acts."""
+        # It is told by how velocities have changed, unless somebody has set them since.
+        if self._before and (self._after is None or np.array_equal(self._after, velocity)):
+            before, length, ours = self._before
+            return (velocity - before) / length - ours
+        return self._other
 
     def _pairs_of(self, rows: NDArray[np.bool_]) -> list[tuple[Link, Link]]:
         return [((a, la), (b, lb)) for a, la, _, b, lb, _ in self._contacts.keys[rows].tolist()]
@@ -331,6 +359,11 @@ class VolumetricContact:
                     NoDirectionWarning,
                     stacklevel=4,
                 )
+
+
+def _followed(frequency2: Array, duration: float) -> int:
+    """How many substeps of a duration follow the fastest swing."""
+    return max(1, math.ceil(math.sqrt(frequency2.max(initial=0.0)) * duration))
 
 
 class _Parameter:

@@ -940,6 +940,11 @@ class ContactSolver:
     @property
     def coordinates(self) -> int: ...
 
+    def copy(self) -> ContactSolver:
+        """
+        Another one that knows the same of the last step: what it solves changes nothing here.
+        """
+
     def place(self, frames: Sequence[Any], overlaps: Overlaps, links: numpy.typing.NDArray[numpy.int64], stiffness: numpy.typing.ArrayLike, dissipation: numpy.typing.ArrayLike, friction: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.float64]:
         """
         Put the links where they are, and take what their shapes share; `links` (k,) is the place of each shape's link.
