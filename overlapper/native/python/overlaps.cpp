@@ -326,8 +326,8 @@ measure round bodies it is that of the round patch, not of polygons.)");
       R"(m, how far the points of that area are on the average from the centroid of the volume, in the plane through it:
 with friction mu and a normal force N, the torque that resists spinning is at most mu * N * patch_distance. Exact of
 polyhedra, discs and ellipses. Where formulas or slices measure round bodies, other patches count as the ellipse that
-has the same centre and moments: of a long rectangle that is 2 % less than the truth, of a stadium or a half disc within
-1 %, of a triangle 2 % more, and of a thin ring 6 % less. None without an area, as the centre.)");
+has the same centre and moments: of a long rectangle that is 2 % less than the truth, of a stadium within 1 %, of a half
+disc within 2 %, of a triangle 2 % more, and of a thin ring 6 % less. None without an area, as the centre.)");
   cls.def_prop_ro(
       "bounds",
       [](const Overlap& o) -> nb::object {
