@@ -53,7 +53,8 @@ class VolumetricContact:
     Bodies are elastic foundations (Winkler): they press with `stiffness` (Pa/m) times the depth, so that a pair is
     pushed apart by stiffness times the volume that it shares, through that volume's centroid, along the area vector of
     its patch. A layer of thickness t and modulus E has the stiffness E / t; two bodies in series have
-    1 / (1 / k1 + 1 / k2). A body rests as deep as its weight is stiffness times volume.
+    1 / (1 / k1 + 1 / k2). A body rests as deep as its weight is stiffness times volume. A body of several convex parts is
+    pressed by the sum of theirs: as if it were one, unless the parts overlap each other, where it is pressed twice.
 
     `dissipation` (s) is how far pressures are ahead of the depth, in time (Kelvin and Voigt): the damping ratio of a
     swing of angular frequency w is w * dissipation / 2, and 0 keeps the energy. `friction` is Coulomb's coefficient, by
@@ -263,7 +264,7 @@ class VolumetricContact:
             self._forget()
 
     def _turn_off(self) -> None:
-        self._response.turn_off(self.bodies.link_pairs(self._among), self.bodies.read_anew(self._seen))
+        self._response.turn_off(self.bodies.link_pairs(self._among), self.bodies._read_anew(self._seen))
 
     def _model(self) -> None:
         """Read the masses and joints of the bodies that there are."""
