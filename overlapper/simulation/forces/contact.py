@@ -53,8 +53,8 @@ class VolumetricContact:
     Bodies are elastic foundations (Winkler): they press with `stiffness` (Pa/m) times the depth, so that a pair is
     pushed apart by stiffness times the volume that it shares, through that volume's centroid, along the area vector of
     its patch. A layer of thickness t and modulus E has the stiffness E / t; two bodies in series have
-    1 / (1 / k1 + 1 / k2). A body rests as deep as its weight is stiffness times volume. A body of several convex parts is
-    pressed by the sum of theirs: as if it were one, unless the parts overlap each other, where it is pressed twice.
+    1 / (1 / k1 + 1 / k2). A body rests as deep as its weight is stiffness times volume. What presses a body of several
+    convex parts is the sum of what presses these: as if they were one, but twice where the parts overlap each other.
 
     `dissipation` (s) is how far pressures are ahead of the depth, in time (Kelvin and Voigt): the damping ratio of a
     swing of angular frequency w is w * dissipation / 2, and 0 keeps the energy. `friction` is Coulomb's coefficient, by
