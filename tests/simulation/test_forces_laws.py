@@ -150,7 +150,7 @@ def test_the_energy_between_boxes_is_the_work_that_draws_them_apart(euler):
             assert abs(abs(up[2]) - 1) < 1e-9
             up = up * np.sign(up[2])
             work = quad(lambda s: overlap(Placed(above, at + s * up, turned), below).volume, 0, 2e-3, epsrel=1e-10)[0]
-            assert energy == pytest.approx(stiffness * work, rel=1e-3)
+            assert energy == pytest.approx(stiffness * work, rel=1e-6)
 
 
 def test_energy_goes_from_motion_to_pressures_and_back():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from overlapper import HalfSpace, Overlaps, overlaps
+from overlapper import HalfSpace, Overlaps, Placed, overlaps
 from overlapper.quaternion import rotated
 from overlapper.simulation.extraction.model import Array
 
@@ -30,11 +30,20 @@ def energies(found: Overlaps, normals: Array, stiffness: Array) -> Array:
             depth = plane.shape.offset - outward @ (overlap.centroid - plane.position)
             result[row] = stiffness[row] * overlap.volume * depth
             continue
-        normal = normals[row]
-        way = np.ptp(overlap.vertices @ normal)
-        positions = np.concatenate([a.position + way * NODES[:, None] * normal, [b.position]])
-        orientations = np.concatenate([np.repeat([a.orientation], len(NODES), axis=0), [b.orientation]])
-        pairs = [(k, len(NODES)) for k in range(len(NODES))]
-        volumes = overlaps([a.shape] * len(NODES) + [b.shape], positions, orientations, pairs).volume
-        result[row] = stiffness[row] * way * (WEIGHTS @ volumes)
+        work = _work(a, b, normals[row], np.ptp(overlap.vertices @ normals[row]))
+        result[row] = stiffness[row] * work
     return result
+
+
+def _work(a: Placed, b: Placed, normal: Array, way: float) -> float:
+    """The integral of the volume that the two share (m⁴) while the first is drawn away, over a way that parts them."""
+    orientations = np.concatenate([np.repeat([a.orientation], len(NODES), axis=0), [b.orientation]])
+    shapes, pairs = [a.shape] * len(NODES) + [b.shape], [(k, len(NODES)) for k in range(len(NODES))]
+    while True:
+        positions = np.concatenate([a.position + way * NODES[:, None] * normal, [b.position]])
+        volumes = overlaps(shapes, positions, orientations, pairs).volume
+        apart = np.flatnonzero(volumes == 0)
+        # What is shared may be longer than deep: nodes where nothing is shared any more say less than they might.
+        if not 0 < len(apart) < len(NODES):
+            return float(way * (WEIGHTS @ volumes))
+        way *= float(NODES[apart[0]])
