@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Any
 
 import pybullet
@@ -11,6 +12,8 @@ from overlapper.simulation.calls import Arguments, unheard
 ARRAYS = frozenset({"setJointMotorControlArray", "setJointMotorControlMultiDofArray"})
 MOTORS = ARRAYS | {"setJointMotorControl2", "setJointMotorControlMultiDof"}
 PUSHES = frozenset({"applyExternalForce", "applyExternalTorque"})
+
+COMMANDS = MOTORS | PUSHES | {"changeConstraint", "resetSimulation", "stepSimulation"}
 
 Command = tuple[str, Arguments]
 
@@ -54,9 +57,10 @@ class Commands:
 
     def hear(self, name: str, arguments: Arguments, _: Any) -> None:
         """A listener of calls."""
-        if arguments.get("physicsClientId", 0) != self._client:
+        if name not in COMMANDS or arguments.get("physicsClientId", 0) != self._client:
             return
-        command = name, dict(arguments)
+        # A script may use its lists again.
+        command = name, deepcopy(arguments)
         if name in PUSHES or (name in MOTORS and arguments.get("controlMode") == pybullet.TORQUE_CONTROL):
             self._momentary.append(command)
         elif name in MOTORS:
@@ -64,13 +68,15 @@ class Commands:
             joints = arguments["jointIndices"] if name in ARRAYS else [arguments["jointIndex"]]
             self._keep([(body, joint) for joint in joints], command)
         elif name == "changeConstraint":
-            self._keep([arguments["userConstraintUniqueId"]], command)
-        elif name == "resetSimulation":
-            self._lasting, self._momentary = {}, []
+            # What a call leaves out stays as it was.
+            constraint = arguments["userConstraintUniqueId"]
+            before = self._lasting.get(constraint, command)[1]
+            self._keep([constraint], (name, before | command[1]))
         elif name == "stepSimulation":
             self.stepped()
-        else:
             return
+        else:
+            self._lasting, self._momentary = {}, []
         # It was told for the length that steps have between two of ours.
         self._length = 0.0
 
