@@ -59,7 +59,7 @@ class AskedPairs:
     def colliders(self, among: Numbered, rules: CollisionRules) -> NDArray[np.intp]:
         """(n, 2) the pairs of links that are asked for, wherever they are, as values of `layout.collider_rows`."""
         layout = self.layout
-        if not isinstance(among, str):
+        if among != "simulated" and among != "all":
             pairs = layout.colliders[np.array(np.divmod(self._codes(among), len(layout.keys)))].T
             return np.unique(np.sort(pairs, axis=1), axis=0)
         first, second = np.triu_indices(len(layout.collider_rows), 1)

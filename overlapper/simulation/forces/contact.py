@@ -12,7 +12,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from overlapper._core import ContactSolver
-from overlapper.simulation.asked_pairs import Among
+from overlapper.simulation.asked_pairs import Among, listed
 from overlapper.simulation.bodies import Bodies
 from overlapper.simulation.calls import listen, unheard, unlisten
 from overlapper.simulation.commands import Commands
@@ -97,9 +97,8 @@ class VolumetricContact:
         substeps: int | Literal["auto"] = "auto",
     ) -> None:
         self.bodies = bodies
-        self._among: Among = "simulated" if pairs is None else pairs
-        if not isinstance(self._among, str):
-            self._among = [*self._among]
+        among: Among = "simulated" if pairs is None else pairs
+        self._among: Among = among if isinstance(among, str) else listed(among)
         bodies.update()
         bodies.link_pairs(self._among)  # says what is wrong with them
         distributed = isinstance(friction, str) and friction == "distributed"
@@ -325,7 +324,9 @@ class VolumetricContact:
         # It is told by how velocities have changed, unless somebody has set them since.
         if self._before and (self._after is None or np.array_equal(self._after, velocity)):
             before, length, ours = self._before
-            return (velocity - before) / length - ours
+            # After forces() nothing may have moved; a body that rests to the last bit tells nothing new.
+            if not np.array_equal(before, velocity):
+                return (velocity - before) / length - ours
         return self._other
 
     def _pairs_of(self, rows: NDArray[np.bool_]) -> list[tuple[Link, Link]]:

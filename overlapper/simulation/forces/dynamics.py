@@ -33,7 +33,7 @@ class Dynamics:
         self._joints = {id: [*range(pybullet.getNumJoints(id, client))] for id in bodies}
         self.links = [(id, link) for id, joints in self._joints.items() for link in (BASE, *joints)]
         self.place = {each: k for k, each in enumerate(self.links)}
-        self._masses: list[Any] = []
+        self._masses: list[Any] = [None]  # of no links, not even none
         self.friction: Array = np.zeros(len(self.links))
         self.read()
 
@@ -116,7 +116,7 @@ class Dynamics:
         client = self._client
         velocity = np.empty(self.solver.coordinates)
         bases = np.array([*map(pybullet.getBaseVelocity, self._joints, repeat(client))]).reshape(-1, 6)
-        velocity[np.add.outer([*self._bases.values()], range(6))] = bases
+        velocity[np.add.outer(np.array([*self._bases.values()], dtype=int), range(6))] = bases
         for id, joints, at in self._single:
             velocity[at] = [state[1] for state in pybullet.getJointStates(id, joints, client)]
         for id, joints, at in self._spherical:
