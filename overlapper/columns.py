@@ -28,6 +28,15 @@ MEASURES = [
     *[f"normal_{axis}" for axis in "xyz"],
 ]
 
+# What volumetric contact adds: force and torque on A, the latter about the centroid, the energy that pressures store,
+# and the velocity of A over B at the centroid.
+FORCE_MEASURES = [
+    *[f"force_{axis}_n" for axis in "xyz"],
+    *[f"torque_{axis}_nm" for axis in "xyz"],
+    "energy_j",
+    *[f"slip_{axis}_m_s" for axis in "xyz"],
+]
+
 MOST_ROWS = 20  # that a notebook shows
 
 Columns = dict[str, NDArray[Any] | Sequence[Any]]

@@ -145,18 +145,21 @@ def diff(
 
     [bold]overlapper diff monday.csv tuesday.csv[/bold]
     """
-    from overlapper.scenes.comparison import compare_measures, compare_poses
-    from overlapper.scenes.expected import DRIFT, ROUNDING, read_budgets
+    from overlapper.scenes.comparison import compare_forces, compare_measures, compare_poses
+    from overlapper.scenes.expected import DRIFT, FORCES, ROUNDING, read_budgets
     from overlapper.scenes.table_file import read_table
 
     with input_refusals():
         recorded, found = read_table(before), read_table(after)
-        budgets = ROUNDING | DRIFT | read_budgets(before)
+        budgets = ROUNDING | DRIFT | FORCES | read_budgets(before)
+    compared = {
+        "poses": compare_poses(recorded, found, budgets),
+        "overlaps": compare_measures(recorded, found, budgets),
+    }
+    if all(rows and "energy_j" in rows[0] for rows in (recorded, found)):
+        compared["forces"] = compare_forces(recorded, found, budgets)
     moved = False
-    for cause, differences in (
-        ("poses", compare_poses(recorded, found, budgets)),
-        ("overlaps", compare_measures(recorded, found, budgets)),
-    ):
+    for cause, differences in compared.items():
         moves = sorted(differences.moves, key=lambda move: -move.part)
         print(f"{cause:9} {f'{len(moves):,} moved' if moves else 'the same'}")
         for move in moves[:20]:

@@ -51,6 +51,11 @@ PairsOption = Annotated[
     typer.Option(help="Pairs that the simulator lets collide, or all of different bodies; by default PAIRS."),
 ]
 
+ContactOption = Annotated[
+    Literal["bullet", "volumetric"] | None,
+    typer.Option(help="What pushes bodies apart: contact points, or the volumes they share; by default CONTACT."),
+]
+
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the scene; may be repeated.", show_default=False),

@@ -14,6 +14,7 @@ from typing import BinaryIO, NoReturn, TextIO
 from overlapper.printable import first_line, printable
 from overlapper.process import NotStarted
 from overlapper.scenes.scene import SceneError
+from overlapper.simulation.forces.cautions import NoDirectionWarning, SubstepsWarning
 
 LIBC = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
 
@@ -75,7 +76,30 @@ def quiet() -> Iterator[BinaryIO]:
     """Keeps stdout for the answer: what Python prints goes to stderr, what C prints (as pybullet) to the file given."""
     with tempfile.TemporaryFile() as noise, redirect_stdout(sys.stderr), warnings.catch_warnings(), diverted(1, noise):
         warnings.simplefilter("ignore", UserWarning)  # of shapes left out: the summary names them
+        _tell_of_forces()
         yield noise
+
+
+def _tell_of_forces() -> None:
+    """What there is to warn of when forces come from volumes goes to stderr, a sentence each."""
+    told, others = (NoDirectionWarning, SubstepsWarning), warnings.showwarning
+    for category in told:
+        warnings.simplefilter("always", category)
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if issubclass(category, told):
+            say(f"overlapper: {message}", sys.stderr)
+        else:
+            others(message, category, filename, lineno, file, line)
+
+    warnings.showwarning = show
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from overlapper.cli.figures import show
 from overlapper.cli.options import (
     CheckOption,
     ConcaveOption,
+    ContactOption,
     HtmlOption,
     MethodOption,
     OutOption,
@@ -52,12 +53,14 @@ def run(
     concave_threshold: ThresholdOption = 0.05,
     surface: SurfaceOption = "nominal",
     pairs: PairsOption = None,
+    contact: ContactOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
     """Simulate a scene and measure what its bodies have in common in every step.
 
     A scene is a Python file with STEPS, the number of steps, and build(client), which fills a pybullet client and may
-    return a function step(i) that is called before each step. PAIRS in it may be "all", or a list of pairs of bodies.
+    return a function step(i) that is called before each step. PAIRS in it may be "all", or a list of pairs of bodies,
+    and CONTACT "volumetric": then bodies are pushed apart by the volumes that they share, and tables have the forces.
     What build takes beside the client, as build(client, *, mass=1.0, seed=0), are parameters that --set sets.
 
     Examples:
@@ -70,6 +73,8 @@ def run(
 
     [bold]overlapper run franka_grasp --set mass=0.3 --set friction=0.4[/bold]  with other parameters
 
+    [bold]overlapper run peg_in_hole --contact volumetric --out peg.csv[/bold]  with forces, in the table, too
+
     [bold]overlapper run kuka_jenga --check fcl --json[/bold]  compared with FCL, for a program to read
     """
     refuse_out_of_range(tolerance, concave_threshold, out)
@@ -81,6 +86,7 @@ def run(
         "concave_threshold": concave_threshold,
         "surface": surface,
         "pairs": pairs,
+        "contact": contact,
     }
     written: list[Path] = []
     try:
@@ -92,7 +98,8 @@ def run(
         raise Refused(f"{refused}{kept}") from refused
     if as_json:
         files = {name: str(path) for name, path in (("out", out), ("html", html)) if path in written}
-        settings = {"settings": {**geometry, "per": per, "check": check}, "parameters": chosen.parameters}
+        asked = {**geometry, "contact": contact or chosen.contact, "per": per, "check": check}
+        settings = {"settings": asked, "parameters": chosen.parameters}
         print(json.dumps(settings | summary.as_dict() | {"finished": finished} | files))
     else:
         _show(chosen.title, summary, finished, written)
@@ -124,9 +131,11 @@ def _measure(
 
         scene = load_scene(name, parameters)
         fcl = stack.enter_context(Fcl()) if check else None
+        geometry = {**geometry, "contact": geometry["contact"] or scene.contact}
         settings = {"scene": scene.name, "steps": steps or scene.steps, **geometry, **heading_of(scene.parameters)}
         summary = Summary(scene.name)
-        take = stack.enter_context(outputs(summary, settings, written, out, html, per, fcl))
+        forces = geometry["contact"] == "volumetric"
+        take = stack.enter_context(outputs(summary, settings, written, out, html, per, fcl, forces))
         frames = stack.enter_context(closing(frames_of(scene, steps, **geometry)))
         try:
             for frame in with_progress(frames, scene.name, steps or scene.steps):

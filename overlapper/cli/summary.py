@@ -25,11 +25,13 @@ def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
         title=f"Overlaps of {name} in {summary.steps} steps, {summary.seconds:.3g} s",
         caption="Volume: the largest in any step, true to within ±. Depth: the shortest way to part the two, or the "
         "deepest of their shapes, in the step where that is longest. Normal: that way, for the first of them."
+        + " Force: the largest between the two." * summary.forces
         + left_out,
     )
     # Two lines a pair and narrow numbers, so that a terminal of 80 columns holds the table.
     table.add_column("pair of links", overflow="fold")
-    for header in ("steps", f"volume\n{unit}", f"±\n{unit}", "depth\nmm", "normal\nx, y, z", "at\nstep"):
+    headers = ["steps", f"volume\n{unit}", f"±\n{unit}", "depth\nmm", "normal\nx, y, z", "at\nstep"]
+    for header in headers + ["force\nN"] * summary.forces:
         table.add_column(header, justify="right", no_wrap=True)
     for pair in pairs[:limit]:
         table.add_row(
@@ -40,6 +42,7 @@ def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
             f"{1e3 * pair.depth:.3g}",
             " ".join(f"{round(component, 2) + 0.0:+.2f}" for component in pair.normal),
             str(pair.depth_step),
+            *[f"{pair.force:.3g}"] * summary.forces,
         )
     return table
 

@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from overlapper.cli.engine import AddressOption, EngineOption, WorkersOption, engine_of, refuse_address
 from overlapper.cli.options import (
     ConcaveOption,
+    ContactOption,
     MethodOption,
     PairsOption,
     SceneArgument,
@@ -93,6 +94,7 @@ def sweep(
     concave_threshold: ThresholdOption = 0.05,
     surface: SurfaceOption = "nominal",
     pairs: PairsOption = None,
+    contact: ContactOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the text.")] = False,
 ) -> None:
     """Run a scene with many parameters, and keep what each run came to.
@@ -151,7 +153,7 @@ def sweep(
         chosen = load_scene(scene, parameters)
         must_be_no_columns(chosen.parameters)
         space = Space(chosen.name, chosen.parameters, parameters.keys())
-        settings["steps"] = steps or chosen.steps
+        settings |= {"steps": steps or chosen.steps, "contact": contact or chosen.contact}
         study = Study.of(find_scene(scene), settings, kept)
         todo = Sweep(study, space.crossed(_axes(space, grid, seeds, points, sample, ranges, sample_seed)))
         recorded = Recorded(check, chosen.expected, todo) if check else None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from overlapper.cli.options import SetOption, given_parameters
+from overlapper.cli.options import ContactOption, SetOption, given_parameters
 from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
 
@@ -36,6 +36,7 @@ def view(
         str | None, typer.Option(help="The scene of a table that has no shapes, by name or path: it is run again.")
     ] = None,
     given: SetOption = None,
+    contact: ContactOption = None,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Steps of a scene at most; by default as many as it says.")
     ] = None,
@@ -83,7 +84,7 @@ def view(
     with quiet() as noise, scene_refusals(noise), input_refusals():
         with without_banner():
             from overlapper.scenes.playback import play
-        playback = play(source, steps, scene, given_parameters(given))
+        playback = play(source, steps, scene, given_parameters(given), contact)
         with closing(playback.views):
             if live:
                 _live(playback, looks, host)

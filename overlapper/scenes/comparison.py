@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.scenes.expected import MEASURES, Budget, Key
+from overlapper.scenes.expected import FORCE_MEASURES, MEASURES, Budget, Key
 from overlapper.scenes.table import POSE, Row, Value, key
 
 Names = Mapping[tuple[int, int], str]
@@ -105,6 +105,33 @@ def _measure_moves(
     if now > allowed:
         part = now / allowed if allowed else math.inf
         yield Move(_step(old), who, "volume_error_m3", _text(was), _text(now), now - was, allowed - was, part)
+
+
+def compare_forces(
+    recorded: Sequence[Row], found: Sequence[Row], budgets: Mapping[str, Budget], names: Names | None = None
+) -> Differences:
+    """Forces, torques and energies within their budgets, of the pairs in both that have any in one.
+
+    Those without a budget may be anything.
+    """
+    names = names or {}
+    old, new = ({(_step(row), *key(row)): row for row in rows} for rows in (recorded, found))
+    moves: list[Move] = []
+    spent = {name: 0.0 for name in FORCE_MEASURES if name in budgets}
+    for k in sorted(old.keys() & new.keys(), key=lambda k: [-math.inf if part is None else part for part in k]):
+        for name in spent:
+            columns = FORCE_MEASURES[name]
+            was, now = (np.array([_number(rows[k], column) for column in columns]) for rows in (old, new))
+            size, difference = (float(np.linalg.norm(each)) for each in (was, now - was))
+            part = 0.0 if np.array_equal(was, now, equal_nan=True) else budgets[name].spent(difference, size)
+            spent[name] = max(spent[name], part)
+            if not part <= 1:
+                unit = columns[0].rpartition("_")[2]
+                before, after = (_numbers(each) if len(each) > 1 else _text(float(each[0])) for each in (was, now))
+                allowed = budgets[name].allowed(size)
+                who = label(old[k], names)
+                moves.append(Move(_step(old[k]), who, f"{name}_{unit}", before, after, difference, allowed, part))
+    return Differences(moves, spent)
 
 
 def compare_poses(

@@ -16,6 +16,7 @@ from pathlib import Path
 from overlapper import Shape
 from overlapper.polytopes.shape_text import shape_of, text_of
 from overlapper.scenes.table import COLUMNS, Row, key
+from overlapper.scenes.table import FORCES as FORCE_COLUMNS
 from overlapper.scenes.table_file import CsvTable, csv_text, read_csv
 
 Key = tuple[int, int, int]  # (body, link, shape)
@@ -24,13 +25,18 @@ Key = tuple[int, int, int]  # (body, link, shape)
 # so that every shape of a step is placed, and a pair out of nothing is noticed.
 EXPECTED_COLUMNS = [name for name in COLUMNS if name not in ("time_s", "nameA", "nameB", "fcl", "fcl_explanation")]
 
-# The measures that are compared, each with its columns.
+# The measures that are compared, each with its columns; those of volumetric contact are told by the simulation alone.
 MEASURES = {
     "volume": ["volume_m3"],
     "centroid": ["centroid_x_m", "centroid_y_m", "centroid_z_m"],
     "area": ["area_m2"],
     "depth": ["depth_m"],
     "normal": ["normal_x", "normal_y", "normal_z"],
+}
+FORCE_MEASURES = {
+    "force": ["force_x_n", "force_y_n", "force_z_n"],
+    "torque": ["torque_x_nm", "torque_y_nm", "torque_z_nm"],
+    "energy": ["energy_j"],
 }
 
 
@@ -70,6 +76,10 @@ ROUNDING = {
 # not depend on chance, and less than anyone would call the same grasp.
 DRIFT = {"position": Budget(0.0, 1e-4), "orientation": Budget(0.0, 1e-3)}
 
+# How far forces, torques and energies of volumetric contact may be from those recorded: a hundredth, and where that is
+# next to nothing, what a gram weighs, on an arm of a centimetre and over a tenth of a millimetre.
+FORCES = {"force": Budget(0.01, 0.01), "torque": Budget(0.01, 1e-4), "energy": Budget(0.01, 1e-6)}
+
 # What is told of the overlaps when bodies are elsewhere, or are others: changes of a hundredth.
 HUNDREDTHS = {"volume": Budget(0.01, 0.0), "depth": Budget(0.01, 0.0)}
 
@@ -99,7 +109,8 @@ class Expected:
             for name, each in self.budgets.items()
         }
         path.parent.mkdir(parents=True, exist_ok=True)
-        table = CsvTable(path, heading | origin, EXPECTED_COLUMNS)
+        forces = [*FORCE_COLUMNS] if any("energy_j" in row for row in self.rows) else []
+        table = CsvTable(path, heading | origin, EXPECTED_COLUMNS + forces)
         try:
             self._write_steps(table)
             table.close()
@@ -146,8 +157,8 @@ def read_budgets(path: Path) -> dict[str, Budget]:
     pattern = r"^# budget (\w+): relative (\S+) absolute (\S+)$"
     budgets: dict[str, Budget] = {}
     for name, *parts in re.findall(pattern, csv_text(path), re.MULTILINE):
-        if name not in ROUNDING | DRIFT:
-            raise ValueError(f"{path} has a budget of {name!r}, which is none of {', '.join(ROUNDING | DRIFT)}")
+        if name not in (known := ROUNDING | DRIFT | FORCES):
+            raise ValueError(f"{path} has a budget of {name!r}, which is none of {', '.join(known)}")
         try:
             relative, absolute = map(float, parts)
         except ValueError:

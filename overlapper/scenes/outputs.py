@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from overlapper import Overlaps
 from overlapper.scenes.summary import Summary
-from overlapper.scenes.table import Bodies, link_rows, rows
+from overlapper.scenes.table import COLUMNS, FORCES, Bodies, link_rows, rows
 from overlapper.scenes.table_file import TABLES, must_be_a_table, origin
 from overlapper.simulation.links import link_contacts
 from overlapper.whole_file import must_be_writable, unfinished
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from overlapper.reference import Comparison, Fcl
     from overlapper.scenes.run import Frame
     from overlapper.simulation.contacts import Contacts
+    from overlapper.simulation.forces.forces import Forces
     from overlapper.viewer.look import Look
 
 PICTURES_PER_SECOND = 30  # of simulated time: as smooth as a film, and a tenth of the size that every step would take
@@ -43,26 +44,35 @@ def can_be_written(out: Path | None, html: Path | None, *others: Path | None) ->
 class StepTable:
     """A table of overlaps that grows by what a step has found; the heading says what wrote it, and `settings`.
 
-    `per` says whether a row is of two shapes or of two links as a whole. ValueError for a name of another ending than
+    `per` says whether a row is of two shapes or of two links as a whole, `forces` whether there are columns of forces,
+    too. ValueError for a name of another ending than
     those of TABLES, OSError if there can be no such file, ImportError without the library that writes it.
     """
 
-    def __init__(self, path: Path, settings: Mapping[str, Any], per: Per = "shape") -> None:
+    def __init__(self, path: Path, settings: Mapping[str, Any], per: Per = "shape", forces: bool = False) -> None:
         must_be_a_table(path)
         if per not in ("shape", "link"):
             raise ValueError(f"per must be 'shape' or 'link', not {per!r}")
         self.path, self._per = path, per
         texts = {name: str(value) for name, value in settings.items()}
-        self._table = TABLES[path.suffix](path, origin() | texts | {"per": per})
+        self._table = TABLES[path.suffix](
+            path, origin() | texts | {"per": per}, COLUMNS | FORCES if forces else COLUMNS
+        )
 
     def add(
-        self, step: int, time: float, bodies: Bodies, contacts: Contacts, opinions: Sequence[Comparison] = ()
+        self,
+        step: int,
+        time: float,
+        bodies: Bodies,
+        contacts: Contacts,
+        opinions: Sequence[Comparison] = (),
+        forces: Forces | None = None,
     ) -> None:
         """Write the rows of a step at once; `opinions` are FCL's of the same contacts, if it was asked."""
         if self._per == "link":
-            self._table.write(link_rows(step, time, bodies, link_contacts(contacts)))
+            self._table.write(link_rows(step, time, bodies, link_contacts(contacts), forces))
         else:
-            self._table.write(rows(step, time, bodies, contacts, opinions))
+            self._table.write(rows(step, time, bodies, contacts, opinions, forces))
 
     def close(self) -> None:
         """Put the table in its place."""
@@ -82,22 +92,24 @@ def outputs(
     html: Path | None = None,
     per: Per = "shape",
     fcl: Fcl | None = None,
+    forces: bool = False,
 ) -> Iterator[Callable[[Frame[Any]], None]]:
     """Takes frames in: into the summary, the table `out` and the page `html`, in whose folders there may be none yet.
 
-    `written` gets the files that there are in the end: in their place, or, if the run fails, beside it.
+    The table has columns of `forces`, if frames have any. `written` gets the files that there are in the end: in their
+    place, or, if the run fails, beside it.
     """
     for path in filter(None, (out, html)):
         path.parent.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         # The page is written last, and checked first.
         record = stack.enter_context(recorder(html, written)) if html else None
-        table = stack.enter_context(_table(out, settings, per, written)) if out else None
+        table = stack.enter_context(_table(out, settings, per, forces, written)) if out else None
 
         def take(frame: Frame[Any]) -> None:
             opinions = fcl.compare_many(contact.overlap for contact in frame.contacts) if fcl else []
             if table:
-                table.add(frame.step, frame.time, frame.bodies, frame.contacts, opinions)
+                table.add(frame.step, frame.time, frame.bodies, frame.contacts, opinions, frame.forces)
             summary.add(frame, opinions)
             if record:
                 record(frame)
@@ -106,9 +118,9 @@ def outputs(
 
 
 @contextmanager
-def _table(path: Path, settings: Mapping[str, Any], per: Per, written: list[Path]) -> Iterator[StepTable]:
+def _table(path: Path, settings: Mapping[str, Any], per: Per, forces: bool, written: list[Path]) -> Iterator[StepTable]:
     """A table to be written; named in `written` if it has rows, or the run came to its end."""
-    table = StepTable(path, settings, per)
+    table = StepTable(path, settings, per, forces)
     try:
         yield table
     except BaseException as error:

@@ -17,7 +17,7 @@ from overlapper.scenes.comparison import compare_measures
 from overlapper.scenes.expected import HUNDREDTHS, read_expected
 from overlapper.scenes.parameters import read_heading
 from overlapper.scenes.run import Frame, run
-from overlapper.scenes.scene import Scene, load_scene
+from overlapper.scenes.scene import ContactModel, Scene, load_scene
 from overlapper.scenes.still import Still
 from overlapper.scenes.table import Row, link_rows, rows
 from overlapper.scenes.table_file import TABLES, csv_text, read_metadata, read_table
@@ -44,9 +44,14 @@ class Playback:
 
 
 def play(
-    source: str, steps: int | None = None, scene: str | None = None, given: Mapping[str, str] | None = None
+    source: str,
+    steps: int | None = None,
+    scene: str | None = None,
+    given: Mapping[str, str] | None = None,
+    contact: ContactModel | None = None,
 ) -> Playback:
-    """The playback of a scene, by name or path, or of a table; of a scene, `steps` of it with the parameters `given`.
+    """The playback of a scene, by name or path, or of a table; of a scene, `steps` of it with the parameters `given`
+    and with that `contact`, by default as it says.
 
     A table without shapes is of the `scene` given: what a table names is not run, as tables come from anywhere. Nor is
     a scene run for longer than it says, or than `steps`, because a table goes on.
@@ -58,9 +63,11 @@ def play(
         if scene is not None:
             raise ValueError(f"--scene is for tables, and {source} is none")
         chosen = load_scene(source, given)
-        return Playback(chosen.title, steps or chosen.steps, _run(chosen, steps or chosen.steps, {}))
+        return Playback(chosen.title, steps or chosen.steps, run(chosen, steps, contact=contact))
     if given:
         raise ValueError(f"--set is for scenes, and {source} is a table, which says its own parameters")
+    if contact:
+        raise ValueError(f"--contact is for scenes, and {source} is a table, which says its own")
     metadata = read_metadata(path)
     if path.suffix == ".csv" and re.search(r"^# shapes ", csv_text(path), re.MULTILINE):
         expected = read_expected(path)
@@ -84,10 +91,6 @@ def _nothing() -> Generator[View, None, None]:
     yield from ()
 
 
-def _run(scene: Scene, steps: int, settings: dict[str, Any]) -> Generator[View, None, None]:
-    yield from run(scene, steps, **settings)
-
-
 def _stills(stills: dict[int, Still], tolerance: float) -> Generator[View, None, None]:
     for step, still in stills.items():
         yield Frame(step, step * STEP, still, still.contacts(tolerance))
@@ -102,6 +105,7 @@ def _settings(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
         "concave": str,
         "concave_threshold": float,
         "pairs": str,
+        "contact": str,
     }
     try:
         return {name: kind(metadata[name]) for name, kind in kinds.items() if metadata.get(name, "None") != "None"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from overlapper.scenes.comparison import compare_measures
-from overlapper.scenes.expected import DRIFT, MEASURES, ROUNDING, Budget, Expected, read_expected
+from overlapper.scenes.expected import DRIFT, FORCES, MEASURES, ROUNDING, Budget, Expected, read_expected
 from overlapper.scenes.parameters import heading_of
 from overlapper.scenes.run import stills
 from overlapper.scenes.scene import Scene
@@ -28,7 +28,8 @@ def record(scene: Scene) -> None:
         made = _observed(scene, old)
     except FileNotFoundError:
         steps = sorted({max(scene.steps * quarter // 4, 1) for quarter in (1, 2, 3, 4)})
-        made = _observed(scene, Expected(steps, 1e-3, ROUNDING | DRIFT))
+        forces = FORCES if scene.contact == "volumetric" else {}
+        made = _observed(scene, Expected(steps, 1e-3, ROUNDING | DRIFT | forces))
         made.budgets.update(_needed(made))
     made.write(scene.expected, origin() | heading_of(scene.parameters))
 

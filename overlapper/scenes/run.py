@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Generator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar
+from typing import Generic, Literal, TypeVar, get_args
 
 from overlapper.scenes.scene import ContactModel, Scene, SceneError, Step, broken
 from overlapper.scenes.still import Still
@@ -40,7 +40,7 @@ class Frame(Generic[Shown]):
 
     def still(self) -> Still:
         """The bodies apart from the simulation."""
-        return self.bodies if isinstance(self.bodies, Still) else Still.of(self.bodies)
+        return self.bodies if isinstance(self.bodies, Still) else Still.of(self.bodies, self.forces)
 
 
 def run(
@@ -61,8 +61,11 @@ def run(
     of `overlapper.overlap`, `concave`, `concave_threshold` and `surface` of `Bodies`, `pairs` of `Bodies.overlaps`, by
     default as the scene says; a recorder hears all that it tells pybullet. `contact` is what pushes bodies apart, by
     default as the scene says: "bullet", contact points, or "volumetric", a `VolumetricContact` of what the simulator
-    lets collide. SceneError if the scene itself fails.
+    lets collide. SceneError if the scene itself fails, ValueError for an argument that is none.
     """
+    model = scene.contact if contact is None else contact
+    if model not in get_args(ContactModel):
+        raise ValueError(f"contact must be 'bullet' or 'volumetric', not {model!r}")
     client = pybullet.connect(pybullet.DIRECT)
     recorder = Recorder(client)
     among = scene.pairs if pairs is None else pairs
@@ -78,9 +81,7 @@ def run(
             names=scene.names,
         )
         seconds = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
-        volumetric = (
-            stack.enter_context(VolumetricContact(bodies)) if (contact or scene.contact) == "volumetric" else None
-        )
+        volumetric = stack.enter_context(VolumetricContact(bodies)) if model == "volumetric" else None
         for i in range(steps or scene.steps):
             _controlled(scene, step, i)
             if volumetric is not None:
@@ -127,4 +128,4 @@ def _controlled(scene: Scene, step: Step | None, i: int) -> None:
 def stills(scene: Scene, steps: Sequence[int]) -> dict[int, Still]:
     """Today's scene in some of its steps, with its shapes as they will be read from a file."""
     last = min(max(steps), scene.steps)
-    return {frame.step: Still.of(frame.bodies).as_written() for frame in run(scene, last, only=steps)}
+    return {frame.step: Still.of(frame.bodies, frame.forces).as_written() for frame in run(scene, last, only=steps)}

@@ -17,12 +17,15 @@ from overlapper.scenes.table import Row, key, placements, rows
 from overlapper.simulation.contacts import Contacts
 
 if TYPE_CHECKING:
-    from overlapper.simulation import Bodies
+    from overlapper.simulation import Bodies, Forces
 
 
 @dataclass(frozen=True, slots=True)
 class Still:
-    """The shapes of a scene at a moment, apart from the simulator; the fields are those of `simulation.Bodies`."""
+    """The shapes of a scene at a moment, apart from the simulator; the fields are those of `simulation.Bodies`.
+
+    `forces` are those of the frame, with volumetric contact.
+    """
 
     keys: list[Key]
     shapes: list[Shape]
@@ -30,9 +33,10 @@ class Still:
     orientations: NDArray[np.float64]
     names: dict[tuple[int, int], str]
     colors: dict[tuple[int, int], tuple[float, float, float, float]]
+    forces: Forces | None = None
 
     @classmethod
-    def of(cls, bodies: Bodies) -> Still:
+    def of(cls, bodies: Bodies, forces: Forces | None = None) -> Still:
         """The bodies as they are now, unmoved by what the simulation does next."""
         return cls(
             list(bodies.keys),
@@ -41,6 +45,7 @@ class Still:
             bodies.orientations.copy(),
             bodies.names,
             bodies.colors,
+            forces,
         )
 
     @classmethod
@@ -65,8 +70,8 @@ class Still:
         return replace(self, shapes=[read[id(shape)] for shape in self.shapes])
 
     def moved(self, by: Sequence[float]) -> Still:
-        """All of it, moved by a vector in m."""
-        return replace(self, positions=self.positions + by)
+        """All of it but the forces, moved by a vector in m."""
+        return replace(self, positions=self.positions + by, forces=None)
 
     @property
     def placed(self) -> list[Placed]:
@@ -75,7 +80,7 @@ class Still:
 
     def rows(self, step: int, tolerance: float) -> list[Row]:
         """A row for each pair of shapes of different bodies that overlap or touch, and one for each shape alone."""
-        pairs = rows(step, 0.0, self, self.contacts(tolerance))
+        pairs = rows(step, 0.0, self, self.contacts(tolerance), forces=self.forces)
         met = {shape for row in pairs for shape in (key(row)[:3], key(row)[3:])}
         return pairs + [row for row in self.placements(step) if key(row)[:3] not in met]
 

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from overlapper.simulation.links import LinkContact, link_contacts
 
 if TYPE_CHECKING:
@@ -21,7 +23,8 @@ class PairSummary:
 
     `volume`, with its `volume_error`, is the largest, in m³ and of the links as a whole, where the shapes of one
     overlap each other counted once; `volume_step` is the step in which it was met. `depth`, met in `depth_step`, is the
-    largest of two of their shapes, in m, and `normal` is its normal, from the second link to the first.
+    largest of two of their shapes, in m, and `normal` is its normal, from the second link to the first. `force`, met in
+    `force_step`, is the largest that pushes the two apart, in N, with volumetric contact.
     """
 
     names: tuple[str, str]
@@ -32,9 +35,13 @@ class PairSummary:
     depth: float = 0.0
     depth_step: int = 0
     normal: tuple[float, ...] = ()
+    force: float = 0.0
+    force_step: int = 0
 
-    def add(self, step: int, pair: LinkContact) -> None:
-        """Take in what the links have in common in a step."""
+    def add(self, step: int, pair: LinkContact, force: float = 0.0) -> None:
+        """Take in what the links have in common in a step, and the force between them."""
+        if force > self.force:
+            self.force, self.force_step = force, step
         self.steps += 1
         if pair.volume > self.volume:
             self.volume, self.volume_error, self.volume_step = pair.volume, pair.volume_error, step
@@ -58,7 +65,8 @@ class Summary:
 
     `scene` is what was run, for `steps` steps and `seconds` of simulated time. `pairs` has a `PairSummary` by (bodyA,
     linkA, bodyB, linkB); `report`, `skipped` and `decomposed` are those of `Bodies`, summed up or as they are in the
-    end. If FCL was asked, `verdicts` counts what it said, and `disagreements` says where it differs.
+    end. If FCL was asked, `verdicts` counts what it said, and `disagreements` says where it differs. `forces` says
+    whether there were those of volumetric contact.
     """
 
     scene: str
@@ -70,6 +78,7 @@ class Summary:
     decomposed: list[Decomposed] = field(default_factory=list)
     verdicts: Counter[str] = field(default_factory=Counter)
     disagreements: list[Disagreement] = field(default_factory=list)
+    forces: bool = False
 
     def add(self, frame: Frame[Bodies], opinions: Sequence[Comparison] = ()) -> None:
         """Take in a frame; `opinions` are FCL's of its contacts, if it was asked."""
@@ -77,9 +86,13 @@ class Summary:
         self.report = _sum(self.report, frame.bodies.report())
         self.skipped, self.decomposed = frame.bodies.skipped, frame.bodies.decomposed
         names = frame.bodies.names
+        between = {} if frame.forces is None else frame.forces.between_links()
+        self.forces |= frame.forces is not None
         for pair in filter(None, link_contacts(frame.contacts)):
             key = pair.bodyA, pair.linkA, pair.bodyB, pair.linkB
-            self.pairs.setdefault(key, PairSummary((names[key[:2]], names[key[2:]]))).add(frame.step, pair)
+            self.pairs.setdefault(key, PairSummary((names[key[:2]], names[key[2:]]))).add(
+                frame.step, pair, float(np.linalg.norm(between.get(key, 0.0)))
+            )
         for contact, opinion in zip(frame.contacts, opinions):
             self._add_opinion(
                 frame.step, (names[contact.bodyA, contact.linkA], names[contact.bodyB, contact.linkB]), opinion
@@ -111,6 +124,7 @@ class Summary:
                     "largest_depth_m": pair.depth,
                     "depth_step": pair.depth_step,
                     "normal": pair.normal,
+                    **({"largest_force_n": pair.force, "force_step": pair.force_step} if self.forces else {}),
                 }
                 for key, pair in sorted(self.pairs.items(), key=lambda item: -item[1].volume)
             ],

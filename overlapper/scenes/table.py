@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.columns import MEASURES
+from overlapper.columns import FORCE_MEASURES, MEASURES
 
 if TYPE_CHECKING:
     from overlapper.reference import Comparison
     from overlapper.simulation.contacts import Contact
+    from overlapper.simulation.forces.forces import Forces
     from overlapper.simulation.links import LinkContact
 
 Value = int | float | str | None
@@ -36,6 +37,9 @@ COLUMNS: dict[str, type] = {
     "fcl": str,
     "fcl_explanation": str,
 }
+
+# What a run with volumetric contact has beside: nothing of a pair that it does not push apart.
+FORCES: dict[str, type] = dict.fromkeys(FORCE_MEASURES, float)
 
 
 class Bodies(Protocol):
@@ -73,9 +77,15 @@ def placements(bodies: Bodies, side: str) -> dict[tuple[int, int, int], Row]:
 
 
 def rows(
-    step: int, time: float, bodies: Bodies, contacts: Sequence[Contact], opinions: Sequence[Comparison] = ()
+    step: int,
+    time: float,
+    bodies: Bodies,
+    contacts: Sequence[Contact],
+    opinions: Sequence[Comparison] = (),
+    forces: Forces | None = None,
 ) -> list[Row]:
-    """The rows of one step; `opinions` are FCL's of the same contacts, if it was asked."""
+    """The rows of one step; `opinions` are FCL's of the same contacts, if it was asked, `forces` those between them."""
+    pushed = _pushed(forces)
     a, b = placements(bodies, "A"), placements(bodies, "B")
     table: list[Row] = []
     for k, contact in enumerate(contacts):
@@ -94,14 +104,33 @@ def rows(
                 **dict(zip(MEASURES, measures)),
                 "fcl": opinions[k].verdict if opinions else None,
                 "fcl_explanation": opinions[k].explanation if opinions else None,
+                **pushed.get(_key(contact), {}),
             }
         )
     return table
 
 
-def link_rows(step: int, time: float, bodies: Bodies, pairs: Sequence[LinkContact]) -> list[Row]:
-    """The rows of one step by links as a whole; columns of single shapes, their poses, area and FCL, are left empty."""
+def _key(contact: Contact) -> tuple[int, ...]:
+    return contact.bodyA, contact.linkA, contact.shapeA, contact.bodyB, contact.linkB, contact.shapeB
+
+
+def _pushed(forces: Forces | None) -> dict[tuple[int, ...], Row]:
+    """The columns of FORCES by pair of shapes."""
+    if forces is None:
+        return {}
+    keys = map(tuple, forces.pairs.tolist())
+    return {pair: dict(zip(FORCES, values)) for pair, values in zip(keys, forces.measures.tolist())}
+
+
+def link_rows(
+    step: int, time: float, bodies: Bodies, pairs: Sequence[LinkContact], forces: Forces | None = None
+) -> list[Row]:
+    """The rows of one step by links as a whole; columns of single shapes, their poses, area, slip and FCL, are empty.
+
+    Forces and energies are sums over the pairs of their shapes, and so are torques, about the centroid of the links.
+    """
     names = bodies.names
+    at = {} if forces is None else {pair: k for k, pair in enumerate(map(tuple, forces.pairs.tolist()))}
     table: list[Row] = []
     for pair in pairs:
         centroid = [None] * 3 if pair.centroid is None else pair.centroid.tolist()
@@ -118,6 +147,17 @@ def link_rows(step: int, time: float, bodies: Bodies, pairs: Sequence[LinkContac
                 "nameB": names[pair.bodyB, pair.linkB],
                 "status": pair.status,
                 **dict(zip(MEASURES, measures)),
+                **_sum_of(pair, forces, [at[_key(each)] for each in pair.contacts if _key(each) in at]),
             }
         )
     return table
+
+
+def _sum_of(pair: LinkContact, forces: Forces | None, which: Sequence[int]) -> Row:
+    """The columns of FORCES of two links, of those rows of `forces`."""
+    if forces is None or pair.centroid is None or not which:
+        return {}
+    arms = np.nan_to_num(forces.centre[which]) - pair.centroid
+    torque = forces.torque[which] + np.cross(arms, forces.force[which])
+    sums = [*forces.force[which].sum(axis=0), *torque.sum(axis=0), forces.energy[which].sum()]
+    return {name: float(each) for name, each in zip(FORCES, sums)}

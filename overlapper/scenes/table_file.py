@@ -24,10 +24,12 @@ from typing import Any, Protocol
 from overlapper import __version__
 from overlapper.install import hint
 from overlapper.printable import first_line, printable
-from overlapper.scenes.table import COLUMNS, POSE, Row, Value
+from overlapper.scenes.table import COLUMNS, FORCES, POSE, Row, Value
 from overlapper.whole_file import claim, settle
 
 __all__ = ["TABLES", "CsvTable", "ParquetTable", "SqliteTable", "Table", "read_csv", "read_metadata", "read_table"]
+
+KNOWN = COLUMNS | FORCES
 
 # The columns without which a table says nothing of pairs.
 NEEDED = ["step", "status"]
@@ -184,11 +186,11 @@ def read_csv(path: Path) -> list[Row]:
 def _row(columns: Sequence[str], cells: Sequence[str]) -> Row:
     if len(cells) != len(columns):
         raise ValueError(f"it has {len(cells)} cells and not {len(columns)}")
-    return _checked({name: COLUMNS[name](cell) if cell else None for name, cell in zip(columns, cells)})
+    return _checked({name: KNOWN[name](cell) if cell else None for name, cell in zip(columns, cells)})
 
 
 def _check_columns(path: Path, columns: Sequence[str]) -> None:
-    strangers, lacking = set(columns) - COLUMNS.keys(), [name for name in NEEDED if name not in columns]
+    strangers, lacking = set(columns) - KNOWN.keys(), [name for name in NEEDED if name not in columns]
     if not columns:
         raise ValueError(f"{path} is not a table of overlaps: it has no columns")
     if strangers or lacking or len(set(columns)) < len(columns):
@@ -199,7 +201,7 @@ def _check_columns(path: Path, columns: Sequence[str]) -> None:
 def _checked(row: Row) -> Row:
     """The row, if its values are of the columns' types."""
     for name, value in row.items():
-        kind = COLUMNS[name]
+        kind = KNOWN[name]
         if kind is float and type(value) is int:
             row[name] = float(value)
         elif value is not None and type(value) is not kind:

@@ -14,6 +14,7 @@ from overlapper.polytopes.shape_text import alike
 from overlapper.scenes.comparison import (
     Differences,
     Move,
+    compare_forces,
     compare_measures,
     compare_poses,
     loose_budgets,
@@ -31,9 +32,9 @@ class Verdict:
     """What has moved in a scene since it was recorded, by cause.
 
     `geometry`: overlaps of the shapes and poses recorded, measured by today's package. `shapes`: shapes as today's
-    simulation has them. `dynamics`: poses of today's simulation. `overlaps`: what has become of the overlaps because of
-    the last two, and empty if both are as recorded. `notes`: sentences about budgets that do not fit. `before` and
-    `after` are the steps as recorded and as they are today.
+    simulation has them. `dynamics`: poses of today's simulation, and forces of volumetric contact. `overlaps`: what has
+    become of the overlaps because of the last two, and empty if both are as recorded. `notes`: sentences about budgets
+    that do not fit. `before` and `after` are the steps as recorded and as they are today.
     """
 
     expected: Expected
@@ -66,7 +67,7 @@ class Verdict:
         sections = {
             "geometry": (self.geometry, "overlaps of the shapes and poses recorded, measured today"),
             "shapes": (self.shapes, "what today's models are read as"),
-            "dynamics": (self.dynamics, "where today's simulation puts them"),
+            "dynamics": (self.dynamics, "where today's simulation puts and pushes them"),
         }
         if self.overlaps:
             sections["overlaps"] = (self.overlaps, "what comes of it, where it is more than a hundredth")
@@ -87,6 +88,10 @@ def examine(scene: Scene, expected: Expected) -> Verdict:
     geometry = compare_measures(expected.rows, replay(expected), expected.budgets, names)
     today = [row for step, still in after.items() for row in still.placements(step)]
     dynamics = compare_poses(expected.rows, today, expected.budgets, names)
+    if any(still.forces is not None for still in after.values()):
+        today = [row for step, still in after.items() for row in still.rows(step, expected.tolerance)]
+        forces = compare_forces(expected.rows, today, expected.budgets, names)
+        dynamics = Differences(dynamics.moves + forces.moves, dynamics.spent | forces.spent)
     shapes = _shape_moves(scene, before, after, names)
     overlaps: list[Move] = []
     if shapes or dynamics.moves:

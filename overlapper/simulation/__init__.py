@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from overlapper.simulation.bodies import Bodies, SelfCollisionWarning, SkippedShapeWarning
     from overlapper.simulation.contacts import Contact, Contacts
     from overlapper.simulation.extraction.model import Concave, Decomposed, Skipped, Surface
-    from overlapper.simulation.forces.contact import NoDirectionWarning, SubstepsWarning, VolumetricContact
+    from overlapper.simulation.forces.cautions import NoDirectionWarning, SubstepsWarning
+    from overlapper.simulation.forces.contact import VolumetricContact
     from overlapper.simulation.forces.forces import Forces
     from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
     from overlapper.simulation.recorder import Recorder
@@ -53,7 +54,8 @@ __getattr__ = lazily(
         "bodies": ("Bodies", "SelfCollisionWarning", "SkippedShapeWarning"),
         "contacts": ("Contact", "Contacts"),
         "extraction.model": ("Concave", "Decomposed", "Skipped", "Surface"),
-        "forces.contact": ("NoDirectionWarning", "SubstepsWarning", "VolumetricContact"),
+        "forces.cautions": ("NoDirectionWarning", "SubstepsWarning"),
+        "forces.contact": ("VolumetricContact",),
         "forces.forces": ("Forces",),
         "links": ("LinkContact", "LinkContacts", "link_contacts"),
         "recorder": ("Recorder",),

@@ -36,6 +36,9 @@ MEASURES = (
     Measure("mean_force_m2", "mean force per pressure, mm²", 1e6),
 )
 
+# Of volumetric contact.
+FORCE = Measure("largest_force_n", "largest force, N", 1.0)
+
 
 @dataclass(frozen=True, slots=True)
 class Axis:

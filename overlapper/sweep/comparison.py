@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from overlapper.printable import first_line
 from overlapper.scenes.comparison import off_by
-from overlapper.scenes.expected import ROUNDING, Budget, read_budgets
+from overlapper.scenes.expected import FORCES, ROUNDING, Budget, read_budgets
 from overlapper.scenes.parameters import Parameter, described
 from overlapper.sweep.part import FAILURES, OF, TASK, TASKS
 from overlapper.sweep.store import Store, rows_in
@@ -25,6 +25,7 @@ Key = tuple[Parameter, ...]
 
 # What is compared, each with the quantity whose budget holds for it.
 BUDGETED = {"largest_volume_m3": "volume", "mean_volume_m3": "volume", "largest_depth_m": "depth"}
+BUDGETED |= {"largest_force_n": "force"}  # of volumetric contact alone
 FORCE, CONTACT, TASK_ITSELF = "mean_force_m2", "contact_time_s", "task"
 COMPARED = (TASK_ITSELF, *BUDGETED, FORCE, CONTACT)
 
@@ -115,7 +116,7 @@ class Recorded:
 
     def __init__(self, folder: Path, expected: Path, sweep: Sweep) -> None:
         self._folder, self._sweep = folder, sweep
-        self._budgets = ROUNDING | (read_budgets(expected) if expected.is_file() else {})
+        self._budgets = ROUNDING | FORCES | (read_budgets(expected) if expected.is_file() else {})
         rows = _rows(folder)
         if not rows:
             raise ValueError(f"--check {folder}: there is no sweep in it")
@@ -160,6 +161,8 @@ class Recorded:
 def _measured(was: Row, now: Row, budgets: Mapping[str, Budget]) -> Iterator[tuple[str, float, float, float]]:
     """Each measure with what it was and is, and the part of its budget that the difference takes."""
     for measure, quantity in BUDGETED.items():
+        if measure not in was or measure not in now:
+            continue
         a, b = float(was[measure]), float(now[measure])
         yield measure, a, b, _part(budgets[quantity], off_by(a, b), a)
     # Forces that cancel leave the rounding of all the surface that they are of, which is not less than this.

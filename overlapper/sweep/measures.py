@@ -34,21 +34,28 @@ MEASURES: dict[str, type] = {
     "deepestB": str,
 }
 
+# What volumetric contact adds: the largest force between two links.
+FORCES: dict[str, type] = {"largest_force_n": float, "hardest_step": int, "hardestA": str, "hardestB": str}
+
 Links = tuple[int, int, int, int]
 
 
 @dataclass(slots=True)
 class _Pair:
-    """Two links so far: the largest volume, the largest depth, each with its step, and the sum of the wrenches."""
+    """Two links so far: the largest volume, depth and force, each with its step, and the sum of the wrenches."""
 
     volume: float = 0.0
     volume_error: float = 0.0
     volume_step: int = 0
     depth: float = 0.0
     depth_step: int = 0
+    force: float = 0.0
+    force_step: int = 0
     wrench: NDArray[np.float64] = field(default_factory=lambda: np.zeros(6))
 
-    def add(self, step: int, pair: LinkContact) -> None:
+    def add(self, step: int, pair: LinkContact, force: float) -> None:
+        if force > self.force:
+            self.force, self.force_step = force, step
         if pair.volume > self.volume:
             self.volume, self.volume_error, self.volume_step = pair.volume, pair.volume_error, step
         if pair.depth > self.depth:
@@ -87,13 +94,14 @@ class Measures:
             return
         self._contact += passed
         self._names |= frame.bodies.names
+        between = {} if frame.forces is None else frame.forces.between_links()
         for pair in found:
             links = pair.bodyA, pair.linkA, pair.bodyB, pair.linkB
-            self._pairs.setdefault(links, _Pair()).add(frame.step, pair)
+            self._pairs.setdefault(links, _Pair()).add(frame.step, pair, float(np.linalg.norm(between.get(links, 0.0))))
             self._volume += pair.volume
 
     def row(self) -> dict[str, Value]:
-        """The columns of MEASURES."""
+        """The columns of MEASURES and of FORCES."""
         row: dict[str, Value] = {
             "steps": self._steps,
             "time_s": self._time,
@@ -102,6 +110,7 @@ class Measures:
             "largest_volume_m3": 0.0,
             "largest_volume_error_m3": 0.0,
             "largest_depth_m": 0.0,
+            "largest_force_n": 0.0,
         }
         if self._pairs:
             links, worst = max(self._pairs.items(), key=lambda item: item[1].volume)
@@ -112,6 +121,10 @@ class Measures:
             links, deepest = max(self._pairs.items(), key=lambda item: item[1].depth)
             row |= {"largest_depth_m": deepest.depth, "deepest_step": deepest.depth_step}
             row |= self._named("deepest", links)
+            links, hardest = max(self._pairs.items(), key=lambda item: item[1].force)
+            if hardest.force:
+                row |= {"largest_force_n": hardest.force, "hardest_step": hardest.force_step}
+                row |= self._named("hardest", links)
         return row
 
     def _named(self, word: str, links: Links) -> dict[str, Value]:

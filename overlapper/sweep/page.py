@@ -104,8 +104,9 @@ def command(sweep: Sweep, scene: str, row: Row, place: Path) -> str:
     study = sweep.study
     defaults = study.loaded()
     words = [f"--set={name}={row[name]}" for name, value in defaults.parameters.items() if row[name] != value]
-    if study.settings["steps"] != defaults.steps:
-        words.append(f"--steps={study.settings['steps']}")
+    for name, value in (("steps", defaults.steps), ("contact", defaults.contact)):
+        if study.settings[name] != value:
+            words.append(f"--{name}={study.settings[name]}")
     others = [
         f"--{name.replace('_', '-')}={study.settings[name]}"
         for name, value in DEFAULTS.items()
@@ -186,7 +187,8 @@ def _charts(sweep: Sweep, rows: Sequence[Row]) -> Iterable[str]:
     varied = _varied(sweep, rows)
     if not varied:
         return
-    columns = {measure: np.array([_measured(row, measure.column) for row in rows]) for measure in charts.MEASURES}
+    measures = [*charts.MEASURES, *[charts.FORCE] * (charts.FORCE.column in rows[0])]
+    columns = {measure: np.array([_measured(row, measure.column) for row in rows]) for measure in measures}
     axes = [charts.axis(name, [row[name] for row in rows]) for name in varied[:DRAWN]]
     yield "<h2>Over each parameter</h2>"
     yield '<p class="quiet">Line: the median of all tasks with that value. Band: from the least to the largest.</p>'

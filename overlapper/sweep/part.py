@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from overlapper.install import hint
 from overlapper.scenes.table import COLUMNS
-from overlapper.sweep.measures import MEASURES
+from overlapper.scenes.table import FORCES as FORCE_COLUMNS
+from overlapper.sweep.measures import FORCES, MEASURES
 
 if TYPE_CHECKING:
     from overlapper.scenes.parameters import Parameter
@@ -21,6 +22,9 @@ TASKS, STEPS, FAILURES = "tasks", "steps", "failures"
 FAILED: dict[str, type] = {"what": str, "sentence": str, "traceback": str}
 
 OF: dict[str, Mapping[str, type]] = {TASKS: MEASURES, STEPS: COLUMNS, FAILURES: FAILED}
+
+# What volumetric contact adds to them.
+FORCES_OF: dict[str, Mapping[str, type]] = {TASKS: FORCES, STEPS: FORCE_COLUMNS, FAILURES: {}}
 
 
 def arrow() -> Any:
@@ -36,7 +40,7 @@ def arrow() -> Any:
 def must_be_no_columns(defaults: Mapping[str, Parameter]) -> None:
     """ValueError if a parameter has the name of a column of ours."""
     for table, columns in OF.items():
-        if taken := defaults.keys() & {TASK, *columns}:
+        if taken := defaults.keys() & {TASK, *columns, *FORCES_OF[table]}:
             raise ValueError(f"the parameter {min(taken)!r} has the name of a column of the table of {table}")
 
 
@@ -47,10 +51,15 @@ def part(
     rows: Iterable[Row],
     heading: Mapping[str, str],
 ) -> bytes:
-    """A Parquet file with the name and the parameters of a task in every row; equal rows are equal bytes."""
+    """A Parquet file with the name and the parameters of a task in every row; equal rows are equal bytes.
+
+    `heading` says what the study is of: with volumetric contact, there are columns of forces.
+    """
     pyarrow = arrow()
     kinds = {int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string(), bool: pyarrow.bool_()}
     columns = {TASK: str, **{each: type(value) for each, value in parameters.items()}, **OF[table]}
+    if heading.get("contact") == "volumetric":
+        columns |= FORCES_OF[table]
     schema = pyarrow.schema([(column, kinds[kind]) for column, kind in columns.items()], dict(heading))
     which = {TASK: name, **parameters}
     filled = pyarrow.Table.from_pylist([{**which, **row} for row in rows], schema=schema)

@@ -32,7 +32,7 @@ def prepared(study: Study) -> Callable[[Task], Parts]:
             for frame in frames:
                 measures.add(frame)
                 if study.kept and frame.step % study.kept == 0:
-                    kept += rows(frame.step, frame.time, frame.bodies, frame.contacts)
+                    kept += rows(frame.step, frame.time, frame.bodies, frame.contacts, forces=frame.forces)
         parts = {STEPS: part(STEPS, task.name, task.parameters, kept, heading)} if study.kept else {}
         return parts | {TASKS: part(TASKS, task.name, task.parameters, [measures.row()], heading)}
 

@@ -1,9 +1,22 @@
 """What pushes the bodies of a scene apart: contact points, or what they share."""
 
+import re
+from dataclasses import replace
+
 import pytest
 
+from overlapper.scenes.comparison import compare_forces
+from overlapper.scenes.expected import FORCES as FORCE_BUDGETS
+from overlapper.scenes.expected import read_expected
+from overlapper.scenes.outputs import outputs
+from overlapper.scenes.record import record
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import SceneError, load_scene
+from overlapper.scenes.summary import Summary
+from overlapper.scenes.table import FORCES, link_rows, rows
+from overlapper.scenes.table_file import read_table
+from overlapper.scenes.verdict import examine
+from overlapper.simulation import link_contacts
 
 SCENE = '''"""A cube on a plane."""
 import pybullet as p
@@ -50,3 +63,123 @@ def test_a_scene_says_what_its_contact_is_and_a_run_says_otherwise(scene):
 def test_a_contact_that_is_none_is_refused(scene):
     with pytest.raises(SceneError, match=r"cube\.py has CONTACT = 'soft', which must be 'bullet' or 'volumetric'"):
         scene("CONTACT = 'soft'")
+
+
+def test_a_contact_that_a_run_does_not_know_is_refused(scene):
+    with pytest.raises(ValueError, match="contact must be 'bullet' or 'volumetric', not 'soft'"):
+        next(run(scene(), contact="soft"))
+
+
+LYING = [0, 0, -9.81, 0, 0, 0, 9.81**2 / 2e5, 0, 0, 0]  # k V²/2A of the cube at rest
+FORCED = [*FORCES]
+
+
+def lying(rows):
+    """The columns of forces in the last of some rows."""
+    return [rows[-1][name] for name in FORCED]
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet", "sqlite"])
+@pytest.mark.parametrize("per", ["shape", "link"])
+def test_forces_are_columns_of_a_table(scene, tmp_path, ending, per):
+    path = tmp_path / f"cube.{ending}"
+    found = []
+    with outputs(summary := Summary("cube"), {}, [], path, per=per, forces=True) as take:
+        for frame in run(scene(), 50, contact="volumetric"):
+            take(frame)
+            where = frame.step, frame.time, frame.bodies
+            found += rows(*where, frame.contacts, forces=frame.forces)
+    table = read_table(path)
+    expected = [0.0 if per == "shape" or not name.startswith("slip") else None for name in FORCED]
+    for name, value, there, blank in zip(FORCED, LYING, lying(table), expected):
+        assert there is None if blank is None else there == pytest.approx(value, abs=1e-6), name
+    if per == "shape":
+        assert [each[name] for each in table for name in FORCED] == [each[name] for each in found for name in FORCED]
+    (pair,) = summary.as_dict()["pairs"]
+    assert pair["largest_force_n"] == pytest.approx(9.81, rel=1e-5) and 1 <= pair["force_step"] <= 50
+
+
+def test_a_run_of_contact_points_has_no_such_columns(scene, tmp_path):
+    with outputs(summary := Summary("cube"), {}, [], tmp_path / "cube.csv") as take:
+        for frame in run(scene(), 50):
+            take(frame)
+    assert not any(name in row for row in read_table(tmp_path / "cube.csv") for name in FORCED)
+    assert not any("force" in name for pair in summary.as_dict()["pairs"] for name in pair)
+
+
+TEE = SCENE.replace(
+    "[0, 0, 0.05 - 9.81e-5]",
+    "[0, 0, 0.05 - 9.81e-5 / 2]",
+).replace(
+    "box = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)",
+    "box = p.createCollisionShapeArray([p.GEOM_BOX] * 2, halfExtents=[[0.05] * 3] * 2,"
+    " collisionFramePositions=[[-0.1, 0, 0], [0.1, 0, 0]], physicsClientId=client)",
+)
+
+
+def test_the_forces_of_two_links_are_the_sum_of_those_of_their_shapes(tmp_path):
+    (tmp_path / "feet.py").write_text(TEE, encoding="utf-8")
+    *_, frame = run(load_scene(tmp_path / "feet.py"), 5, contact="volumetric")
+    where = frame.step, frame.time, frame.bodies
+    left, right = rows(*where, frame.contacts, forces=frame.forces)
+    (whole,) = link_rows(*where, link_contacts(frame.contacts), frame.forces)
+    for name in ("force_z_n", "energy_j"):
+        assert whole[name] == pytest.approx(left[name] + right[name]) and left[name] == pytest.approx(right[name])
+    assert whole["force_z_n"] == pytest.approx(-9.81, abs=1e-5)
+    # About the middle, what one foot bears turns against the other.
+    assert whole["torque_y_nm"] == pytest.approx(0, abs=1e-9)
+    # Without the right foot, what is left turns about the middle of both.
+    only = replace(frame.forces, **{name: getattr(frame.forces, name) * [[1.0], [0.0]] for name in ("force", "torque")})
+    (half,) = link_rows(*where, link_contacts(frame.contacts), only)
+    assert half["torque_y_nm"] == pytest.approx(-0.1 * 9.81 / 2, rel=1e-5)
+    assert [*only.to_pandas().columns] == [*frame.contacts.to_pandas().columns, *FORCED]
+
+
+def test_a_pair_that_is_only_measured_has_no_force(scene):
+    filtered = "    p.setCollisionFilterPair(0, 1, -1, -1, 0, physicsClientId=client)\nPAIRS = 'all'\n"
+    *_, frame = run(scene(filtered), 3, contact="volumetric")
+    (row,) = rows(frame.step, frame.time, frame.bodies, frame.contacts, forces=frame.forces)
+    assert len(frame.forces) == 0 and row["volume_m3"] > 0 and "force_z_n" not in row
+    assert link_rows(1, 0.0, frame.bodies, link_contacts(frame.contacts), frame.forces)[0]["status"] == "overlapping"
+
+
+@pytest.fixture
+def recorded(scene):
+    known = scene("CONTACT = 'volumetric'")
+    record(known)
+    return known
+
+
+def test_an_expected_file_has_forces_with_their_budgets(recorded):
+    expected = read_expected(recorded.expected)
+    assert {name: expected.budgets[name] for name in FORCE_BUDGETS} == FORCE_BUDGETS
+    assert lying(expected.rows) == pytest.approx(LYING, abs=1e-6)
+    verdict = examine(recorded, expected)
+    assert verdict.moves == [] and "where today's simulation puts and pushes them" in verdict.lines()[2]
+
+
+def test_a_force_that_is_another_has_moved(recorded):
+    text = recorded.expected.read_text(encoding="utf-8")
+    text = re.sub(r"^# rows: .*\n", "", text, flags=re.MULTILINE)
+    heavier = re.sub(r"-9\.8[01]\d*", "-9.5", text)
+    assert heavier != text
+    recorded.expected.write_text(heavier, encoding="utf-8")
+    verdict = examine(recorded, read_expected(recorded.expected))
+    assert {move.quantity for move in verdict.moves} == {"force_n"} and len(verdict.dynamics) == 4
+    assert "force_n is (" in str(verdict.moves[0]) and verdict.moves[0].difference == pytest.approx(0.31, abs=1e-3)
+    assert "energy" in {*compare_forces(verdict.expected.rows, [], verdict.expected.budgets).spent}
+
+
+def test_without_a_budget_forces_may_be_anything(recorded):
+    expected = read_expected(recorded.expected)
+    none = [row | {"force_z_n": 1e3, "energy_j": 1.0} for row in expected.rows]
+    assert compare_forces(expected.rows, none, {}).moves == []
+    moved = compare_forces(expected.rows, none, FORCE_BUDGETS).moves
+    assert {move.quantity for move in moved} == {"force_n", "energy_j"}
+
+
+def test_contact_points_are_recorded_without_forces(scene):
+    known = scene()
+    record(known)
+    expected = read_expected(known.expected)
+    assert not FORCE_BUDGETS.keys() & expected.budgets.keys() and "energy_j" not in expected.rows[0]

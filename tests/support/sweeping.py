@@ -43,7 +43,7 @@ def build(client, *, apart=0.15, seed=0, fate="good", seconds=0.0):
 '''
 
 SETTINGS = {"tolerance": 1e-3, "method": "auto", "concave": "decompose", "concave_threshold": 0.05}
-SETTINGS |= {"surface": "nominal", "pairs": None}
+SETTINGS |= {"surface": "nominal", "pairs": None, "contact": "bullet"}
 
 # Sixty tasks of which a kill comes in the middle.
 SLOW = ["apart=0.05:0.25:20", "seed=0,1,2", "seconds=0.06"]

@@ -57,6 +57,11 @@ def test_a_page_of_samples_and_settings_has_maps_and_whole_commands():
     assert page.command(sweep, "my scene.py", row, Path("a.html")) == (
         "overlapper run 'my scene.py' --set=apart=0.125 --steps=1 --surface=margin --html=a.html"
     )
+    sweep.study.settings.update(surface="nominal", contact="volumetric")
+    assert page.command(sweep, "my scene.py", row, Path("a.html")).endswith(
+        " --steps=1 --contact=volumetric --html=a.html"
+    )
+    assert page.command(sweep, "my scene.py", row, Path("a.html")).startswith("overlapper view ")
 
 
 def test_the_summary_names_what_is_to_be_installed(monkeypatch):

@@ -18,6 +18,7 @@ from overlapper.simulation.calls import listen, unheard, unlisten
 from overlapper.simulation.commands import Commands
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.extraction.model import Array
+from overlapper.simulation.forces.cautions import NoDirectionWarning, SubstepsWarning
 from overlapper.simulation.forces.dynamics import Dynamics
 from overlapper.simulation.forces.forces import Forces
 from overlapper.simulation.forces.response import Response
@@ -31,14 +32,6 @@ COARSE = 2.0
 
 # What is swept in a step at most: stiffness beyond is damped.
 MOST_SUBSTEPS = 200
-
-
-class NoDirectionWarning(UserWarning):
-    """A body lies within another or goes through it: what they share has no side to push to."""
-
-
-class SubstepsWarning(UserWarning):
-    """The substeps are too few for the stiffness: contacts lose energy."""
 
 
 class VolumetricContact:

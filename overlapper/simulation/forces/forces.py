@@ -8,13 +8,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper.columns import FORCE_MEASURES, Columns, Tabular
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.extraction.model import Array
 from overlapper.simulation.forces.energy import energies
 
 
 @dataclass(frozen=True, eq=False)
-class Forces:
+class Forces(Tabular):
     """What pairs of shapes that share a volume do to each other, a row for each pair, in SI units and the world.
 
     `contacts` is what they share. `force` (p, 3) in N acts on the first of each pair at `centre`, and `torque` (p, 3)
@@ -22,6 +23,9 @@ class Forces:
     `slip` (p, 3) in m/s is the velocity of the first over the second at `centre`, along the patch, at the end of the
     step. `normal` (p, 3) is the direction of the pressures, unit, from the second to the first; where `directed` (p,)
     is False, what is shared has none, and it is the last known. `stiffness` (p,) is in Pa/m.
+
+    As a table, by `to_pandas()` and its like, they have the columns of `contacts` and those that volumetric contact
+    adds to `overlapper run`.
     """
 
     contacts: Contacts
@@ -66,6 +70,21 @@ class Forces:
             force += sign * self.force[rows].sum(axis=0)
             moment += sign * (self.torque[rows] + np.cross(centre[rows], self.force[rows])).sum(axis=0)
         return force, moment
+
+    def between_links(self) -> dict[tuple[int, int, int, int], Array]:
+        """The force (3,) in N on the first of two links, by (bodyA, linkA, bodyB, linkB)."""
+        found: dict[tuple[int, int, int, int], Array] = {}
+        for (a, la, _, b, lb, _), force in zip(self.pairs.tolist(), self.force):
+            found[a, la, b, lb] = found.get((a, la, b, lb), 0.0) + force
+        return found
+
+    @cached_property
+    def measures(self) -> Array:
+        """(p, 10) force, torque, energy and slip, by the columns of `overlapper run`."""
+        return np.column_stack([self.force, self.torque, self.energy, self.slip])
+
+    def _columns(self) -> Columns:
+        return {**self.contacts._columns(), **dict(zip(FORCE_MEASURES, self.measures.T))}
 
     def __len__(self) -> int:
         return len(self.force)
