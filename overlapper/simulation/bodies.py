@@ -167,9 +167,12 @@ class Bodies:
         needs no list around it. A body paired with itself stands for all pairs of its links. ValueError if there is no
         such body or link.
         """
+        return self._pairs_at(self.positions, self.orientations, among)
+
+    def _pairs_at(self, positions: Array, orientations: Array, among: Among) -> NDArray[np.int32]:
+        """The same, were the shapes there."""
         asked: Numbered = among if isinstance(among, str) else self._asked_for(among)
-        layout = self._layout
-        pairs: NDArray[np.int32] = layout.batch.candidate_pairs(layout.positions, layout.orientations)
+        pairs: NDArray[np.int32] = self._layout.batch.candidate_pairs(positions, orientations)
         return np.asarray(pairs[self._pairs.chosen(pairs, asked, self._in_force.rules)])
 
     def partners(self) -> dict[tuple[int, int], list[tuple[int, int]]]:

@@ -121,6 +121,19 @@ void Multibodies::jacobian(int link, Vec3 point, std::span<double> rows) const {
   }
 }
 
+std::array<Vec3, 2> Multibodies::twist(int link, std::span<const double> velocity) const {
+  const Body& body = bodies_[body_[link]];
+  const double* v = &velocity[body.first_coordinate];
+  const Vec3 spin{v[3], v[4], v[5]}, centre = frames_[link].translation;
+  Vec3 linear = Vec3{v[0], v[1], v[2]} + cross(spin, centre - frames_[body.first_link].translation), angular = spin;
+  for (int column : moved_[link]) {
+    const Moving& by = moving_[body.first_coordinate + column];
+    linear += v[column] * (by.turns ? cross(by.axis, centre - by.pivot) : by.axis);
+    if (by.turns) angular += v[column] * by.axis;
+  }
+  return {linear, angular};
+}
+
 void Multibodies::find_inverse_mass(int number) {
   const Body& body = bodies_[number];
   const int n = body.coordinates;

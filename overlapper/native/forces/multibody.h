@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -45,6 +46,9 @@ class Multibodies {
 
   /// Writes 6 rows: the linear velocity of the point of a link, then its angular velocity, by its body's coordinates.
   void jacobian(int link, Vec3 point, std::span<double> rows) const;
+
+  /// The linear velocity of the centre of mass of a link, and its angular velocity, by the velocity of all coordinates.
+  std::array<Vec3, 2> twist(int link, std::span<const double> velocity) const;
 
   /// By rows, as many as the body has coordinates; zeros for what forces do not move.
   std::span<const double> inverse_mass(int body) const { return inverse_mass_[body]; }

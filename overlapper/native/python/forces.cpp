@@ -105,6 +105,33 @@ nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_give
                         to_numpy<Vector>(std::move(solution.acceleration), {coordinates}), solution.sweeps);
 }
 
+/// Where shapes are that go on as their links move now.
+nb::tuple ahead(const ContactSolver& solver, double duration, nb::handle velocity_given, nb::handle links_given,
+                nb::handle positions_given, nb::handle orientations_given) {
+  const Multibodies& bodies = solver.bodies();
+  const auto velocity = numbers(velocity_given, "velocity", bodies.coordinates());
+  const auto links = to_indices(links_given, "links");
+  const size_t k = links.size();
+  std::vector<double> positions = numbers(positions_given, "positions", k, 3);
+  std::vector<double> orientations = numbers(orientations_given, "orientations", k, 4);
+  for (size_t i = 0; i < k; ++i) {
+    if (links[i] < 0 || links[i] >= std::int64_t(bodies.links().size())) fail("links", "must be places of links");
+    const int link = int(links[i]);
+    const auto [linear, angular] = bodies.twist(link, velocity);
+    double *p = &positions[3 * i], *q = &orientations[4 * i];
+    const double angle = duration * norm(angular);
+    const Vec3 half = std::sin(angle / 2) * unit(angular);
+    const Quaternion turn{half.x, half.y, half.z, std::cos(angle / 2)};
+    const Vec3 centre = bodies.centre(link), at{p[0], p[1], p[2]};
+    const Vec3 now = centre + duration * linear + rotated(turn, at - centre);
+    const Quaternion orientation = turn * Quaternion{q[0], q[1], q[2], q[3]};
+    p[0] = now.x, p[1] = now.y, p[2] = now.z;
+    q[0] = orientation.x, q[1] = orientation.y, q[2] = orientation.z, q[3] = orientation.w;
+  }
+  return nb::make_tuple(to_numpy<Matrix>(std::move(positions), {k, 3}),
+                        to_numpy<Matrix>(std::move(orientations), {k, 4}));
+}
+
 }  // namespace
 
 void define_forces(nb::module_& m) {
@@ -139,6 +166,14 @@ the world, then of its joints.)");
 `frames` begin with position and quaternion of the inertial frame, as pybullet's answers do. By row of `overlaps` (p,):
 stiffness in Pa/m, dissipation in s, and the coefficient of friction. The answer (p,) is the square of a frequency,
 (rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.)");
+  cls.def(
+      "ahead", &ahead, "duration"_a, "velocity"_a, "links"_a, "positions"_a, "orientations"_a,
+      nb::sig("def ahead(self, duration: float, velocity: numpy.typing.ArrayLike, links: "
+              "numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: "
+              "numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], "
+              "numpy.typing.NDArray[numpy.float64]]"),
+      R"((k, 3) positions in m and (k, 4) quaternions xyzw where shapes on these `links`, (k,) as for `place`, come to after
+`duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.)");
   cls.def(
       "solve", &solve, "duration"_a, "velocity"_a, "acceleration"_a, "damped"_a, "distributed"_a,
       nb::sig("def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: "

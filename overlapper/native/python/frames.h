@@ -47,4 +47,17 @@ inline Frame to_frame(nb::handle given) {
   return {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}};
 }
 
+inline Vec3 vector_part(Quaternion q) { return {q.x, q.y, q.z}; }
+
+inline Vec3 rotated(Quaternion q, Vec3 v) {
+  const Vec3 axis = vector_part(q), twice = 2 * cross(axis, v);
+  return v + q.w * twice + cross(axis, twice);
+}
+
+/// Turns by `b`, then by `a`.
+inline Quaternion operator*(Quaternion a, Quaternion b) {
+  const Vec3 v = vector_part(a), u = vector_part(b), product = a.w * u + b.w * v + cross(v, u);
+  return {product.x, product.y, product.z, a.w * b.w - dot(v, u)};
+}
+
 }  // namespace overlapper::python

@@ -4,8 +4,6 @@
 namespace overlapper::python {
 namespace {
 
-Vec3 vector_part(Quaternion q) { return {q.x, q.y, q.z}; }
-
 bool zero(Quaternion q) { return unturned(q) && q.w == 0; }
 
 Quaternion unit(Quaternion given) {
@@ -13,17 +11,6 @@ Quaternion unit(Quaternion given) {
   const Quaternion q = known ? in_range(given) : given;
   const double length = std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
   return {q.x / length, q.y / length, q.z / length, q.w / length};
-}
-
-Vec3 rotated(Quaternion q, Vec3 v) {
-  const Vec3 axis = vector_part(q), twice = 2 * cross(axis, v);
-  return v + q.w * twice + cross(axis, twice);
-}
-
-/// Turns by `b`, then by `a`.
-Quaternion operator*(Quaternion a, Quaternion b) {
-  const Vec3 v = vector_part(a), u = vector_part(b), product = a.w * u + b.w * v + cross(v, u);
-  return {product.x, product.y, product.z, a.w * b.w - dot(v, u)};
 }
 
 nb::tuple world_poses(nb::handle frames_given, nb::handle which_given, nb::handle positions_given,

@@ -11,6 +11,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from overlapper import Batch, Overlaps
 from overlapper._core import ContactSolver
 from overlapper.simulation.asked_pairs import Among, listed
 from overlapper.simulation.bodies import Bodies
@@ -146,16 +147,17 @@ class VolumetricContact:
         duration = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
         self._refresh()
         left, taken = duration, 0
-        planned = self._planned
+        length = duration / (self._planned or 1)
         try:
             while left > 1e-9 * duration:
                 if taken:
                     self.bodies.follow()
                 frequency2 = self._place(self._dynamics.solver)
-                if planned:
-                    length = duration / planned
-                else:
-                    length = left / min(_followed(frequency2, left), max(1, MOST_SUBSTEPS - taken))
+                if not self._planned:
+                    # Once in a step is enough for what comes; a length that changes within a swing costs energy.
+                    highest = frequency2.max(initial=0.0) + (0.0 if taken else self._coming(duration))
+                    if not taken or highest * length**2 > 1:
+                        length = left / min(_followed(highest, left), max(1, MOST_SUBSTEPS - taken))
                 wrenches = self._solve(length, frequency2)
                 pybullet.setTimeStep(length, client)
                 self._commands.prepare(length, first=not taken)
@@ -188,7 +190,7 @@ class VolumetricContact:
         solver = dynamics.solver.copy()
         frequency2 = self._place(solver)
         duration = pybullet.getPhysicsEngineParameters(self.bodies.physicsClientId)["fixedTimeStep"]
-        length = duration / (self._planned or min(_followed(frequency2, duration), MOST_SUBSTEPS))
+        length = duration / (self._planned or min(_followed(frequency2.max(initial=0.0), duration), MOST_SUBSTEPS))
         velocity = dynamics.velocity()
         force, torque, slip, normal, directed, *_ = solver.solve(
             length, velocity, self._others(velocity), frequency2 * length**2 > COARSE**2, self._distributed
@@ -264,6 +266,7 @@ class VolumetricContact:
         self._dynamics = Dynamics(self.bodies.physicsClientId, sorted({body for body, _, _ in self._keys}))
         self._links = np.array([self._dynamics.place[body, link] for body, link, _ in self._keys], dtype=np.int64)
         self._frames = self._dynamics.frames()
+        self._batch = Batch(self.bodies.shapes)  # for what is not yet: the one of `bodies` knows what is
         self._forget()
 
     def _forget(self) -> None:
@@ -279,19 +282,48 @@ class VolumetricContact:
 
     def _place(self, solver: ContactSolver) -> Array:
         """Give a solver what bodies share where they are; the squares of frequencies by row."""
-        dynamics = self._dynamics
         self._contacts = self.bodies.overlaps(pairs=self._among)
+        self._frames = self._dynamics.frames()
         found = self._contacts.overlaps
+        self._moduli, dissipation, friction = self._parameters(found)
+        frequency2: Array = solver.place(self._frames, found, self._links, self._moduli, dissipation, friction)
+        return frequency2
+
+    def _parameters(self, found: Overlaps) -> tuple[Array, Array, Array]:
+        """Stiffness, dissipation and coefficient of friction, by row."""
+        dynamics = self._dynamics
         links = self._links[found.pairs]
-        self._moduli = self._stiffness.of(links, dynamics.links)
         if self._friction is None:
             friction = dynamics.friction[links].prod(axis=1)
         else:
             friction = self._friction.of(links, dynamics.links)
-        self._frames = dynamics.frames()
-        dissipation = self._dissipation.of(links, dynamics.links)
-        frequency2: Array = solver.place(self._frames, found, self._links, self._moduli, dissipation, friction)
-        return frequency2
+        return self._stiffness.of(links, dynamics.links), self._dissipation.of(links, dynamics.links), friction
+
+    def _coming(self, duration: float) -> float:
+        """The square of the highest frequency of pairs that do not touch yet, and will in a time as long as that.
+
+        A body that came in by a long step would be deeper than its speed can take it: it would be thrown back. So steps
+        are short before they have to be.
+        """
+        bodies, dynamics = self.bodies, self._dynamics
+        velocity = dynamics.velocity()
+        if self._before:
+            before, length, _ = self._before
+            velocity = velocity + duration / length * (velocity - before)
+        else:
+            velocity = velocity + duration * self._other
+        positions, orientations = dynamics.solver.ahead(
+            duration, velocity, self._links, bodies.positions, bodies.orientations
+        )
+        pairs = bodies._pairs_at(positions, orientations, self._among)
+        count = len(bodies.keys)
+        now = self._contacts.overlaps.pairs.astype(np.int64) @ [count, 1]
+        pairs = pairs[~np.isin(pairs.astype(np.int64) @ [count, 1], now)]
+        if not len(pairs):
+            return 0.0
+        found = self._batch.overlaps(positions, orientations, pairs, separated=False)
+        solver = dynamics.solver.copy()
+        return float(solver.place(self._frames, found, self._links, *self._parameters(found)).max(initial=0.0))
 
     def _solve(self, duration: float, frequency2: Array) -> Array:
         """The forces of a step as long as that; (n, 6) force and torque on the links."""
@@ -356,9 +388,9 @@ class VolumetricContact:
                 )
 
 
-def _followed(frequency2: Array, duration: float) -> int:
-    """How many substeps of a duration follow the fastest swing."""
-    return max(1, math.ceil(math.sqrt(frequency2.max(initial=0.0)) * duration))
+def _followed(frequency2: float, duration: float) -> int:
+    """How many substeps of a duration follow a swing of that frequency, squared."""
+    return max(1, math.ceil(math.sqrt(frequency2) * duration))
 
 
 class _Parameter:

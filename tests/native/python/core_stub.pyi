@@ -954,6 +954,12 @@ class ContactSolver:
         (rad/s)², that no way of swinging of the two bodies on all of their patches exceeds.
         """
 
+    def ahead(self, duration: float, velocity: numpy.typing.ArrayLike, links: numpy.typing.NDArray[numpy.int64], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        (k, 3) positions in m and (k, 4) quaternions xyzw where shapes on these `links`, (k,) as for `place`, come to after
+        `duration` (s), from where they are now, if links go on with the `velocity` of all coordinates.
+        """
+
     def solve(self, duration: float, velocity: numpy.typing.ArrayLike, acceleration: numpy.typing.ArrayLike, damped: numpy.typing.ArrayLike, distributed: bool) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], int]:
         """
         The forces within a step of that `duration` (s), from `velocity` and `acceleration` of all coordinates, the latter
