@@ -45,8 +45,8 @@ def view(
     ] = None,
     close: Annotated[bool, typer.Option("--close", help="The picture is of the largest overlap.")] = False,
     overlaps: Annotated[
-        str, typer.Option(help="What is drawn of overlaps: faces, edges, vertices, marks.")
-    ] = "faces,marks",
+        str, typer.Option(help="What is drawn of overlaps: faces, edges, vertices, marks, forces.")
+    ] = "faces,marks,forces",
     overlaps_opacity: Annotated[float, typer.Option(help="From 0 to 1.")] = 1.0,
     overlaps_front: Annotated[str | None, typer.Option(help="Colour from outside; the owners' if not given.")] = None,
     overlaps_back: Annotated[str | None, typer.Option(help="Colour from inside, seen if opacity is below 1.")] = None,

@@ -155,7 +155,7 @@ def recorder(
         overlapping = set(map(tuple, found.keys[found.overlaps.status == Overlaps.OVERLAPPING].tolist()))
         due = frame.time * rate >= shown
         if due or not overlapping <= met:
-            recording.add(frame.bodies, found, frame.time)
+            recording.add(frame.bodies, found, frame.time, forces=frame.forces)
             met.update(overlapping)
             shown += due
 

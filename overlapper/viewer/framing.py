@@ -72,6 +72,12 @@ class Framing:
         """True of a half-space, and of what is as large as a body that is a ground."""
         return isinstance(placed.shape, HalfSpace) or _extent(placed.bounds) >= self._ground_size
 
+    def pushed_second(self, contact: Contact) -> bool:
+        """True if the second is what a force is seen on: the first is a ground, or stays where it is beside it."""
+        if self.is_ground(contact.overlap.shapes[0]):
+            return True
+        return contact.bodyA not in self._moved and contact.bodyB in self._moved
+
     def see(self, bodies: Bodies, contacts: Iterable[Contact]) -> None:
         """The bodies as they are at one more moment, and what they share."""
         bounded = self._bounded(bodies)

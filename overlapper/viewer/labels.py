@@ -73,11 +73,11 @@ def body_paths(bodies: Bodies) -> list[str]:
 
 def pairs(bodies: Bodies, contacts: Iterable[Contact]) -> dict[Pair, Overlap]:
     """The overlapping pairs by their names; a link or shape is named only where its body or link has more than one."""
-    return {pair: overlap for pair, _, overlap in labelled(bodies, contacts)}
+    return {pair: contact.overlap for pair, _, contact in labelled(bodies, contacts)}
 
 
-def labelled(bodies: Bodies, contacts: Iterable[Contact]) -> Iterator[tuple[Pair, tuple[Link, Link], Overlap]]:
-    """The name of each overlapping pair, its bodies and links, and the overlap; "" is the link of a body of one."""
+def labelled(bodies: Bodies, contacts: Iterable[Contact]) -> Iterator[tuple[Pair, tuple[Link, Link], Contact]]:
+    """The name of each overlapping pair, its bodies and links, and the pair; "" is the link of a body of one."""
     names = link_names(bodies)
     links = Counter(body for body, _ in names)
     shapes = Counter((body, link) for body, link, _ in bodies.keys)
@@ -93,4 +93,4 @@ def labelled(bodies: Bodies, contacts: Iterable[Contact]) -> Iterator[tuple[Pair
     for c in contacts:
         if c.overlap:
             pair = name(c.bodyA, c.linkA, c.shapeA), name(c.bodyB, c.linkB, c.shapeB)
-            yield pair, (where(c.bodyA, c.linkA), where(c.bodyB, c.linkB)), c.overlap
+            yield pair, (where(c.bodyA, c.linkA), where(c.bodyB, c.linkB)), c

@@ -35,7 +35,7 @@ GROUND, GRID = (0.36, 0.40, 0.47), (0.62, 0.68, 0.77)  # of a ground: its face a
 GROUND_OPACITY, GRID_OPACITY = 0.5, 0.45  # in its middle; it fades out from there
 LIGHT = np.array([0.5, -0.8, 1.4]) / np.linalg.norm([0.5, -0.8, 1.4])  # the way to it
 FIELD_OF_VIEW = 35.0  # degrees, from bottom to top
-PARTS = ("faces", "edges", "vertices", "marks")  # what a Look may show
+PARTS = ("faces", "edges", "vertices", "marks", "forces")  # what a Look may show
 MANY_FACETS = 100  # more than that are only of what is round
 
 
@@ -46,7 +46,8 @@ class Look:
     Colours are written #rrggbb; without them, each has its own. `opacity`, from 0 to 1, is that of the faces. `front`
     is the colour of faces seen from outside, `back` of those seen from inside, which are drawn where they can be seen:
     overlaps' own are a shade of their owners', bodies have none of their own. `marks` are the patch outline and the
-    normal of an overlap.
+    normal of an overlap. `forces`, where there are any, are arrows in the place of normals, and faces are coloured by
+    pressure, which no colour above replaces.
     """
 
     faces: bool = True
@@ -56,6 +57,7 @@ class Look:
     front: str | None = None
     back: str | None = None
     marks: bool = True
+    forces: bool = True
 
     def __post_init__(self) -> None:
         if not 0 <= self.opacity <= 1:

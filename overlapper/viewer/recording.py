@@ -2,6 +2,7 @@
 
 The page keeps bodies, poses, polytopes and numbers in arrays of the narrowest type that is seen to be enough: of what
 is at rest nothing is said twice, vertices are 16-bit fractions of their polytope's size, numbers have five digits.
+Where there are forces, the planes of facets are there, too: pressures are of depths far below a vertex's last bit.
 """
 
 from __future__ import annotations
@@ -36,6 +37,18 @@ from overlapper.viewer.look import (
     to_draw,
 )
 from overlapper.viewer.page_text import filled, licences
+from overlapper.viewer.pressure import (
+    COLORS,
+    FORCE,
+    FRICTION,
+    Forces,
+    Press,
+    arrows,
+    deepest,
+    key_of,
+    presses,
+    rounded_up,
+)
 from overlapper.viewer.stage import Stage, rgb
 from overlapper.whole_file import beside
 
@@ -44,7 +57,7 @@ from meshcat.servers.zmqserver import VIEWER_ROOT  # isort: skip
 from meshcat.transformations import translation_matrix  # isort: skip
 
 # Of the page, in the order they need each other.
-SCRIPTS = ("film", "scene", "look", "numbers", "camera", "chart", "list", "panels", "time")
+SCRIPTS = ("film", "scene", "forces", "look", "numbers", "camera", "chart", "list", "panels", "time")
 ASPECTS = (0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0)
 ARRAYS = {"float32": "Float32Array", "uint32": "Uint32Array", "int32": "Int32Array", "uint16": "Uint16Array"}
 ARRAYS |= {"int16": "Int16Array", "uint8": "Uint8Array"}
@@ -52,6 +65,9 @@ ARRAYS |= {"int16": "Int16Array", "uint8": "Uint8Array"}
 
 # Volume; its error, of which one digit is shown; depth, area, centroid; normal: columns, and bits that are enough.
 NUMBERS = [(slice(0, 1), 17), (slice(1, 2), 6), (slice(2, 7), 17), (slice(7, 10), 14)]
+# Force; torque, energy, slip; direction of the pressures; stiffness.
+PRESSES = [(slice(0, 6), 17), (slice(6, 9), 14), (slice(9, 10), 17)]
+UNPRESSED = (0.0,) * 10
 
 
 class Recording:
@@ -83,9 +99,20 @@ class Recording:
         self._polytopes = _Polytopes()
         self._sightings: list[tuple[int, int, int]] = []  # frame, pair, polytope
         self._numbers: list[Array] = []
+        self._contacts: dict[Pair, Contact] = {}  # the first of each
+        self._presses: list[tuple[float, ...]] = []  # of each sighting
+        self._depths: dict[int, float] = {}  # of polytopes
+        self._strongest: list[tuple[float, float]] = []  # N and Pa, in each frame that has forces
 
-    def add(self, bodies: Bodies, contacts: Iterable[Contact], time: float, name: str = "") -> None:
-        """Record the bodies where they are now and the overlapping pairs among `contacts`.
+    def add(
+        self,
+        bodies: Bodies,
+        contacts: Iterable[Contact],
+        time: float,
+        name: str = "",
+        forces: Forces | None = None,
+    ) -> None:
+        """Record the bodies where they are now and the overlapping pairs among `contacts`, with the `forces` of these.
 
         `time` in seconds must increase from call to call; the page counts from the first. Frames with a `name` are no
         moments of one run: the page shows their names in the place of times.
@@ -113,9 +140,15 @@ class Recording:
             self._poses[node] = pose
         contacts = list(contacts)
         self._framing.see(bodies, contacts)
-        for pair, links, overlap in labelled(bodies, contacts):
+        pressed = presses(forces)
+        most = 0.0
+        for pair, links, contact in labelled(bodies, contacts):
             self._links.setdefault(pair, links)
-            self._add_overlap(self._stage, pair, overlap)
+            self._contacts.setdefault(pair, contact)
+            most = max(most, self._add_overlap(self._stage, pair, contact.overlap, pressed.get(key_of(contact))))
+        if most:
+            found = arrows(bodies, contacts, pressed)
+            self._strongest.append((max(float(np.linalg.norm(each.force)) for each in found), most))
 
     def __repr__(self) -> str:
         until = f", {self._times[-1]:g} s" if self._times else ""
@@ -164,6 +197,21 @@ class Recording:
             "looks": {name: asdict(look) for name, look in self._looks.items()},
             "colors": {"owners": [rgb(color) for color in OWNER_COLORS[:2]], "ink": rgb(INK), "line": rgb(LINE)},
             "light": LIGHT.tolist(),
+            "forces": self._scale(framing),
+        }
+
+    def _scale(self, framing: Framing) -> dict[str, Any] | None:
+        """What is usual in a frame, for an impact of one moment is not what arrows and colours are to be told by."""
+        if not self._strongest:
+            return None
+        force, pressure = np.median(self._strongest, axis=0).tolist()
+        return {
+            "usual": force,
+            "top": rounded_up(pressure),
+            "colors": COLORS,
+            "force": rgb(FORCE),
+            "friction": rgb(FRICTION),
+            "on_second": [framing.pushed_second(contact) for contact in self._contacts.values()],
         }
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
@@ -179,6 +227,16 @@ class Recording:
             "sighting_polytope": sightings[:, 2],
             "numbers": np.hstack([_rounded(numbers[:, column], bits) for column, bits in NUMBERS]).T,
             **self._polytopes.arrays(),
+            **self._pressing(),
+        }
+
+    def _pressing(self) -> dict[str, NDArray[Any]]:
+        """What there is beside of a recording with forces; empty without."""
+        rows = self._presses if self._strongest else []
+        columns = np.array(rows, dtype=np.float32).reshape(-1, 10)
+        return {
+            "presses": np.hstack([_rounded(columns[:, column], bits) for column, bits in PRESSES]).T,
+            "planes": np.concatenate(self._polytopes.planes).T if rows else np.empty(0, np.float32),
         }
 
     def _add_body(self, stage: Stage, path: str, placed: Placed, color: Sequence[float]) -> str:
@@ -194,7 +252,8 @@ class Recording:
                 self._grounds.append(self._nodes[node])
         return node
 
-    def _add_overlap(self, stage: Stage, pair: Pair, overlap: Overlap) -> None:
+    def _add_overlap(self, stage: Stage, pair: Pair, overlap: Overlap, press: Press | None) -> float:
+        """Returns about the highest pressure, Pa."""
         number = self._pairs.setdefault(pair, len(self._pairs))
         last, polytope = self._drawn.get(pair, (None, -1))
         slack = 2 if len(overlap.owner) > MANY_FACETS else 1
@@ -205,6 +264,14 @@ class Recording:
         measures = [overlap.volume, overlap.volume_error, overlap.depth or 0.0, overlap.area]
         normal = np.zeros(3) if overlap.normal is None else overlap.normal
         self._numbers.append(np.hstack([measures, np.asarray(overlap.centroid) - stage.center, normal]))
+        if press is None:
+            self._presses.append(UNPRESSED)
+            return 0.0
+        measured = press.torque, press.energy, press.slip
+        self._presses.append((*press.force, *measured, *press.normal, press.stiffness))
+        if polytope not in self._depths:
+            self._depths[polytope] = deepest(to_draw(self._drawn[pair][0], stage.size), press.normal)
+        return press.stiffness * self._depths[polytope]
 
 
 @dataclass
@@ -216,6 +283,7 @@ class _Polytopes:
     vertices: list[NDArray[np.int16]] = field(default_factory=list)
     owners: list[NDArray[np.integer[Any]]] = field(default_factory=list)
     facets: list[list[NDArray[np.int32]]] = field(default_factory=list)
+    planes: list[NDArray[np.float32]] = field(default_factory=list)  # of facets: normal, offset from the middle
 
     def add(self, overlap: Overlap, center: Array, like: int, slack: int) -> int:
         """Keep the overlap, about `center`; `like` is the one that the pair had before, or -1. Returns its number.
@@ -232,6 +300,9 @@ class _Polytopes:
         self.vertices.append(grid)
         self.owners.append(overlap.owner)
         self.facets.append(overlap.facets)
+        planes = overlap.halfspaces
+        offsets = planes[:, 3] + planes[:, :3] @ ((lower + upper) / 2)
+        self.planes.append(np.column_stack([planes[:, :3], offsets]).astype(np.float32))
         return len(self.vertices) - 1
 
     def arrays(self) -> dict[str, NDArray[Any]]:

@@ -150,7 +150,11 @@ def test_an_expected_file_is_seen_without_its_scene(scene_file):
         ("press.py", {"live": True, "host": "no host"}, "host must be an address of this machine, not 'no host': "),
         ("gone.csv", {}, "gone.csv: No such file"),
         ("press.py", {"png": Path("a.png"), "step": 13}, "there is no step 13 to see"),
-        ("press.py", {"overlaps": "faces,corners"}, "--overlaps must name some of faces,edges,vertices,marks, not 'c"),
+        (
+            "press.py",
+            {"overlaps": "faces,corners"},
+            "--overlaps must name some of faces,edges,vertices,marks,forces, not 'c",
+        ),
         ("press.py", {"bodies_back": "red"}, "--bodies-back must be a colour like #e69f00, not 'red'"),
         ("press.py", {"live": True, "png": Path("a.png")}, "--html, --png and --live do not go together"),
     ],

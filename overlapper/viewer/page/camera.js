@@ -44,27 +44,45 @@ function linkHere() {
   return link;
 }
 
-// Volumes beside the largest overlaps, as many as there is room for; after each picture.
+// Volumes or forces beside the largest, as many as there is room for; after each picture.
 const TAGS = 5;
 function placeTags() {
-  const wanted = shown < 0 || !looks.overlaps.marks ? [] : largestFirst(sighted).slice(0, TAGS);
-  const own = shown < 0 || !looks.overlaps.marks ? -1 : sightingOf(chosen, shown);
-  if (own >= 0 && sighted.includes(own)) wanted.unshift(own);
   const taken = [], tags = [];
-  for (const sighting of new Set(wanted)) {
-    const at = onPage(measured(sighting).centroid).project(viewer.camera);
+  for (const {where, text, own} of shown < 0 ? [] : forcesSeen() ? forceTags() : volumeTags()) {
+    const at = onPage(where).project(viewer.camera);
     const x = (1 + at.x) / 2 * pane.clientWidth + 10, y = (1 - at.y) / 2 * pane.clientHeight - 28;
     if (at.z >= 1 || x < 0 || y < 0 || x > pane.clientWidth || y > pane.clientHeight) continue;
     if (taken.some(([left, top]) => Math.abs(left - x) < 84 && Math.abs(top - y) < 24)) continue;
     taken.push([x, y]);
-    const tag = element("span", {textContent: inUnit(film.numbers[sighting], units, 3).slice(0, 2).join(" ")});
-    tag.className = sighting === own ? "picked" : "";
+    const tag = element("span", {textContent: text});
+    tag.className = own ? "picked" : "";
     tag.style.transform = `translate(${x}px, ${y}px)`;
     tags.push(tag);
   }
   byId("tags").replaceChildren(...tags);
 }
+
+function volumeTags() {
+  if (!looks.overlaps.marks) return [];
+  const wanted = largestFirst(sighted).slice(0, TAGS), own = sightingOf(chosen, shown);
+  if (own >= 0 && sighted.includes(own)) wanted.unshift(own);
+  return [...new Set(wanted)].map(sighting => ({
+    where: measured(sighting).centroid,
+    text: told(film.numbers[sighting], units, 3),
+    own: sighting === own,
+  }));
+}
+
+function forceTags() {
+  const own = pushed.filter(each => each.pairs.includes(chosen));
+  return [...new Set([...own, ...pushed.slice(0, TAGS)])].map(each => ({
+    where: each.at,
+    text: told(Math.hypot(...each.force), newtons, 3),
+    own: own.includes(each),
+  }));
+}
 viewer.render = (render => () => {
+  fitForces();
   render();
   placeTags();
 })(viewer.render.bind(viewer));

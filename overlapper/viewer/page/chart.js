@@ -1,9 +1,16 @@
-// What is shared over time: of each pair or of all, as volume or as depth, linear or logarithmic.
+// What is shared over time: of each pair or of all, as volume, as depth or as force, linear or logarithmic.
 
 const LEFT = 60, RIGHT = 12, TOP = 20, BOTTOM = 20;  // px; the slider's ends are at the same places
 const CURVES = 200;  // the largest; among more, none would be told from another
 const kind = {by: "volume", total: false, logarithmic: false};
 let curves = [], drawnCurves = [], largest = 0, smallest = 0, unit = [];  // [frame, value], ... of each pair, or one of all
+const charted = ["volume", "depth", ...film.forces ? ["force"] : []];
+if (film.forces) byId("of-depth").after(element("button", {id: "of-force", textContent: "force", title: "(d)"}));
+const together = {
+  volume: {button: "total", title: " in total"},
+  depth: {button: "deepest", title: ", the deepest"},
+  force: {button: "strongest", title: ", the strongest"},
+};
 const background = document.createElement("canvas");
 
 function traceAll() {
@@ -21,7 +28,7 @@ function traceAll() {
   largest = values.reduce((a, b) => Math.max(a, b), 0);
   // As small as is of interest: nobody looks for a millionth of the largest.
   smallest = 10 ** Math.floor(Math.log10(Math.max(values.reduce((a, b) => Math.min(a, b), largest), largest * 1e-6)));
-  unit = kind.by === "volume" ? inUnit(largest, units, 3).slice(1) : ["mm", 1e-3];
+  unit = kind.by === "depth" ? ["mm", 1e-3] : inUnit(largest, kind.by === "volume" ? units : newtons, 3).slice(1);
   for (const curve of curves) curve.peak = curve.reduce((peak, [, value]) => Math.max(peak, value), 0);
   drawnCurves = curves.filter(curve => curve.length).sort((a, b) => b.peak - a.peak);
   awaitChart();
@@ -124,7 +131,7 @@ function sizeChart() {
   }
   context.textAlign = "right";
   if (!names) context.fillText("time, s", right, chart.height - 4 * ratio);
-  const title = `${kind.by}${kind.total ? kind.by === "volume" ? " in total" : ", the deepest" : ""}, ${unit[0]}`
+  const title = `${kind.by}${kind.total ? together[kind.by].title : ""}, ${unit[0]}`
     + (drawnCurves.length > CURVES ? `, the ${CURVES} largest of ${drawnCurves.length.toLocaleString("en")} pairs` : "");
   context.textAlign = "left";
   context.fillText(largest ? title : "nothing is shared", left + 5 * ratio, 12 * ratio);
@@ -187,10 +194,12 @@ function chartOf(change) {
   Object.assign(kind, change);
   const pressed = {"of-volume": kind.by === "volume", "of-depth": kind.by === "depth", "per-pair": !kind.total};
   Object.assign(pressed, {"in-total": kind.total, linear: !kind.logarithmic, logarithmic: kind.logarithmic});
+  if (film.forces) pressed["of-force"] = kind.by === "force";
   for (const [id, on] of Object.entries(pressed)) byId(id).ariaPressed = on;
-  byId("in-total").textContent = kind.by === "volume" ? "total" : "deepest";
+  byId("in-total").textContent = together[kind.by].button;
   traceAll();
 }
 const changes = {"of-volume": {by: "volume"}, "of-depth": {by: "depth"}, "per-pair": {total: false}, "in-total": {total: true}};
 Object.assign(changes, {linear: {logarithmic: false}, logarithmic: {logarithmic: true}});
+if (film.forces) changes["of-force"] = {by: "force"};
 for (const [id, change] of Object.entries(changes)) byId(id).onclick = () => chartOf(change);

@@ -76,6 +76,13 @@ function measured(sighting) {
   return {volume, error, depth, area, centroid: [x, y, z].map((part, k) => part + center[k]), normal};
 }
 
+// What the two do to each other, of a film with forces; null of two that are not said to.
+function pressOf(sighting) {
+  if (!film.forces) return null;
+  const [x, y, z, torque, energy, slip, u, v, w, stiffness] = Array.from({length: 10}, (_, k) => film.presses[k * count + sighting]);
+  return stiffness ? {force: [x, y, z], torque, energy, slip, normal: [u, v, w], stiffness} : null;
+}
+
 function extent(sighting) {
   return 2 * film.polytope_frame[3 * film.polytope_previous.length + film.sighting_polytope[sighting]];
 }

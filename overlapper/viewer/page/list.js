@@ -1,6 +1,6 @@
 // The list of overlaps: by pairs of bodies, in these by pairs of links, in these by shapes, each with its totals.
 
-const ROWS = 200, FEW = 12;
+const ROWS = 200, FEW = 12, columns = film.forces ? 3 : 2;
 const [rows, heading] = [document.querySelector("#list tbody"), document.querySelector("#list th")];
 const opened = new Map();  // whether a group is open, by its key; those that nobody touched are if there are few
 let most = 0;
@@ -15,12 +15,14 @@ function grouped(some, keys) {
   const groups = new Map();
   for (const sighting of some) {
     const key = keys[film.sighting_pair[sighting]];
-    if (!groups.has(key)) groups.set(key, {key, sightings: [], volume: 0, depth: 0});
+    if (!groups.has(key)) groups.set(key, {key, sightings: [], volume: 0, depth: 0, forces: [0, 0, 0]});
     const group = groups.get(key);
     group.sightings.push(sighting);
     group.volume += measure(sighting, "volume");
     group.depth = Math.max(group.depth, measure(sighting, "depth"));
+    (pressOf(sighting)?.force ?? []).forEach((part, k) => { group.forces[k] += part; });
   }
+  for (const group of groups.values()) group.force = Math.hypot(...group.forces);
   return [...groups.values()].sort((a, b) => b.volume - a.volume);
 }
 
@@ -36,7 +38,7 @@ function rowsOf(some) {
   const leaf = (sighting, level, wholes, own = wholes) => {
     const pair = film.sighting_pair[sighting];
     const called = wholes ? pairs[pair].map((name, k) => name === wholes[k] ? own[k] : within(name, wholes[k])) : pairs[pair];
-    wanted.push({level, pair, sighting, called, full: pairs[pair], volume: measure(sighting, "volume"), depth: measure(sighting, "depth")});
+    wanted.push({level, pair, sighting, called, full: pairs[pair], volume: measure(sighting, "volume"), depth: measure(sighting, "depth"), force: measure(sighting, "force")});
   };
   for (const bodies of grouped(some, bodyKeys)) {
     if (bodies.sightings.length === 1) {
@@ -77,7 +79,7 @@ function showList(frame) {
 }
 
 function fillRow(row, each) {
-  const {level, pair = -1, sighting, group, called, full, volume, depth} = each;
+  const {level, pair = -1, sighting, group, called, full, volume, depth, force} = each;
   Object.assign(row, {pair, sighting, group});
   const button = row.cells[0].firstChild, text = JSON.stringify([called, group?.sightings.length, group && isOpen(group.key)]);
   if (row.text !== text) {
@@ -91,7 +93,7 @@ function fillRow(row, each) {
   }
   row.level = level;
   dressRow(row);
-  [inUnit(volume, units, 3).slice(0, 2).join(" "), `${plain(1e3 * depth, 3)} mm`].forEach((text, i) => {
+  [told(volume, units, 3), `${plain(1e3 * depth, 3)} mm`, told(force, newtons, 3)].slice(0, columns).forEach((text, i) => {
     if (row.cells[i + 1].textContent !== text) row.cells[i + 1].textContent = text;
   });
 }
@@ -104,7 +106,7 @@ function dressRow(row) {
 
 function newRow() {
   const row = rows.insertRow();
-  for (let i = 0; i < 3; i++) row.insertCell();
+  for (let i = 0; i <= columns; i++) row.insertCell();
   row.cells[0].append(element("button"));
   row.onclick = () => {
     if (row.group) {
@@ -139,8 +141,12 @@ function chooseNext(step) {
 
 const [least, by] = ["least", "by"].map(byId);
 const [filterUnit, filterScale] = inUnit(film.numbers.subarray(0, count).reduce((a, b) => Math.max(a, b), 0), units, 3).slice(1);
-const scales = {volume: filterScale, depth: 1e-3};
+const scales = {volume: filterScale, depth: 1e-3, force: 1};
 by.options[0].textContent = `${filterUnit} volume`;
+if (film.forces) {
+  by.append(element("option", {value: "force", textContent: "N force"}));
+  document.querySelector("#list thead tr").append(element("th", {textContent: "force", scope: "col"}));
+}
 
 // All follows the filter; its controls say what it is.
 function leaveOut(kind, smallest) {

@@ -45,8 +45,10 @@ function applyLooks() {
   if (drawn.inside.material.vertexColors !== own) drawn.inside.material.needsUpdate = true;
   drawn.inside.material.vertexColors = own;
   drawn.inside.material.color.set(own ? 0x808080 : look.back);
-  for (const each of document.querySelectorAll("#legend .own")) each.hidden = look.front !== null;
-  byId("shared").hidden = look.front === null;
+  for (const each of document.querySelectorAll("#legend .own")) each.hidden = look.front !== null || forcesSeen();
+  byId("shared").hidden = look.front === null || forcesSeen();
+  byId("normals").hidden = forcesSeen();
+  for (const each of document.querySelectorAll(".pressing")) each.hidden = !forcesSeen();
   byId("shared").querySelector("rect").style.fill = look.front ?? "";
   if (shown >= 0) drawOverlaps(shown);
   viewer.set_dirty();
@@ -77,7 +79,7 @@ function control(kind, name) {
   return swatch;
 }
 
-const details = ["faces", "edges", "vertices", "marks", "opacity", "front", "back"];
+const details = ["faces", "edges", "vertices", "marks", ...film.forces ? ["forces"] : [], "opacity", "front", "back"];
 const kinds = ["overlaps", "bodies"];
 document.querySelector("#look thead").insertRow().append(element("th"), ...kinds.map(kind => element("th", {textContent: kind, scope: "col"})));
 for (const name of details) {
@@ -85,7 +87,7 @@ for (const name of details) {
   row.append(element("th", {textContent: name, scope: "row"}));
   for (const kind of kinds) {
     const cell = row.insertCell();
-    if (kind !== "bodies" || name !== "marks") cell.append(control(kind, name));
+    if (kind !== "bodies" || name !== "marks" && name !== "forces") cell.append(control(kind, name));
   }
 }
 const resets = document.querySelector("#look tbody").insertRow();

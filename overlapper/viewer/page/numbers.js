@@ -2,10 +2,17 @@
 
 const units = [[1e-9, "mm³"], [1e-6, "cm³"], [1e-3, "dm³"], [1, "m³"]];
 const areas = [[1e-6, "mm²"], [1e-4, "cm²"], [1, "m²"]];
+const prefixed = unit => [[1e-6, `µ${unit}`], [1e-3, `m${unit}`], [1, unit], [1e3, `k${unit}`], [1e6, `M${unit}`]];
+const [newtons, joules] = [prefixed("N"), prefixed("J")], torques = prefixed("N m").slice(0, 4);
+const speeds = prefixed("m/s").slice(0, 3), pascals = [...prefixed("Pa").slice(2), [1e9, "GPa"]];
 
 function inUnit(value, choices, digits) {
   const [unit, name] = choices.find(([unit]) => value < 1000 * unit) ?? choices[choices.length - 1];
   return [plain(value / unit, digits), name, unit];
+}
+
+function told(value, choices, digits = 4) {
+  return inUnit(value, choices, digits).slice(0, 2).join(" ");
 }
 
 // As %g has it.
@@ -18,11 +25,13 @@ function named([first, second]) {
   return [element("span", {className: "first", textContent: first}), " – ", element("span", {className: "second", textContent: second})];
 }
 
-// What is left out of the list, the scene and the chart: overlaps with less than so much volume in m³, or depth in m.
+// What is left out of the list, the scene and the chart: overlaps with less than so much volume in m³, depth in m, or
+// force in N.
 const filter = {by: "volume", least: 0};
 const row = {volume: 0, depth: 2};  // among the numbers of a sighting
 
 function measure(sighting, by) {
+  if (by === "force") return Math.hypot(...pressOf(sighting)?.force ?? [0]);
   return film.numbers[row[by] * count + sighting];
 }
 
@@ -35,6 +44,7 @@ function largestFirst(some) {
   return [...some].sort((a, b) => film.numbers[b] - film.numbers[a]);  // the first numbers are volumes
 }
 
+const STILL = 1e-9;  // m/s: a slip that is rounding
 let chosen = -1, hovered = -1, shown = -1;  // a pair, a pair, a frame
 
 function choose(pair) {
@@ -69,13 +79,19 @@ function showNumbers(frame) {
   }
   const {volume, error, depth, area, centroid, normal} = measured(sighting);
   const [text, unit, scale] = inUnit(volume, units, 4);
-  const list = document.createElement("table");
+  const list = document.createElement("table"), press = pressOf(sighting);
   for (const [name, value] of [
     ["volume", `${text} ± ${plain(error / scale, 1)} ${unit}`],
     ["depth", `${plain(1e3 * depth, 4)} mm`],
-    ["surface", inUnit(area, areas, 4).slice(0, 2).join(" ")],
+    ["surface", told(area, areas)],
     ["centroid", `(${centroid.map(part => part.toFixed(4)).join(", ")}) m`],
     ["normal", `(${normal.map(part => part.toFixed(4)).join(", ")})`],
+    ...press ? [
+      ["force", told(Math.hypot(...press.force), newtons)],
+      ["torque", told(press.torque, torques)],
+      ["energy", told(press.energy, joules)],
+      ["slip", press.slip < STILL ? "sticks" : told(press.slip, speeds)],
+    ] : [],
   ]) {
     const row = list.insertRow();
     row.append(element("th", {textContent: name}));

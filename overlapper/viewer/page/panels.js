@@ -91,3 +91,10 @@ byId("whole").onclick = () => lookAt(seenAs === "whole" ? "opening" : "whole");
 byId("help").onclick = () => byId("keys").showModal();
 document.querySelector("#head h1").textContent = film.title;
 document.title = film.title ? `${film.title}, overlapper` : "overlapper";
+
+if (film.forces) {
+  document.body.classList.add("forced");
+  byId("ramp").style.background = `linear-gradient(90deg, ${film.forces.colors.join(", ")})`;
+  byId("top").textContent = told(film.forces.top, pascals, 3);
+  document.querySelector("#legend summary").textContent = "What is what?";
+}

@@ -71,7 +71,7 @@ const through = {color: film.colors.ink, transparent: true, depthTest: false};
 const line = {color: film.colors.line, transparent: true};
 const apart = {polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1};  // from the edges upon them
 const batches = {faces: new Batch(["position", "color"])};
-for (const name of ["edges", "vertices", "marks", "arrows", "dots", "specks", "picked"]) batches[name] = new Batch(["position"]);
+for (const name of ["edges", "vertices", "marks", "arrows", "dots", "specks", "picked", "forces", "friction"]) batches[name] = new Batch(["position"]);
 const facets = batches.faces.geometry;
 const drawn = {
   inside: new THREE.Mesh(facets, new THREE.MeshBasicMaterial({vertexColors: true, transparent: true, side: THREE.BackSide, ...apart})),
@@ -83,6 +83,8 @@ const drawn = {
   dots: new THREE.Points(batches.dots.geometry, new THREE.PointsMaterial({size: 5, sizeAttenuation: false, ...through})),
   specks: new THREE.Points(batches.specks.geometry, new THREE.PointsMaterial({size: 3, sizeAttenuation: false, ...through, opacity: 0.5})),
   picked: new THREE.LineSegments(batches.picked.geometry, new THREE.LineBasicMaterial({...line, depthTest: false})),
+  forces: new THREE.Mesh(batches.forces.geometry, new THREE.MeshBasicMaterial({...through, color: film.forces?.force})),
+  friction: new THREE.Mesh(batches.friction.geometry, new THREE.MeshBasicMaterial({...through, color: film.forces?.friction})),
 };
 const overlaps = new THREE.Group();
 // Bodies come first, so that none of them tints an overlap.
@@ -109,8 +111,9 @@ function drawOverlaps(frame) {
     triangles.push(batches.faces.length / 3);
     drawOverlap(s, middle, marked.has(s) || film.sighting_pair[s] === chosen);
   }
+  drawForces(middle);
   for (const batch of Object.values(batches)) batch.done();
-  byId("dull").hidden = marked.size === sighted.length;
+  byId("dull").hidden = marked.size === sighted.length || forcesSeen();
 }
 
 function drawOverlap(sighting, middle, marked) {
@@ -121,11 +124,14 @@ function drawOverlap(sighting, middle, marked) {
     const [u, v, w] = film.vertices.subarray(i, i + 3);
     points.push([middle.x + x + scale * u, middle.y + y + scale * v, middle.z + z + scale * w]);
   }
+  const pressure = forcesSeen() && pressureIn(sighting, k), place = [middle.x + x, middle.y + y, middle.z + z];
+  const halvings = sighted.length < 12 ? 4 : sighted.length < 60 ? 3 : 2;
   const ownerOf = new Map();  // of the facet to the left of an edge
   for (let f = firstFacet[k]; f < firstFacet[k + 1]; f++) {
     const ring = film.rings.subarray(firstCorner[f], firstCorner[f + 1]), owner = film.owners[f];
-    const color = shaded(ring, points, owner, marked);
-    for (let i = 1; i < ring.length - 1; i++) for (const corner of [ring[0], ring[i], ring[i + 1]]) batches.faces.add(points[corner], color);
+    const color = pressure ? null : shaded(ring, points, owner, marked);
+    if (pressure) paintFacet(Array.from(ring, corner => points[corner].map((part, axis) => part - place[axis])), place, pressure, halvings);
+    else for (let i = 1; i < ring.length - 1; i++) for (const corner of [ring[0], ring[i], ring[i + 1]]) batches.faces.add(points[corner], color);
     for (let i = 0; i < ring.length; i++) ownerOf.set(ring[i] * 65536 + ring[(i + 1) % ring.length], owner);
   }
   for (const [edge, owner] of ownerOf) {
@@ -140,7 +146,7 @@ function drawOverlap(sighting, middle, marked) {
   const {centroid, normal, area} = measured(sighting);
   const at = centroid.map((part, i) => part - center[i] + middle.getComponent(i));
   if (unit < 0.0075 * sceneSize) (marked ? batches.dots : batches.specks).add(at);
-  if (marked && normal.some(Boolean)) drawArrow(at, normal, Math.min(Math.max(Math.sqrt(area) / 3, 0.03 * sceneSize), 0.06 * sceneSize));
+  if (marked && !forcesSeen() && normal.some(Boolean)) drawArrow(at, normal, Math.min(Math.max(Math.sqrt(area) / 3, 0.03 * sceneSize), 0.06 * sceneSize));
 }
 
 // Flat and matt facets look the same from everywhere: mostly of their own light, so that an owner is known in shade, too.
@@ -162,16 +168,20 @@ function shaded(ring, points, owner, marked) {
 }
 
 const turns = Array.from({length: 8}, (_, i) => [Math.cos(i * Math.PI / 4), Math.sin(i * Math.PI / 4)]);
+// Two unit vectors across a normal; the first is made with the axis that it has least of.
+function aside([nx, ny, nz]) {
+  const steep = Math.abs(ny) > 0.8;
+  let u = steep ? [0, nz, -ny] : [-nz, 0, nx];
+  const size = Math.hypot(...u);
+  u = u.map(part => part / size);
+  return [u, [ny * u[2] - nz * u[1], nz * u[0] - nx * u[2], nx * u[1] - ny * u[0]]];
+}
+
 function drawArrow(at, normal, length) {
   const [tip, neck] = [1, 0.8].map(part => at.map((a, i) => a + part * length * normal[i]));
   batches.marks.add(at);
   batches.marks.add(tip);
-  // Two unit vectors across the normal; the first is made with the axis that it has least of.
-  const [nx, ny, nz] = normal, steep = Math.abs(ny) > 0.8;
-  let u = steep ? [0, nz, -ny] : [-nz, 0, nx];
-  const size = Math.hypot(...u);
-  u = u.map(part => part / size);
-  const v = [ny * u[2] - nz * u[1], nz * u[0] - nx * u[2], nx * u[1] - ny * u[0]];
+  const [u, v] = aside(normal);
   const rim = turns.map(([c, s]) => neck.map((part, i) => part + 0.05 * length * (c * u[i] + s * v[i])));
   rim.forEach((point, i) => {
     const next = rim[(i + 1) % rim.length];

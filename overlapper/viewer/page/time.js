@@ -64,10 +64,14 @@ const keys = {
   o: ["panel of overlaps", () => showPanel("overlaps")],
   b: ["panel of bodies", () => showPanel("bodies")],
   l: ["panel of looks", () => showPanel("look")],
-  d: ["chart of volumes or depths", () => chartOf({by: kind.by === "volume" ? "depth" : "volume"})],
+  d: [`chart of volumes${film.forces ? ", depths or forces" : " or depths"}`, () => chartOf({by: charted[(charted.indexOf(kind.by) + 1) % charted.length]})],
   t: ["chart of pairs or of all together", () => chartOf({total: !kind.total})],
   g: ["chart linear or logarithmic", () => chartOf({logarithmic: !kind.logarithmic})],
   c: ["copy the link to this moment, seen from here", copyLink],
+  ...film.forces ? {a: ["forces: pressures and arrows", () => {
+    looks.overlaps.forces = !looks.overlaps.forces;
+    renew();
+  }]} : {},
   r: ["looks as they were", () => {
     for (const kind of kinds) Object.assign(looks[kind], film.looks[kind]);
     renew();
@@ -105,7 +109,7 @@ document.addEventListener("click", event => {
 // What the address asks for; also of a page that is open already.
 function follow() {
   const wanted = new URLSearchParams(location.hash.slice(1));
-  const by = wanted.has("depth") ? "depth" : "volume";
+  const by = Object.keys(scales).find(each => wanted.has(each)) ?? "volume";
   leaveOut(by, +wanted.get(by));
   if (wanted.has("from")) look(...["from", "at"].map(name => onPage(wanted.get(name).split(",").map(Number))));
   else lookAt("opening");

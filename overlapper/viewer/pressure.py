@@ -1,0 +1,216 @@
+"""What bodies do to each other, as it is drawn: pressures as colours, and an arrow for each pair of links.
+
+A pressure is stiffness times how far what is shared reaches along the direction of the pressures. Its colours are
+viridis's: as far apart as the values that they stand for, also to who is colour-blind, and lighter where it is more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import Overlap
+from overlapper.viewer.labels import Bodies, Contact, Link, labelled
+from overlapper.viewer.look import Array, channels
+from overlapper.viewer.outline import polytope_edges, triangles
+
+COLORS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21908c", "#27ad81", "#5dc863", "#aadc32", "#fde725")
+FORCE = (1.00, 1.00, 1.00)  # arrows: of no colour that pressures have
+FRICTION = (1.00, 0.42, 0.21)
+STEP = 1 / 25  # of the scale: a triangle in which pressures differ by more is cut in four
+HALVINGS = 4  # of a triangle's sides at most
+RIM = 0.01  # of the way to its middle: on the very rim of a facet there may be no pressure, however little further in
+ALONG = 1e-6  # sine: a facet that is turned by less from the direction of pressures is no end of a depth
+
+Key = tuple[int, ...]  # bodyA, linkA, shapeA, bodyB, linkB, shapeB
+
+
+class Forces(Protocol):
+    """Forces between pairs of shapes, a row for each, in SI units and the world; see simulation.forces.Forces."""
+
+    @property
+    def pairs(self) -> NDArray[np.int64]: ...
+    @property
+    def force(self) -> Array: ...
+    @property
+    def torque(self) -> Array: ...
+    @property
+    def energy(self) -> Array: ...
+    @property
+    def slip(self) -> Array: ...
+    @property
+    def normal(self) -> Array: ...
+    @property
+    def stiffness(self) -> Array: ...
+
+
+@dataclass(frozen=True)
+class Press:
+    """The `force` (3,) on the first of a pair in N, and what goes with it in N m, J, m/s and Pa/m.
+
+    `normal` (3,) is the direction of the pressures, unit; what of the force is across it is friction.
+    """
+
+    force: Array
+    torque: float
+    energy: float
+    slip: float
+    normal: Array
+    stiffness: float
+
+    @property
+    def friction(self) -> Array:
+        across: Array = self.force - (self.force @ self.normal) * self.normal
+        return across
+
+
+def presses(forces: Forces | None) -> dict[Key, Press]:
+    """By pair of shapes; nothing of None."""
+    if forces is None:
+        return {}
+    torque, slip = (np.linalg.norm(each, axis=1) for each in (forces.torque, forces.slip))
+    return {
+        tuple(key): Press(forces.force[row], torque[row], forces.energy[row], slip[row], forces.normal[row], stiffness)
+        for row, (key, stiffness) in enumerate(zip(forces.pairs.tolist(), forces.stiffness.tolist(), strict=True))
+    }
+
+
+def key_of(contact: Contact) -> Key:
+    return contact.bodyA, contact.linkA, contact.shapeA, contact.bodyB, contact.linkB, contact.shapeB
+
+
+def depths(overlap: Overlap, normal: Array, points: Array) -> Array:
+    """How far the overlap reaches along the normal through points (..., 3) in it or on it, (...), in m."""
+    planes = overlap.halfspaces
+    slopes = planes[:, :3] @ normal
+    room = np.maximum(-(points @ planes[:, :3].T + planes[:, 3]), 0)
+    ends = np.abs(slopes) > ALONG
+    ways = room[..., ends] / np.abs(slopes[ends])
+    sides = [np.where(side, ways, np.inf).min(axis=-1, initial=np.inf) for side in (slopes[ends] > 0, slopes[ends] < 0)]
+    found: Array = sides[0] + sides[1]
+    return found
+
+
+def deepest(overlap: Overlap, normal: Array) -> float:
+    """How deep it is at about the deepest place: of its corners, the middles of edges and facets, and its centroid."""
+    corners, edges = overlap.vertices, overlap.vertices[polytope_edges(overlap.facets)].mean(axis=1)
+    middles = [corners[ring].mean(axis=0) for ring in overlap.facets]
+    points = np.concatenate([corners, edges, middles, [overlap.centroid]])
+    return float(depths(overlap, normal, points).max())
+
+
+def pressures(overlap: Overlap, press: Press, top: float) -> tuple[Array, Array]:
+    """Triangles (k, 3, 3) of the surface, and the pressures (k, 3) at their corners, Pa.
+
+    They are so small that pressures differ by little of `top` in each.
+    """
+    corners = overlap.vertices[triangles(overlap.facets)]
+    middles = np.array([overlap.vertices[ring].mean(axis=0) for ring in overlap.facets])
+    facet = np.repeat(np.arange(len(middles)), [len(ring) - 2 for ring in overlap.facets])
+    done = []
+    for halving in range(HALVINGS + 1):
+        points = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+        within = points + RIM * (middles[facet][:, None] - points)
+        found = press.stiffness * depths(overlap, press.normal, within)
+        even = (np.ptp(np.minimum(found, top), axis=1) <= STEP * top) | (halving == HALVINGS)
+        done.append((corners[even], found[even, :3]))
+        corners, facet = corners[~even], np.tile(facet[~even], 4)
+        halves = (corners + np.roll(corners, -1, axis=1)) / 2
+        outer = [np.stack([corners[:, k], halves[:, k], halves[:, k - 1]], axis=1) for k in range(3)]
+        corners = np.concatenate([*outer, halves])
+    return np.concatenate([each for each, _ in done]), np.concatenate([each for _, each in done])
+
+
+def colors(pressure: Array, top: float) -> Array:
+    """(..., 3) of pressures (...): the last colour is that of `top` and more."""
+    places = np.linspace(0, 1, len(COLORS))
+    stops = np.array([channels(color) for color in COLORS])
+    return np.stack([np.interp(pressure / top, places, stops[:, part]) for part in range(3)], axis=-1)
+
+
+def rounded_up(value: float, digits: Sequence[int] = (1, 2, 5, 10)) -> float:
+    """To the next of those digits times a power of ten."""
+    if not value > 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * next(each for each in digits if each * power >= value * (1 - 1e-9)))
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Arrows: `length` m stand for `force` N. The last colour stands for `top` Pa."""
+
+    length: float
+    force: float
+    top: float
+
+    @classmethod
+    def of(cls, force: float, top: float, length: float) -> Scale:
+        """With arrows of that force as long as that, or down to half of it, as lengths and forces are round."""
+        unit = 10.0 ** np.floor(np.log10(length))
+        return cls(float(unit), rounded_up(force * unit / length, range(1, 11)), rounded_up(top))
+
+    def arrow(self, force: Array) -> Array:
+        return force * (self.length / self.force)
+
+    def __str__(self) -> str:
+        return f"{_in_unit(self.length, LENGTHS)} = {_in_unit(self.force, NEWTONS)}"
+
+    @property
+    def pressure(self) -> str:
+        """What the last colour stands for."""
+        return _in_unit(self.top, PASCALS)
+
+
+LENGTHS = ((1e-3, "mm"), (1e-2, "cm"), (1.0, "m"))
+NEWTONS = ((1e-6, "µN"), (1e-3, "mN"), (1.0, "N"), (1e3, "kN"), (1e6, "MN"))
+PASCALS = ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa"))
+
+
+def _in_unit(value: float, units: Sequence[tuple[float, str]]) -> str:
+    unit, name = next((each for each in reversed(units) if value >= each[0] * (1 - 1e-9)), units[0])
+    return f"{value / unit:.3g} {name}"
+
+
+def force_text(force: float) -> str:
+    return _in_unit(force, NEWTONS)
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """The sum of the forces of a pair of links on one of them, in N, and of their friction; `start` (3,) in m."""
+
+    links: tuple[Link, Link]
+    start: Array
+    force: Array
+    friction: Array
+
+
+def arrows(
+    bodies: Bodies,
+    contacts: Iterable[Contact],
+    pressed: Mapping[Key, Press],
+    on_second: Callable[[Contact], bool] = lambda contact: False,
+) -> list[Arrow]:
+    """For each pair of links, where its overlaps are in the mean, weighted by force; on the first unless it is said."""
+    sums: dict[tuple[Link, Link], Arrow] = {}
+    weights: dict[tuple[Link, Link], float] = {}
+    for _, links, contact in labelled(bodies, contacts):
+        press = pressed.get(key_of(contact))
+        weight = float(np.linalg.norm(press.force)) if press else 0.0
+        if press is None or not weight:
+            continue
+        sign = -1.0 if on_second(contact) else 1.0
+        before = sums.get(links, Arrow(links, np.zeros(3), np.zeros(3), np.zeros(3)))
+        total = weights[links] = weights.get(links, 0.0) + weight
+        sums[links] = replace(
+            before,
+            start=before.start + (np.asarray(contact.overlap.centroid) - before.start) * (weight / total),
+            force=before.force + sign * press.force,
+            friction=before.friction + sign * press.friction,
+        )
+    return list(sums.values())
