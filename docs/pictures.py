@@ -45,6 +45,12 @@ MAKERS = (
     Maker("docs/how.py", ("how.png", "how_frame.png", "how_slices.png", "how_ways.png")),
     Maker("docs/polytopes.py", ("polytopes.png",), ("overlapper/viewer/picture.py",)),
     Maker("docs/results.py", ("results.png",), ("scenes/franka_grasp.py",)),
+    of_results(
+        "forces_physics.py",
+        "forces.csv",
+        *("forces_energy.png", "forces_friction.png", "forces_bodies.png"),
+        sources=("benchmarks/forces_page.py",),
+    ),
     of_results("round_bodies.py", "*/round.csv", "round.png"),
     of_results("scene_steps.py", "*/steps.csv", "steps.png"),
     of_results(

@@ -1,0 +1,184 @@
+"""What volumetric contact does beside what textbooks say, and beside Bullet's own contact in steps as long.
+
+    python benchmarks/forces_physics.py          all again, a minute or two, then the page and its pictures
+    python benchmarks/forces_physics.py --page   only the page, from the results there are
+
+The experiments are those of the tests, tests/support/contact_experiments.py. Writes forces.csv, a line per figure, to
+benchmarks/results, and the page forces.md with its pictures to docs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT / "tests" / "support"))
+import contact_experiments as experiments  # noqa: E402
+from contact_experiments import HALF, STEP, G  # noqa: E402
+from forces_page import LAWS, Row, write_page  # noqa: E402
+
+from overlapper import Box, Placed, overlap  # noqa: E402
+from overlapper.simulation import SubstepsWarning  # noqa: E402
+
+RESULTS = ROOT / "benchmarks" / "results" / "forces.csv"
+SUBSTEPS = (1, 2, 4, 8, 16, 32, 64)
+FEW = (1, 4, 20)
+WINDOW = 12  # steps of a series of which the largest is kept
+
+
+def measured() -> Iterator[Row]:
+    for part in (rests, bounces, slides, inclines, spins, slides_and_spins, rolls, pushes, grips, stacks, loops):
+        yield from part()
+        print(f"{part.__name__}: measured", flush=True)
+
+
+def rests() -> Iterator[Row]:
+    """How far the depth is from m g / k A after three seconds, and how fast a tilted cube still is, on the way."""
+    for stiffness in (1e7, 1e8, 1e9):
+        seen = experiments.rattle(stiffness=stiffness)
+        case = f"{stiffness:.0e} Pa/m"
+        yield Row("rest", "volumetric", case, "depth", seen["depth"][-1] / (G / (stiffness * 4 * HALF**2)) - 1)
+        yield from rattling("volumetric", case, seen)
+    for substeps in (1, 4):
+        yield from rattling("bullet", f"{substeps} substeps", experiments.rattle("bullet", substeps=substeps))
+
+
+def rattling(law: str, case: str, seen: dict[str, np.ndarray]) -> Iterator[Row]:
+    speed = seen["speed"] + HALF * seen["spin"]
+    yield Row("rest", law, case, "speed", speed[-1])
+    for last in range(WINDOW, len(speed) + 1, WINDOW):
+        yield Row("rattle", law, case, f"{last * STEP:.3f}", speed[last - WINDOW : last].max())
+
+
+def bounces() -> Iterator[Row]:
+    for law in LAWS:
+        for pose in experiments.POSES if law == "volumetric" else ("face", "edge"):
+            for substeps in SUBSTEPS:
+                yield Row("bounce", law, pose, substeps, experiments.bounce(pose, substeps, law))
+
+
+def slides() -> Iterator[Row]:
+    for law in LAWS:
+        for substeps in FEW:
+            yield Row("slide", law, "", substeps, experiments.slide(substeps, law))
+
+
+def inclines() -> Iterator[Row]:
+    """The acceleration over g."""
+    for law in LAWS:
+        for slope in (0.99, 0.997, 0.999, 1.001, 1.003, 1.01):
+            acceleration, way = experiments.incline(slope, law)
+            yield Row("incline", law, "acceleration", slope, acceleration / G)
+            yield Row("incline", law, "way", slope, way)
+
+
+def spins() -> Iterator[Row]:
+    for law in LAWS:
+        for shape in ("box", "disc"):
+            for substeps in FEW:
+                stopped, foretold = experiments.spin(shape, substeps, law)
+                yield Row("spin", law, shape, substeps, stopped / foretold)
+
+
+def slides_and_spins() -> Iterator[Row]:
+    for shape in ("box", "disc"):
+        rigid = experiments.rigid_slide_and_spin(shape)
+        for name, law, friction in (
+            ("ellipsoid", "volumetric", None),
+            ("distributed", "volumetric", "distributed"),
+            ("", "bullet", None),
+        ):
+            ours = experiments.slide_and_spin(shape, law, friction)
+            for figure in ("way", "angle", "time"):
+                case = f"{shape} {name}".strip()
+                yield Row("slide and spin", law, case, figure, getattr(ours, figure) / getattr(rigid, figure))
+
+
+def rolls() -> Iterator[Row]:
+    """What is left of the speed after a second, and of the energy without dissipation."""
+    for shape in ("cylinder", "ball"):
+        for tau in (0.0, 5e-4, 1e-3, 2e-3, 4e-3):
+            v0, v1, e0, e1 = experiments.roll(shape, stiffness=1e8, dissipation=tau)
+            yield Row("roll", "volumetric", shape, tau, v1 / v0)
+            if not tau:
+                yield Row("roll", "volumetric", shape, "energy", e1 / e0 - 1)
+        v0, v1, e0, e1 = experiments.roll(shape, "bullet")
+        yield Row("roll", "bullet", shape, 0.0, v1 / v0)
+        yield Row("roll", "bullet", shape, "energy", e1 / e0 - 1)
+
+
+def pushes() -> Iterator[Row]:
+    for law in LAWS:
+        for degrees in (0, 45, 60):
+            angle = math.radians(degrees)
+            box, balls = experiments.simbenchmark(angle, law)
+            along, across = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
+            for name, velocity in (("box", box), ("balls", balls)):
+                yield Row("push", law, name, degrees, velocity @ along)
+                yield Row("push", law, f"{name} aside", degrees, velocity @ across)
+
+
+def grips() -> Iterator[Row]:
+    for law in LAWS:
+        for part in (0.97, 0.98, 0.99, 1.01, 1.02, 1.03):
+            held = experiments.grip(part, law)
+            yield Row("grip", law, "fallen", part, -held.fallen)
+            yield Row("grip", law, "speed", part, abs(held.speed))
+            yield Row("grip", law, "acceleration", part, -held.acceleration / G)
+
+
+def stacks() -> Iterator[Row]:
+    for stiffness, name in ((1e8, "1e8 Pa/m"), (1e7, "1e7 Pa/m")):
+        drift, speed = experiments.stack(stiffness=stiffness)
+        yield Row("stack", "volumetric", name, "drift", drift)
+        yield Row("stack", "volumetric", name, "speed", speed)
+    for substeps in (1, 4):
+        drift, speed = experiments.stack("bullet", substeps=substeps)
+        yield Row("stack", "bullet", f"{substeps} substeps", "drift", drift)
+        yield Row("stack", "bullet", f"{substeps} substeps", "speed", speed)
+
+
+def loops() -> Iterator[Row]:
+    """The work of an edge across an edge along a circle, over the energy stored: nought if there were a potential."""
+    a, b = Box([HALF] * 3), Placed(Box([HALF] * 3), (0, 0, 0), experiments.POSES["edge"])
+    across = (0, math.sin(math.pi / 8), 0, math.cos(math.pi / 8))  # on an edge along y
+    radius, depth, nodes = 1e-3, 2e-3, 256
+    work, stored = 0.0, 0.0
+    for turn in 2 * math.pi * np.arange(nodes) / nodes:
+        x, y, z = radius * math.cos(turn), 0.0, 2 * HALF * math.sqrt(2) - depth + radius * math.sin(turn)
+        shared = overlap(Placed(a, (x, y, z), across), b)
+        up = -np.ravel(shared.gradient)[:3]
+        force = shared.volume * up / np.linalg.norm(up)
+        work += float(force @ [-math.sin(turn), 0, math.cos(turn)]) * radius * 2 * math.pi / nodes
+        stored = max(stored, shared.volume * depth / 4)
+    yield Row("loop", "volumetric", "edge across edge", "work", abs(work) / stored)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Volumetric contact beside textbooks and beside Bullet's own.")
+    parser.add_argument("--out", type=Path, help="folder for results and page, by default those of the checkout")
+    parser.add_argument("--page", action="store_true", help="only write the page, from the results there are")
+    chosen = parser.parse_args()
+    path = chosen.out / "forces.csv" if chosen.out else RESULTS
+    if not chosen.page:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SubstepsWarning)  # few are taken to see what is lost
+            rows = list(measured())
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(Row._fields)
+            writer.writerows((*row[:-1], f"{row.value:.10g}") for row in rows)
+    print(f"Written: {path}, {write_page(path, chosen.out or ROOT / 'docs')}")
+
+
+if __name__ == "__main__":
+    main()
