@@ -81,7 +81,7 @@ def run(
             names=scene.names,
         )
         seconds = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
-        volumetric = stack.enter_context(VolumetricContact(bodies)) if model == "volumetric" else None
+        volumetric = stack.enter_context(_volumetric(scene, bodies)) if model == "volumetric" else None
         for i in range(steps or scene.steps):
             _controlled(scene, step, i)
             if volumetric is not None:
@@ -114,6 +114,13 @@ def _built(scene: Scene, client: int) -> Step | None:
     if step is not None and not callable(step):
         raise SceneError(f"build(client) of {scene.path} must return None or a function step(i), not {step!r}")
     return step
+
+
+def _volumetric(scene: Scene, bodies: Bodies) -> VolumetricContact:
+    try:
+        return VolumetricContact(bodies, **scene.volumetric)
+    except ValueError as error:
+        raise SceneError(f"{scene.path} has a CONTACT that is none: {error}") from error
 
 
 def _controlled(scene: Scene, step: Step | None, i: int) -> None:

@@ -5,8 +5,8 @@ pybullet client and may return `step(i)`, called before every stepSimulation. Wh
 `build(client, *, mass=1.0, seed=0)`, are the scene's parameters. `PAIRS`, if it is there, says which pairs
 are looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
 apart. `CONTACT`, if it is there, says what pushes them: "bullet", as by default, or "volumetric", for
-`simulation.VolumetricContact`. `NAMES`, a dictionary that `build` fills, has names of bodies by their numbers, as
-`simulation.Bodies` takes them.
+`simulation.VolumetricContact`, or a dictionary of what that is told of its contacts, as {"stiffness": 1e8}. `NAMES`, a
+dictionary that `build` fills, has names of bodies by their numbers, as `simulation.Bodies` takes them.
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ Step = Callable[[int], object]
 ContactModel = Literal["bullet", "volumetric"]
 """What pushes bodies apart."""
 
+# What a scene may tell simulation.VolumetricContact.
+TOLD = frozenset({"stiffness", "dissipation", "friction", "substeps"})
+
 
 class SceneError(Exception):
     """A scene that cannot be found, loaded or run; the message is one sentence for whoever can mend it."""
@@ -37,7 +40,7 @@ class SceneError(Exception):
 class Scene:
     """A simulation that can be built again and again, and how many steps of it are worth looking at.
 
-    `parameters` are what `build` is given beside the client, by name.
+    `parameters` are what `build` is given beside the client, `volumetric` what `VolumetricContact` is told, by name.
     """
 
     name: str
@@ -49,6 +52,7 @@ class Scene:
     names: dict[int, str] = field(default_factory=dict)
     parameters: dict[str, Parameter] = field(default_factory=dict)
     contact: ContactModel = "bullet"
+    volumetric: dict[str, Any] = field(default_factory=dict)
 
     @property
     def expected(self) -> Path:
@@ -131,14 +135,17 @@ def scene_of(path: Path, source: bytes) -> Scene:
     pairs = getattr(module, "PAIRS", "simulated")
     if isinstance(pairs, str) and pairs not in ("simulated", "all"):
         raise SceneError(f"{path} has PAIRS = {pairs!r}, which must be 'simulated', 'all' or a list of pairs")
-    contact: ContactModel = getattr(module, "CONTACT", "bullet")
-    if contact not in get_args(ContactModel):
-        raise SceneError(f"{path} has CONTACT = {contact!r}, which must be 'bullet' or 'volumetric'")
+    contact: Any = getattr(module, "CONTACT", "bullet")
+    if contact not in get_args(ContactModel) and not (isinstance(contact, dict) and contact.keys() <= TOLD):
+        told = f"'bullet', 'volumetric' or a dictionary of {', '.join(sorted(TOLD))}"
+        raise SceneError(f"{path} has CONTACT = {contact!r}, which must be {told}")
+    volumetric: dict[str, Any] = contact if isinstance(contact, dict) else {}
+    model: ContactModel = "volumetric" if isinstance(contact, dict) else contact
     names = getattr(module, "NAMES", {})
     if not isinstance(names, dict):
         raise SceneError(f"{path} has NAMES = {names!r}, which must be a dictionary of names by the numbers of bodies")
     difficulty = (module.__doc__ or "").strip()
-    return Scene(path.stem, path, difficulty, steps, build, pairs, names, parameters_of(build), contact)
+    return Scene(path.stem, path, difficulty, steps, build, pairs, names, parameters_of(build), model, volumetric)
 
 
 def find_scene(name_or_path: str | Path) -> Path:

@@ -61,8 +61,20 @@ def test_a_scene_says_what_its_contact_is_and_a_run_says_otherwise(scene):
 
 
 def test_a_contact_that_is_none_is_refused(scene):
-    with pytest.raises(SceneError, match=r"cube\.py has CONTACT = 'soft', which must be 'bullet' or 'volumetric'"):
-        scene("CONTACT = 'soft'")
+    either = "which must be 'bullet', 'volumetric' or a dictionary of dissipation, friction, stiffness, substeps"
+    for each in ("'soft'", "{'mass': 1}"):
+        with pytest.raises(SceneError, match=rf"cube\.py has CONTACT = {each}, {either}"):
+            scene(f"CONTACT = {each}")
+    with pytest.raises(SceneError, match=r"cube\.py has a CONTACT that is none: stiffness must be a number Pa/m"):
+        next(run(scene("CONTACT = {'stiffness': 0}")))
+
+
+def test_a_scene_says_how_stiff_its_bodies_are(scene):
+    stiff = scene("CONTACT = {'stiffness': 2e7}")
+    *_, frame = run(stiff, 1)
+    assert frame.forces.stiffness == pytest.approx([2e7]) and stiff.contact == "volumetric"
+    *_, frame = run(stiff, 1, contact="bullet")
+    assert frame.forces is None
 
 
 def test_a_contact_that_a_run_does_not_know_is_refused(scene):
