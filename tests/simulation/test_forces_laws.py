@@ -6,12 +6,12 @@ import warnings
 import numpy as np
 import pybullet as p
 import pytest
-from contact_experiments import HALF, STEP, G, World
+from contact_experiments import HALF, STEP, G, World, run
 from scipy.integrate import quad
 from simulated import body, box
 
 from overlapper import Box, Placed, overlap
-from overlapper.simulation import Bodies, NoDirectionWarning, VolumetricContact
+from overlapper.simulation import Bodies, NoDirectionWarning, Recorder, VolumetricContact
 from overlapper.simulation.forces.dynamics import Dynamics
 
 
@@ -325,3 +325,58 @@ def test_a_rod_through_a_plate_has_no_direction(client):
         force = contact.on(rod)[0]
         assert np.linalg.norm(force) == pytest.approx(1e7 * 0.02**2 * 0.01)
         assert contact.on(plate)[0] == pytest.approx(-force)
+
+
+# Where the law is not a plane's
+
+
+def test_a_box_over_the_rim_of_another_is_pushed_aside_by_the_depth_over_the_breadth():
+    """The area vector of the patch is that of the face below and of the side beneath it."""
+    depth, over = 1e-4, 0.02
+    with World() as world:
+        p.removeBody(world.plane, world.client)
+        world.box(*[HALF] * 3, mass=0, position=[0, 0, HALF])
+        cube = world.box(*[HALF] * 3, position=[over, 0, 3 * HALF - depth])
+        with world.contact(friction=0) as contact:
+            contact.forces()
+            x, y, z = contact.on(cube)[0]
+    assert x / z == pytest.approx(depth / (2 * HALF - over), rel=1e-9) and abs(y) < 1e-12
+
+
+HAND = """<robot name="hand"><link name="palm"><inertial><mass value="0"/>
+<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>{}</robot>"""
+FINGER = """<link name="finger{0}"><inertial><mass value=".2"/>
+<inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size=".02 .04 .04"/></geometry></collision></link>
+<joint name="rail{0}" type="prismatic"><parent link="palm"/><child link="finger{0}"/><origin xyz="{1} 0 0"/>
+<axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="100" velocity="9"/></joint>"""
+
+
+def test_fingers_of_one_hand_press_each_other(tmp_path):
+    """Both sides of the patch are moved by the joints of one body; motors press with 10 N."""
+    path = tmp_path / "hand.urdf"
+    path.write_text(HAND.format(FINGER.format(0, -0.02) + FINGER.format(1, 0.02)))
+    with World(gravity=(0, 0, 0)) as world, Recorder(world.client) as recorder:
+        client, flags = world.client, p.URDF_USE_SELF_COLLISION
+        hand = p.loadURDF(str(path), [0, 0, 1], useFixedBase=True, flags=flags, physicsClientId=client)
+        world.undamped(hand, 0.5)
+        with VolumetricContact(Bodies(client, recorder=recorder)) as contact:
+            for joint, way in ((0, 1), (1, -1)):
+                p.setJointMotorControl2(
+                    hand, joint, p.VELOCITY_CONTROL, targetVelocity=way, force=10, physicsClientId=client
+                )
+            run(contact, 1)
+            assert contact.on(hand, 0)[0] == pytest.approx([-10, 0, 0], abs=1e-9)
+            assert contact.on(hand, 1)[0] == pytest.approx([10, 0, 0], abs=1e-9)
+            assert contact.on(hand)[0] == pytest.approx([0, 0, 0], abs=1e-12)
+        assert abs(p.getJointState(hand, 0, client)[1]) < 1e-9
+
+
+def test_a_body_that_becomes_heavier_sinks_in_deeper():
+    with World() as world:
+        cube = world.box(*[HALF] * 3, position=[0, 0, HALF - G / 1e5])
+        with world.contact() as contact:
+            run(contact, 0.5)
+            p.changeDynamics(cube, -1, mass=3, physicsClientId=world.client)
+            run(contact, 2)
+        assert HALF - world.position(cube)[2] == pytest.approx(3 * G / 1e5, rel=1e-9)
