@@ -74,6 +74,12 @@ def physics_table(of: Figures) -> str:
         ["bounce on an edge, 16 substeps", "0", *most("bounce", "edge", "16", "")],
         ["the same, 32 substeps", "0", *most("bounce", "edge", "32", "")],
         ["bounce on a corner, 16 substeps", "0", f"{small(of['bounce', 'volumetric', 'corner']['16'])}", ""],
+        [
+            "speed after a bounce, of that before, *τ* = 0.5 ms",
+            f"{of['rebound', 'volumetric', 'foretold']['0.0005']:.3f}",
+            f"{of['rebound', 'volumetric', 'measured']['0.0005']:.3f}",
+            "no *τ*",
+        ],
         ["way until a box stops, over *v²/2µg*, 1 substep", "1", *both("slide", "", "1")],
         ["the same, 20 substeps", "1", *both("slide", "", "20")],
         ["way in 1 s on an incline of 0.999 *µ*", "0", *most("incline", "way", "0.999", " m")],

@@ -35,7 +35,20 @@ WINDOW = 12  # steps of a series of which the largest is kept
 
 
 def measured() -> Iterator[Row]:
-    for part in (rests, bounces, slides, inclines, spins, slides_and_spins, rolls, pushes, grips, stacks, loops):
+    for part in (
+        rests,
+        bounces,
+        rebounds,
+        slides,
+        inclines,
+        spins,
+        slides_and_spins,
+        rolls,
+        pushes,
+        grips,
+        stacks,
+        loops,
+    ):
         yield from part()
         print(f"{part.__name__}: measured", flush=True)
 
@@ -63,6 +76,13 @@ def bounces() -> Iterator[Row]:
         for pose in experiments.POSES if law == "volumetric" else ("face", "edge"):
             for substeps in SUBSTEPS:
                 yield Row("bounce", law, pose, substeps, experiments.bounce(pose, substeps, law))
+
+
+def rebounds() -> Iterator[Row]:
+    """The speed after a bounce on a face over that before, and what is foretold."""
+    for tau in (1e-4, 5e-4, 2e-3):
+        yield Row("rebound", "volumetric", "measured", tau, experiments.restitution(tau))
+        yield Row("rebound", "volumetric", "foretold", tau, experiments.rebound(tau))
 
 
 def slides() -> Iterator[Row]:

@@ -196,6 +196,30 @@ def test_friction_of_a_patch_is_coulombs(seed):
             assert friction @ slip == pytest.approx(-np.linalg.norm(friction) * np.linalg.norm(slip), rel=1e-6)
 
 
+@pytest.mark.parametrize("friction", [None, "distributed"])
+def test_friction_in_a_heap_is_within_its_limit_and_against_the_slip(friction):
+    """Of all patches at once: they are solved until nothing changes."""
+    with World() as world:
+        heap(world)
+        with world.contact(friction=friction) as contact:
+            slipping = 0
+            for _ in range(120):
+                contact.step()
+                normal, found = contact.last.normal, contact.contacts.overlaps
+                pressing = (contact.force * normal).sum(axis=1)
+                along = contact.force - pressing[:, None] * normal
+                held = contact.pairs[:, 0] == world.plane
+                limit = np.where(held, 0.5, 0.25) * pressing
+                size, slip = np.linalg.norm(along, axis=1), np.linalg.norm(contact.slip, axis=1)
+                assert (pressing >= 0).all() and (size <= limit + 1e-9).all()
+                twist = np.abs((contact.torque * normal).sum(axis=1))
+                assert (twist <= limit * np.nan_to_num(found.patch_distance) * (1 + 1e-9) + 1e-12).all()
+                fast = slip > 0.01
+                assert ((along * contact.slip).sum(axis=1)[fast] <= 1e-12).all()
+                slipping += fast.sum()
+        assert slipping > 50
+
+
 # Robots
 
 ROBOTS = [

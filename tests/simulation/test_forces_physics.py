@@ -30,6 +30,12 @@ def test_what_a_bounce_on_a_face_loses_at_the_kink_is_of_second_order():
     assert fine < coarse / 8
 
 
+@pytest.mark.parametrize("drop", [0.5, 1.0])
+@pytest.mark.parametrize("dissipation", [1e-4, 5e-4, 2e-3])
+def test_what_a_bounce_loses_is_told_by_the_dissipation_whatever_the_speed(dissipation, drop):
+    assert experiments.restitution(dissipation, drop) == pytest.approx(experiments.rebound(dissipation), abs=0.01)
+
+
 @pytest.mark.parametrize("substeps", [1, 4, 20])
 def test_a_box_stops_after_the_way_that_friction_takes(substeps):
     assert experiments.slide(substeps) == pytest.approx(1, abs=1e-4)
