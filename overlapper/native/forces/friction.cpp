@@ -39,6 +39,7 @@ constexpr std::array<double, 4> kWeights{0.1739274225687269, 0.3260725774312731,
 
 Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, double& shift) {
   if (!(limit > 0) || dot(slip, slip) == 0) return {};
+  if (!(mobility[0][0] + mobility[1][1] + mobility[2][2] > 0)) return (-limit / std::sqrt(dot(slip, slip))) * slip;
   // The force is -(mobility + shift)⁻¹ slip: what is left of the slip is then -shift times the force. Newton's method
   // on the inverse of its size finds the shift, if any (Moré and Sorensen 1983).
   constexpr double kClose = 1e-12;

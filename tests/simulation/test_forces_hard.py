@@ -1,0 +1,90 @@
+"""Volumetric contact where it is hard: what is light, fast or stiff, and what scripts do in the middle of it."""
+
+import numpy as np
+import pybullet
+import pytest
+
+from overlapper.simulation import Bodies, VolumetricContact
+
+G = 9.81
+
+
+def _ground(client):
+    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+    return pybullet.createMultiBody(0, plane, physicsClientId=client)
+
+
+def _box(client, position, mass=1.0, half=0.05, velocity=(0, 0, 0)):
+    shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[half] * 3, physicsClientId=client)
+    box = pybullet.createMultiBody(mass, shape, -1, position, physicsClientId=client)
+    pybullet.changeDynamics(box, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
+    pybullet.resetBaseVelocity(box, velocity, physicsClientId=client)
+    return box
+
+
+def _speed(client, body):
+    return np.array(pybullet.getBaseVelocity(body, physicsClientId=client)[0])
+
+
+@pytest.mark.parametrize("phase", [0.05, 0.35, 0.65, 0.95])
+@pytest.mark.parametrize(("mass", "half", "stiffness"), [(0.1, 0.05, 1e7), (0.01, 0.05, 1e7), (1, 0.05, 1e9)])
+def test_what_is_light_or_stiff_bounces_no_faster_than_it_fell(client, mass, half, stiffness, phase):
+    _ground(client)
+    box = _box(client, [0, 0, half + (1 + phase) / 240], mass, half, velocity=[0, 0, -1])
+    with VolumetricContact(Bodies(client), stiffness=stiffness) as contact:
+        for _ in range(30):
+            contact.step()
+    assert 0 <= _speed(client, box)[2] < 0.6
+
+
+def test_what_is_put_down_where_it_touches_stays_there(client):
+    pybullet.setGravity(0, 0, -G, physicsClientId=client)
+    _ground(client)
+    box = _box(client, [0, 0, 0.05], mass=0.01)
+    highest = 0.0
+    with VolumetricContact(Bodies(client)) as contact:
+        for _ in range(240):
+            contact.step()
+            highest = max(highest, pybullet.getBasePositionAndOrientation(box, physicsClientId=client)[0][2])
+    assert highest <= 0.05 and np.abs(_speed(client, box)).max() < 1e-9
+
+
+def test_a_pole_that_swings_down_is_seen_to_come(client):
+    """What is fast is the end of a link, of which the joint knows."""
+    _ground(client)
+    shape = pybullet.createCollisionShape(
+        *(pybullet.GEOM_BOX, 0, [0.5, 0.02, 0.02]), collisionFramePosition=[0.5, 0, 0], physicsClientId=client
+    )
+    pole = pybullet.createMultiBody(
+        *(0, -1, -1, [0, 0, 0.025]),
+        linkMasses=[0.05],
+        linkCollisionShapeIndices=[shape],
+        linkVisualShapeIndices=[-1],
+        linkPositions=[[0, 0, 0]],
+        linkOrientations=[[0, 0, 0, 1]],
+        linkInertialFramePositions=[[0.5, 0, 0]],
+        linkInertialFrameOrientations=[[0, 0, 0, 1]],
+        linkParentIndices=[0],
+        linkJointTypes=[pybullet.JOINT_REVOLUTE],
+        linkJointAxis=[[0, 1, 0]],
+        physicsClientId=client,
+    )
+    pybullet.changeDynamics(pole, 0, linearDamping=0, angularDamping=0, jointDamping=0, physicsClientId=client)
+    pybullet.setJointMotorControl2(pole, 0, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
+    pybullet.resetJointState(pole, 0, -0.1, 3.0, physicsClientId=client)
+    fastest = 0.0
+    with VolumetricContact(Bodies(client)) as contact:
+        for _ in range(40):
+            contact.step()
+            fastest = min(fastest, pybullet.getJointState(pole, 0, physicsClientId=client)[1])
+    assert -2.5 < fastest < 0
+
+
+def test_what_nothing_moves_slips_without_an_answer(client):
+    """Two bodies without mass, one of which goes on as it was told: what friction there is ends no slip."""
+    ground, box = _ground(client), _box(client, [0, 0, 0.049], mass=0, velocity=[0.1, 0, 0])
+    with VolumetricContact(Bodies(client), pairs=[(ground, box)]) as contact:
+        contact.step()
+    pressing = 1e7 * 0.01 * 1e-3
+    assert contact.force[0] == pytest.approx([0.25 * pressing, 0, -pressing], rel=1e-9)
+    assert contact.slip[0] == pytest.approx([-0.1, 0, 0], abs=1e-12) and np.isfinite(contact.torque).all()
