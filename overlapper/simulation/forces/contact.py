@@ -31,6 +31,12 @@ OfPair = Callable[[Link, Link], float]
 # A swing that turns by more than so many radians in a step is followed by backward Euler.
 COARSE = 2.0
 
+# There is no patch where the area vector is less than this part of the surface of what is shared, as to the solver.
+NO_PATCH = 1e-6
+
+# How often a step is halved to find when what is swallowed by its end has a patch.
+BISECTIONS = 8
+
 # What is swept in a step at most: stiffness beyond is damped.
 MOST_SUBSTEPS = 200
 
@@ -155,7 +161,7 @@ class VolumetricContact:
                 frequency2 = self._place(self._dynamics.solver)
                 if not self._planned:
                     # Once in a step is enough for what comes; a length that changes within a swing costs energy.
-                    highest = frequency2.max(initial=0.0) + (0.0 if taken else self._coming(duration))
+                    highest = max(frequency2.max(initial=0.0), 0.0 if taken else self._coming(duration))
                     if not taken or highest * length**2 > 1:
                         length = left / min(_followed(highest, left), max(1, MOST_SUBSTEPS - taken))
                 wrenches = self._solve(length, frequency2)
@@ -300,30 +306,45 @@ class VolumetricContact:
         return self._stiffness.of(links, dynamics.links), self._dissipation.of(links, dynamics.links), friction
 
     def _coming(self, duration: float) -> float:
-        """The square of the highest frequency of pairs that do not touch yet, and will in a time as long as that.
+        """The square of the highest frequency of what bodies will share in a time as long as that.
 
         A body that came in by a long step would be deeper than its speed can take it: it would be thrown back. So steps
-        are short before they have to be.
+        are short before they have to be: before two touch, and before an edge comes down to a face.
         """
-        bodies, dynamics = self.bodies, self._dynamics
+        dynamics, solver = self._dynamics, self._dynamics.solver.copy()
         velocity = dynamics.velocity()
         if self._before:
             before, length, _ = self._before
             velocity = velocity + duration / length * (velocity - before)
         else:
             velocity = velocity + duration * self._other
-        positions, orientations = dynamics.solver.ahead(
+        highest = 0.0
+        known = _swallowed(self._contacts.overlaps)
+        # What is small and fast is swallowed within the step: then it counts when it was half in, and for how long.
+        lost: set[tuple[int, int]] = set()
+        early, late, part = 0.0, 1.0, 1.0
+        for _ in range(BISECTIONS):
+            found = self._at(part * duration, velocity)
+            frequency2 = solver.place(self._frames, found, self._links, *self._parameters(found))
+            highest = max(highest, float(frequency2.max(initial=0.0)))
+            swallowed = _swallowed(found) - known
+            if swallowed:
+                late, lost = part, swallowed
+            elif lost and lost.isdisjoint(map(tuple, found.pairs[found.volume > 0].tolist())):
+                early = part
+            else:
+                break
+            part = (early + late) / 2
+        return max(highest, (2 / (late - early) / duration) ** 2) if lost else highest
+
+    def _at(self, duration: float, velocity: Array) -> Overlaps:
+        """What bodies share that have gone on for a duration with that velocity of all coordinates."""
+        bodies = self.bodies
+        positions, orientations = self._dynamics.solver.ahead(
             duration, velocity, self._links, bodies.positions, bodies.orientations
         )
         pairs = bodies._pairs_at(positions, orientations, self._among)
-        count = len(bodies.keys)
-        now = self._contacts.overlaps.pairs.astype(np.int64) @ [count, 1]
-        pairs = pairs[~np.isin(pairs.astype(np.int64) @ [count, 1], now)]
-        if not len(pairs):
-            return 0.0
-        found = self._batch.overlaps(positions, orientations, pairs, separated=False)
-        solver = dynamics.solver.copy()
-        return float(solver.place(self._frames, found, self._links, *self._parameters(found)).max(initial=0.0))
+        return self._batch.overlaps(positions, orientations, pairs, separated=False)
 
     def _solve(self, duration: float, frequency2: Array) -> Array:
         """The forces of a step as long as that; (n, 6) force and torque on the links."""
@@ -391,6 +412,12 @@ class VolumetricContact:
 def _followed(frequency2: float, duration: float) -> int:
     """How many substeps of a duration follow a swing of that frequency, squared."""
     return max(1, math.ceil(math.sqrt(frequency2) * duration))
+
+
+def _swallowed(found: Overlaps) -> set[tuple[int, int]]:
+    """The pairs of which one lies wholly in the other: what they share has no patch."""
+    rows = (found.volume > 0) & (np.linalg.norm(found.gradient[:, 1, :3], axis=1) <= NO_PATCH * found.area)
+    return {(a, b) for a, b in found.pairs[rows].tolist()}
 
 
 class _Parameter:
