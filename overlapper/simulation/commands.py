@@ -15,6 +15,9 @@ PUSHES = frozenset({"applyExternalForce", "applyExternalTorque"})
 
 COMMANDS = MOTORS | PUSHES | {"changeConstraint", "resetSimulation", "stepSimulation"}
 
+# What pybullet takes where a script says nothing: parts of an error that a step takes away.
+DEFAULT_GAINS = {"positionGain": 0.1, "velocityGain": 1.0}
+
 Command = tuple[str, Arguments]
 
 
@@ -22,7 +25,8 @@ class Commands:
     """The commands of a client that depend on the length of a step, as far as they are heard.
 
     pybullet keeps the force of a motor or a constraint as an impulse, of the length that a step has when it is told: in
-    shorter steps it would be so much stronger. Forces, and torques of joints, act in one step alone.
+    shorter steps it would be so much stronger. Gains are parts of an error that a step takes away: in shorter steps a
+    motor would be so much faster. Forces, and torques of joints, act in one step alone.
     """
 
     def __init__(self, client: int) -> None:
@@ -31,14 +35,14 @@ class Commands:
         self._momentary: list[Command] = []
         self._length = 0.0  # of the steps that lasting ones have been told for
 
-    def prepare(self, length: float, first: bool) -> None:
+    def prepare(self, length: float, first: bool, share: float = 1.0) -> None:
         """Tell them again for a substep as long as that (s), the `first` of a step or a later one.
 
-        The simulator's time step has to be that long already.
+        The simulator's time step has to be that long already, which is that `share` of what the script takes for one.
         """
         if length != self._length:
             for name, arguments in {id(each): each for each in self._lasting.values()}.values():
-                self._tell(name, arguments)
+                self._tell(name, arguments | _gains(name, arguments, share), arguments)
             self._length = length
         if not first:
             for name, arguments in self._momentary:
@@ -48,12 +52,12 @@ class Commands:
         """A step is over: forces act no more."""
         self._momentary.clear()
 
-    def _tell(self, name: str, arguments: Arguments) -> None:
+    def _tell(self, name: str, arguments: Arguments, kept: Arguments | None = None) -> None:
         try:
             unheard(name)(**arguments)
         except pybullet.error:
             # The body or the constraint is gone.
-            self._lasting = {key: each for key, each in self._lasting.items() if each[1] is not arguments}
+            self._lasting = {key: each for key, each in self._lasting.items() if each[1] is not kept}
 
     def hear(self, name: str, arguments: Arguments, _: Any) -> None:
         """A listener of calls."""
@@ -84,3 +88,23 @@ class Commands:
         for key in keys:
             self._lasting.pop(key, None)
             self._lasting[key] = command
+
+
+def _gains(name: str, arguments: Arguments, share: float) -> Arguments:
+    """The gains of a motor, for steps that are that share of those that it was meant for."""
+    mode = arguments.get("controlMode")
+    if share == 1 or mode not in (pybullet.POSITION_CONTROL, pybullet.VELOCITY_CONTROL):
+        return {}
+    many = len(arguments["jointIndices"]) if name in ARRAYS else 1
+    s = "s" if name in ARRAYS else ""
+    positions, velocities = (
+        [*arguments[gain + s]] if name in ARRAYS and gain + s in arguments else [arguments.get(gain, default)] * many
+        for gain, default in DEFAULT_GAINS.items()
+    )
+    # Of an error in the velocity, `share` of a step leaves what would leave the gain's rest after a whole one.
+    slower = [1 - (1 - each) ** share if 0 <= each <= 1 else each for each in velocities]
+    told: dict[str, list[float]] = {"velocityGain": slower}
+    if mode == pybullet.POSITION_CONTROL:
+        quotients = [share * (new / old if old else share) for new, old in zip(slower, velocities)]
+        told["positionGain"] = [gain * quotient for gain, quotient in zip(positions, quotients)]
+    return {gain + s: each if name in ARRAYS else each[0] for gain, each in told.items()}
