@@ -1,0 +1,133 @@
+"""The solver of contact forces by itself: its law in closed form, where links go, and what it refuses."""
+
+import numpy as np
+import pytest
+
+from overlapper import Box, HalfSpace, _core, overlaps
+
+G, HALF, STIFFNESS = 9.81, 0.05, 1e7
+HELD, FREE = (0.0, [0.0] * 3), (1.0, [1 / 600] * 3)
+TURN = (0.0, 0.0, 0.0, 1.0)
+
+
+def solver_of(*bodies):
+    """Of single links."""
+    count = len(bodies)
+    masses, inertias = zip(*bodies)
+    return _core.ContactSolver([-1] * count, [0] * count, np.zeros((count, 3)), np.zeros((count, 3)), masses, inertias)
+
+
+def placed(depth, dissipation=0.0, friction=0.0):
+    """A cube that has sunk into a half-space, and the squares of frequencies."""
+    solver = solver_of(HELD, FREE)
+    poses = [(0, 0, 0), (0, 0, HALF - depth)]
+    found = overlaps([HalfSpace([0, 0, 1], 0), Box([HALF] * 3)], poses, [TURN] * 2, [(0, 1)])
+    frames = [(pose, TURN) for pose in poses]
+    links = np.array([0, 1])
+    return solver, solver.place(frames, found, links, [STIFFNESS], [dissipation], [friction])
+
+
+@pytest.mark.parametrize("dissipation", [0.0, 2e-3])
+@pytest.mark.parametrize("damped", [False, True])
+@pytest.mark.parametrize("approach", [-0.02, 0.0, 0.3])
+def test_the_pressure_at_the_end_of_a_step_is_that_of_the_velocity_there(damped, dissipation, approach):
+    """f = k V + k A (θ h (u' - u) + τ u'), or with backward Euler k V + k A (h + τ) u', of u' = u + h (g - f / m)."""
+    h, depth, area = 1 / 240, 1e-4, 4 * HALF**2
+    solver, _ = placed(depth, dissipation)
+    velocity, weight = np.zeros(12), np.zeros(12)
+    velocity[8], weight[8] = -approach, -G
+    force, *_, wrenches, ours, _sweeps = solver.solve(h, velocity, weight, np.array([damped]), False)
+    lag = (h if damped else h / 4) + dissipation
+    ahead = lag * (approach + h * G) - (0 if damped else h / 4 * approach)
+    expected = max(0, STIFFNESS * area * (depth + ahead) / (1 + STIFFNESS * area * h * lag))
+    # A half-space is pushed by the opposite.
+    assert force == pytest.approx(np.array([[0, 0, -expected]]), rel=1e-12, abs=1e-12)
+    assert wrenches[1] == pytest.approx([0, 0, expected, 0, 0, 0], rel=1e-12, abs=1e-12)
+    assert ours[8] == pytest.approx(expected, rel=1e-12, abs=1e-12) and not ours[:6].any()
+
+
+def test_a_cube_on_its_face_swings_fastest_up_and_down():
+    """By k A / m; rolling has half of that square: k a^4 / 12 over an inertia of m a^2 / 6."""
+    _, (square,) = placed(1e-6)
+    assert square == pytest.approx(STIFFNESS * 4 * HALF**2, rel=1e-9)
+
+
+def test_links_go_on_as_they_move():
+    solver = _core.ContactSolver(
+        [-1, 0], [0, 1], [[0, 0, 0], [0, 0, 1]], [[0, 0, 0], [1, 0, 0]], [1, 1], [[1, 1, 1], [1, 1, 1]]
+    )
+    nothing = overlaps([Box([1] * 3)], [(0, 0, 0)], [TURN], np.empty((0, 2), dtype=np.int32))
+    solver.place([((0, 0, 0), TURN), ((2, 0, 0), TURN)], nothing, np.array([0]), [], [], [])
+    # The base moves along y; the joint, 1 m out, turns about z.
+    velocity = [0, 3, 0, 0, 0, 0, 0.5]
+    positions, orientations = solver.ahead(0.2, velocity, np.array([0, 1]), [(0, 0, 1), (2.5, 0, 0)], [TURN] * 2)
+    assert positions[0] == pytest.approx([0, 0.6, 1])
+    turned = 0.1
+    assert positions[1] == pytest.approx([2 + 0.5 * np.cos(turned), 0.2 * 3.5 + 0.5 * np.sin(turned), 0])
+    assert orientations[1] == pytest.approx([0, 0, np.sin(turned / 2), np.cos(turned / 2)])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"parents": [-1, 1]}, "links must begin with a base, and come after their parents"),
+        ({"parents": [0, -1]}, "links must begin with a base, and come after their parents"),
+        ({"joints": [0, 4]}, "joints must be from 0 to 3"),
+        ({"joints": [0]}, "links must have a row in each array"),
+        ({"masses": [1]}, "masses must have 2 numbers, not 1"),
+        ({"masses": ["a", "b"]}, "masses must be an array of numbers"),
+        ({"axes": np.zeros((1, 3))}, "links must have a row in each array"),
+    ],
+)
+def test_links_that_are_none_are_refused(wrong, said):
+    given = {
+        "parents": [-1, 0],
+        "joints": [0, 1],
+        "axes": np.zeros((2, 3)),
+        "pivots": np.zeros((2, 3)),
+        "masses": [1, 1],
+        "inertias": np.ones((2, 3)),
+    }
+    with pytest.raises(ValueError, match=f"^{said}$"):
+        _core.ContactSolver(**(given | wrong))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"frames": []}, "frames must be one for each link"),
+        ({"links": np.array([0, 2])}, "links must be places of links, one for each shape"),
+        ({"links": np.array([0, -1])}, "links must be places of links, one for each shape"),
+        ({"links": np.array([0])}, "links must be places of links, one for each shape"),
+        ({"stiffness": []}, "stiffness must have 1 numbers, not 0"),
+        ({"dissipation": [1, 2]}, "dissipation must have 1 numbers, not 2"),
+        ({"friction": [[1, 2]]}, "friction must have 1 numbers, not 2"),
+    ],
+)
+def test_places_that_are_none_are_refused(wrong, said):
+    poses = [(0, 0, 0), (0, 0, HALF - 1e-4)]
+    given = {
+        "frames": [(pose, TURN) for pose in poses],
+        "overlaps": overlaps([HalfSpace([0, 0, 1], 0), Box([HALF] * 3)], poses, [TURN] * 2, [(0, 1)]),
+        "links": np.array([0, 1]),
+        "stiffness": [1e7],
+        "dissipation": [0],
+        "friction": [0],
+    }
+    with pytest.raises(ValueError, match=f"^{said}$"):
+        solver_of(HELD, FREE).place(**(given | wrong))
+
+
+def test_steps_that_are_none_are_refused():
+    solver, _ = placed(1e-4)
+    rest, undamped = np.zeros(12), np.array([False])
+    with pytest.raises(ValueError, match=r"^velocity must have 12 numbers, not 6$"):
+        solver.solve(0.01, rest[:6], rest, undamped, False)
+    with pytest.raises(ValueError, match=r"^acceleration must have 12 numbers, not 13$"):
+        solver.solve(0.01, rest, np.zeros(13), undamped, False)
+    with pytest.raises(ValueError, match=r"^damped must have 1 numbers, not 2$"):
+        solver.solve(0.01, rest, rest, np.array([False, True]), False)
+    with pytest.raises(ValueError, match=r"^links must be places of links$"):
+        solver.ahead(0.01, rest, np.array([2]), [(0, 0, 0)], [TURN])
+    with pytest.raises(ValueError, match=r"^positions must have 3 numbers, not 6$"):
+        solver.ahead(0.01, rest, np.array([1]), [(0, 0, 0)] * 2, [TURN])
