@@ -116,3 +116,29 @@ def test_what_nothing_moves_slips_without_an_answer(client):
     pressing = 1e7 * 0.01 * 1e-3
     assert contact.force[0] == pytest.approx([0.25 * pressing, 0, -pressing], rel=1e-9)
     assert contact.slip[0] == pytest.approx([-0.1, 0, 0], abs=1e-12) and np.isfinite(contact.torque).all()
+
+
+@pytest.mark.filterwarnings("ignore::overlapper.simulation.forces.cautions.SubstepsWarning")
+@pytest.mark.parametrize("seed", range(8))
+def test_what_turns_fast_is_pushed_wherever_its_pressures_are_more_than_none(client, seed):
+    """Torques that the patch cannot give take no force away. Without a force, velocities stay as they are."""
+    stiffness, tau, pushed = 1e8, 1e-3, 0
+    random = np.random.default_rng(seed)
+    _ground(client)
+    boxes = [_box(client, [0.5 * k, 0, 0.0497], mass=0.25) for k in range(20)]
+    for box in boxes:
+        tilt = [*(0.01 * random.normal(size=3)), 1]
+        at = pybullet.getBasePositionAndOrientation(box, physicsClientId=client)[0]
+        pybullet.resetBasePositionAndOrientation(box, at, tilt, physicsClientId=client)
+        spin = 10 * random.normal(size=3)
+        pybullet.resetBaseVelocity(box, [0, 0, random.uniform(-0.1, 0.1)], spin, physicsClientId=client)
+    before = {box: np.ravel(pybullet.getBaseVelocity(box, physicsClientId=client)) for box in boxes}
+    with VolumetricContact(Bodies(client), stiffness=stiffness, dissipation=tau, substeps=1) as contact:
+        contact.step()
+    for row, (_, _, _, box, _, _) in enumerate(contact.pairs.tolist()):
+        shared = contact.contacts.overlaps
+        growing = shared.gradient[row, 1] @ before[box]
+        pressures = stiffness * (shared.volume[row] + (1 / 240 + tau) * growing)
+        assert (contact.force[row, 2] < 0) == (pressures > 0)
+        pushed += pressures > 0
+    assert 0 < pushed < len(boxes)

@@ -55,12 +55,14 @@ Three Pressure::answer(const Three& slip) const {
   const Three target = rest_ - response_ * slip;
   const Three asked = implicit_ * target;
   const double force = asked[0];
-  if (!(force > 0)) return {};
-  if (!(area_.area > 0)) return {force, 0, 0};
-  const double x = -asked[2] / force - area_.u, y = asked[1] / force - area_.v;
+  if (!(area_.area > 0)) return {std::max(0.0, force), 0, 0};
+  // Where the force is none, torques alone have their centre infinitely far away. Below it is the torques that the
+  // patch cannot give by which the force vanishes: without them it may be more.
+  const double share = std::max(0.0, force);
+  const double x = -asked[2] - share * area_.u, y = asked[1] - share * area_.v;
   const double far = in_radii_[0] * x * x + 2 * in_radii_[1] * x * y + in_radii_[2] * y * y;
-  if (!(far > kReach2)) return asked;
-  const double back = std::sqrt(kReach2 / far);
+  if (force > 0 && !(far > kReach2 * force * force)) return asked;
+  const double back = far > 0 ? std::sqrt(kReach2 / far) : 0;
   const Three per_force{1, area_.v + back * y, -(area_.u + back * x)};
   const double moved = overlapper::dot(response_[0], mobility_ * per_force);
   return std::max(0.0, target[0] / (1 + duration_ * moved)) * per_force;
