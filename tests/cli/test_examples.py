@@ -182,3 +182,35 @@ def test_poses_free_of_self_collision_are_those_of_pybullet(run):
     assert 0 < free < 100 and same == 100
     ((deepest,),) = numbers(r"deepest: lbr_iiwa/\w+ and lbr_iiwa/\w+, ([\d.]+) mm", text)
     assert deepest > 10
+
+
+def test_fingers_squeeze_as_hard_as_they_are_told_and_carry_what_they_hold(run):
+    text = run("grasp_force.py")
+    fingers = numbers(r"finger \d+: squeezes with ([\d.]+) N, carries ([\d.]+) N", text)
+    assert len(fingers) == 2
+    assert [squeeze for squeeze, _ in fingers] == pytest.approx([20, 20], abs=0.05)
+    assert sum(carried for _, carried in fingers) == pytest.approx(0.5 * 9.81, abs=2e-3)
+    ((together, weight, slip),) = numbers(r"carry ([\d.]+) N of ([\d.]+) N; slip (\S+) m/s", text)
+    assert together == pytest.approx(weight, abs=1e-3) and slip < 1e-8
+
+
+def test_a_box_slips_at_the_angle_of_its_friction(run):
+    ((degrees, friction, told),) = numbers(
+        r"slips at ([\d.]+)°: friction ([\d.]+), and it was told ([\d.]+)", run("friction_from_incline.py")
+    )
+    assert told == 0.5 and 0 < friction - told < 1e-3
+    assert np.tan(np.radians(degrees)) == pytest.approx(friction, abs=2e-4)
+
+
+def test_two_feet_press_as_hard_as_what_stands_on_them(run, tmp_path):
+    text = run("foot_pressure.py")
+    feet = numbers(r"foot \d: ([\d.]+) N at y = ([\d.-]+) mm, from (\d+) to (\d+) Pa", text)
+    assert len(feet) == 2
+    for force, at, least, most in feet:
+        # 5 cm by 20 cm, from 5 cm behind to 15 cm before the joint: the middle is at 5 cm.
+        assert force == pytest.approx(90.02 * 9.81 / 2, rel=5e-3)
+        assert (least + most) / 2 * 0.05 * 0.2 == pytest.approx(force, rel=0.01)
+        assert 30 < at < 40 and 2 * least < most
+    ((together,),) = numbers(r"together ([\d.]+) N", text)
+    assert together == pytest.approx(90.02 * 9.81, rel=5e-3)
+    assert (tmp_path / "foot_pressure.png").read_bytes().startswith(b"\x89PNG")

@@ -75,9 +75,9 @@ class VolumetricContact:
 
     What else acts on the bodies, as gravity, motors, constraints and forces of the script, is taken to be as it was in
     the substep before. What a script tells motors and constraints within the `with`, and the forces that it applies, is
-    told again in each substep, so that it lasts for the whole step: pybullet keeps it as an impulse. Gains of motors are
-    those of a whole step, too. Motors that were told before, unless a recorder has heard it, are as much stronger as
-    substeps are shorter.
+    told again in each substep, so that it lasts for the whole step: pybullet keeps it as an impulse. Gains of motors
+    are those of a whole step, too. Motors that were told before, unless a recorder has heard it, are as much stronger
+    as substeps are shorter.
 
     What has no direction, as a body that lies wholly within another or goes through a plate, is pushed where it was
     pushed last, or along the least translation that frees it, with one NoDirectionWarning for each pair.
