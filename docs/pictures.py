@@ -38,6 +38,7 @@ MAKERS = (
     Maker("docs/picture.py", ("picture.webp",), (*PAGE, "scenes/franka_grasp.py")),
     Maker("docs/why.py", ("why.png",), ("overlapper/viewer/picture.py",)),
     Maker("docs/view.py", ("view.png",), (*PAGE, "scenes/franka_grasp.py")),
+    Maker("docs/grip.py", ("grip.png",), (*PAGE, "scenes/franka_grasp.py")),
     Maker("docs/concave.py", ("concave.png",), (*PAGE, "examples/chain_links.py")),
     Maker("docs/regression.py", ("regression.png",), (*PAGE, "examples/ci/**/*")),
     Maker("docs/meshes.py", ("meshes.png",), PAGE),

@@ -141,7 +141,7 @@ def _picture(playback: Playback, png: Path, step: int | None, close: bool, looks
     view = at_step(watched(), step) if step else largest(watched())
     png.parent.mkdir(parents=True, exist_ok=True)
     title = f"{playback.name}, step {view.step}, {view.time:.3f} s"
-    picture.save(png, view.bodies, view.contacts, title, close, looks, framing)
+    picture.save(png, view.bodies, view.contacts, title, close, looks, framing, view.forces)
 
 
 def _live(playback: Playback, looks: Sequence[Look], host: str) -> None:
@@ -156,7 +156,7 @@ def _live(playback: Playback, looks: Sequence[Look], host: str) -> None:
         for view in playback.views:
             if view.time * PICTURES_PER_SECOND >= shown or playback.sparse:
                 time.sleep(max(0.0, start + view.time - time.monotonic()))
-                viewer.show(view.bodies, view.contacts)
+                viewer.show(view.bodies, view.contacts, view.forces)
                 shown += 1
         while sys.stderr.isatty():
             time.sleep(3600)

@@ -4,22 +4,24 @@ Each overlap is drawn after the bodies, so that none of them tints it, with an a
 centroid and points along `normal`, the way that pushes the first shape out of the second; the line is the patch
 outline. Both shine through everything, and the arrow is as long as a fixed part of the scene, so that an overlap of a
 millimetre between bodies of a metre is still found. In meshcat's tree the bodies are
-`/overlapper/bodies/<body>/<link>/<shape>` and the overlaps `/overlapper/overlaps/<a>-<b>/<volume>`.
+`/overlapper/bodies/<body>/<link>/<shape>` and the overlaps `/overlapper/overlaps/<a>-<b>/<volume>`. Where there are
+forces, overlaps are coloured by pressure, and arrows are `/overlapper/forces/<scale>/<a>-<b>/<force>`; the scale says
+how long arrows are and what the last colour stands for.
 """
 
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from overlapper import Overlap
 from overlapper.process import START_LIMIT, Ended, NotStarted, Worker
 from overlapper.viewer.framing import Framing
-from overlapper.viewer.labels import Bodies, Contact, body_paths, pairs
+from overlapper.viewer.labels import Bodies, Contact, body_paths, labelled
 from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, volume_text
+from overlapper.viewer.pressure import Forces, Scale, Seen, force_text, key_of
 from overlapper.viewer.recording import Recording
 from overlapper.viewer.stage import Stage, matrix
 
@@ -27,6 +29,8 @@ import meshcat  # isort: skip  # after the stage, which says what to install
 from overlapper.viewer.server import Window, must_be_here, serve  # isort: skip
 
 __all__ = ["Recording", "Viewer"]
+
+FORCES = "/overlapper/forces"
 
 
 class Viewer:
@@ -49,6 +53,9 @@ class Viewer:
         self._shapes: dict[str, bytes] = {}
         self._poses: dict[str, Array] = {}
         self._pairs: set[tuple[str, str]] = set()
+        self._framing: Framing | None = None
+        self._scale: Scale | None = None
+        self._pushing = False  # whether arrows are seen
 
     def _serve(self, host: str) -> None:
         must_be_here(host)
@@ -64,17 +71,32 @@ class Viewer:
         """Where a browser finds it."""
         return str(self.visualizer.url())
 
-    def show(self, bodies: Bodies, contacts: Iterable[Contact]) -> None:
-        """Draw the bodies where they are now and the overlapping pairs among `contacts`, in place of what was there."""
+    def show(self, bodies: Bodies, contacts: Iterable[Contact], forces: Forces | None = None) -> None:
+        """Draw the bodies where they are now, the overlapping pairs among `contacts` and the `forces` of these.
+
+        What was there is replaced.
+        """
         contacts = list(contacts)
-        if self._stage is None:
-            framing = Framing(bodies)
-            self._stage = Stage(framing, *self._looks)
+        if self._stage is None or self._framing is None:
+            self._framing = Framing(bodies)
+            self._stage = Stage(self._framing, *self._looks)
             if self._server:
-                framing.see(bodies, contacts)
-                self._stage.set(self.visualizer, framing.whole())  # what will move is not known yet
+                self._framing.see(bodies, contacts)
+                self._stage.set(self.visualizer, self._framing.whole())  # what will move is not known yet
+        seen = self._seen(self._stage, self._framing, bodies, contacts, forces)
         self._show_bodies(self._stage, bodies)
-        self._show_overlaps(self._stage, pairs(bodies, contacts))
+        self._show_overlaps(self._stage, bodies, contacts, seen)
+        self._show_forces(self._stage, seen)
+
+    def _seen(
+        self, stage: Stage, framing: Framing, bodies: Bodies, contacts: list[Contact], forces: Forces | None
+    ) -> Seen | None:
+        if forces is None or not self._looks[1].forces:
+            return None
+        framing.see(bodies, contacts)
+        seen = Seen.of(bodies, contacts, forces, 0.15 * stage.size, framing, self._scale)
+        self._scale = seen.scale
+        return seen
 
     def _show_bodies(self, stage: Stage, bodies: Bodies) -> None:
         paths, colors = body_paths(bodies), bodies.colors
@@ -91,12 +113,27 @@ class Viewer:
                 self.visualizer[path].set_transform(pose)
                 self._poses[path] = pose
 
-    def _show_overlaps(self, stage: Stage, overlaps: Mapping[tuple[str, str], Overlap]) -> None:
+    def _show_overlaps(self, stage: Stage, bodies: Bodies, contacts: list[Contact], seen: Seen | None) -> None:
         for pair in self._pairs:
             self.visualizer[_path(pair)].delete()
-        for pair, overlap in overlaps.items():
-            self.visualizer[f"{_path(pair)}/{volume_text(overlap.volume)}"].set_object(stage.overlap(overlap))
-        self._pairs = set(overlaps)
+        self._pairs = set()
+        for pair, _, contact in labelled(bodies, contacts):
+            press = seen.pressed.get(key_of(contact)) if seen else None
+            drawn = stage.overlap(contact.overlap, press, seen.scale if seen else None)
+            self.visualizer[f"{_path(pair)}/{volume_text(contact.overlap.volume)}"].set_object(drawn)
+            self._pairs.add(pair)
+
+    def _show_forces(self, stage: Stage, seen: Seen | None) -> None:
+        if self._pushing:
+            self.visualizer[FORCES].delete()
+        self._pushing = seen is not None and bool(seen.arrows)
+        if seen is None:
+            return
+        scale = f"{FORCES}/{seen.scale}, {seen.scale.pressure}"
+        for each in seen.arrows:
+            pair = "-".join(".".join(filter(None, link)) for link in each.links)
+            force = force_text(float(np.linalg.norm(each.force)))
+            self.visualizer[f"{scale}/{pair}/{force}"].set_object(stage.force(each, seen.scale))
 
     def close(self) -> None:
         """Stop the server, if this view started it."""

@@ -143,9 +143,9 @@ def _plane(corners: Array) -> tuple[Array, float]:
     return normal, float(corners.mean(axis=0) @ normal)
 
 
-def cone(radius: float, bottom: float, top: float) -> Outline:
-    """A cone about z, its base at height `bottom`, its tip at `top`."""
-    return _revolved(np.array([0, radius, 0]), np.array([bottom, bottom, top]), np.zeros(3))
+def cone(radius: float, bottom: float, top: float, upper: float = 0.0) -> Outline:
+    """A cone about z from height `bottom` to `top`, where it has the radius `upper`: a tip."""
+    return _revolved(np.array([0, radius, upper]), np.array([bottom, bottom, top]), np.zeros(3))
 
 
 def triangles(facets: Facets) -> NDArray[np.integer[Any]]:

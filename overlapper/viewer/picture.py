@@ -18,7 +18,7 @@ from overlapper import Overlap, Placed
 from overlapper.install import hint
 from overlapper.quaternion import rotated
 from overlapper.viewer.framing import Framing, View
-from overlapper.viewer.labels import Bodies, Contact, pairs
+from overlapper.viewer.labels import Bodies, Contact, Pair, labelled
 from overlapper.viewer.look import (
     BODIES,
     BOTTOM,
@@ -41,13 +41,27 @@ from overlapper.viewer.look import (
     volume_text,
 )
 from overlapper.viewer.outline import Ground, ground, outline, polytope_edges
+from overlapper.viewer.pressure import (
+    FORCE,
+    FRICTION,
+    Arrow,
+    Forces,
+    Press,
+    Scale,
+    Seen,
+    colors,
+    force_text,
+    key_of,
+    pressures,
+)
 from overlapper.whole_file import beside
 
 try:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.figure import Figure
-    from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea, VPacker
+    from matplotlib.offsetbox import AnchoredOffsetbox, DrawingArea, HPacker, TextArea, VPacker
+    from matplotlib.patches import Polygon, Rectangle
     from PIL import Image, ImageDraw
 except ImportError as missing:
     raise ImportError(f"overlapper.viewer.picture needs {hint('matplotlib')}") from missing
@@ -58,6 +72,8 @@ ROWS = 8  # of the table: the largest
 BEHIND, BEFORE = 2, 4  # overlaps: where lines are drawn
 NEAR = 4.0  # times its size: from how far an overlap is looked at
 
+_Row = tuple[Pair, Overlap, "Press | None"]
+
 
 def save(
     path: str | Path,
@@ -67,8 +83,9 @@ def save(
     close: bool = False,
     looks: tuple[Look, Look] = (BODIES, OVERLAPS),
     framing: Framing | None = None,
+    forces: Forces | None = None,
 ) -> Path:
-    """Draw the bodies where they are and the overlapping pairs among `contacts`; returns the path.
+    """Draw the bodies where they are, the overlapping pairs among `contacts` and their `forces`; returns the path.
 
     With `close`, the camera comes near the largest of them. `looks` are those of the bodies and of the overlaps.
     A `framing` that has seen other moments, too, knows what moves; without one, the bodies that overlap are framed.
@@ -76,14 +93,23 @@ def save(
     contacts = list(contacts)
     here = Framing(bodies)
     here.see(bodies, contacts)
-    overlaps = sorted(pairs(bodies, contacts).items(), key=lambda item: -item[1].volume)
-    near = np.asarray(overlaps[0][1].bounds) if close and overlaps else None
+    shared = sorted(labelled(bodies, contacts), key=lambda item: -item[2].overlap.volume)
+    near = np.asarray(shared[0][2].overlap.bounds) if close and shared else None
     picture = _Picture(framing or here, here.side(), near)
+    seen = None
+    if forces is not None and looks[1].forces:
+        seen = Seen.of(bodies, contacts, forces, picture.height / 4, framing or here)
     for key, placed in zip(bodies.keys, bodies.placed, strict=True):
         picture.add_body(placed, np.array(bodies.colors[key[:2]][:3]), looks[0])
-    for _, overlap in overlaps:
-        picture.add_overlap(to_draw(overlap, picture.size), looks[1])
-    picture.save(Path(path), title, overlaps)
+    table = []
+    for pair, _, contact in shared:
+        press = seen.pressed.get(key_of(contact)) if seen else None
+        picture.add_overlap(to_draw(contact.overlap, picture.size), looks[1], press, seen.scale if seen else None)
+        table.append((pair, contact.overlap, press))
+    if seen:
+        for arrow in seen.arrows:
+            picture.add_force(arrow, seen.scale)
+    picture.save(Path(path), title, table, seen.scale if seen else None)
     return Path(path)
 
 
@@ -135,6 +161,8 @@ class _Picture:
         self.lines: list[tuple[Array, Array, int]] = []  # (k, 2, 2) segments, (k, 4) colours, BEHIND or BEFORE
         self.heads: list[Array] = []
         self.dots: list[tuple[Array, Array, float]] = []
+        self.pushes: list[tuple[Array, Any]] = []  # polygons, and their colours
+        self.height = 2 * self.distance * float(np.tan(np.deg2rad(FIELD_OF_VIEW) / 2))  # m, seen where it looks at
 
     def seen(self, points: Array) -> tuple[Array, Array]:
         """Where world points (n, 3) are on the screen, (n, 2), in half heights from its middle, and how far off, m."""
@@ -192,9 +220,13 @@ class _Picture:
             colors = np.column_stack([np.tile(GRID, (len(strength), 1)), strength])
             self._add_lines(_in_world(placed, drawn.edges), colors, BEHIND)
 
-    def add_overlap(self, overlap: Overlap, look: Look) -> None:
+    def add_overlap(self, overlap: Overlap, look: Look, press: Press | None = None, scale: Scale | None = None) -> None:
         vertices, centroid = overlap.vertices, np.asarray(overlap.centroid)
-        if look.faces:
+        if look.faces and press and scale:
+            corners, found = pressures(overlap, press, scale.top)
+            shades = list(colors(found.mean(axis=1), scale.top))
+            self._add_sides(list(corners), shades, None, look.opacity, self.overlaps, lit=False)
+        elif look.faces:
             own = [np.array(OWNER_COLORS[owner % len(OWNER_COLORS)]) for owner in overlap.owner]
             fronts = [channels(look.front)] * len(own) if look.front else own
             back = channels(look.back) if look.back else np.array([0.3, 0.3, 0.3])
@@ -204,15 +236,30 @@ class _Picture:
         if look.vertices:
             self.dots.append((self.seen(vertices)[0], np.array(LINE), 5.0))
         if look.marks:
-            self._add_marks(overlap, centroid)
+            self._add_marks(overlap, centroid, arrow=press is None)
         if np.ptp(vertices, axis=0).max() < 0.015 * self.size:
             self.dots.append((self.seen(centroid[None])[0], np.array(INK), 6.0))
 
-    def _add_marks(self, overlap: Overlap, centroid: Array) -> None:
+    def add_force(self, arrow: Arrow, scale: Scale) -> None:
+        """The force of a pair of links, and what of it is friction."""
+        for force, color, thick in ((arrow.force, FORCE, 0.007), (arrow.friction, FRICTION, 0.009)):
+            (start, end), _ = self.seen(np.array([arrow.start, arrow.start + scale.arrow(force)]))
+            along = end - start
+            length = float(np.linalg.norm(along))
+            if length < 0.008:
+                continue
+            along /= length
+            aside, head = np.array([-along[1], along[0]]), min(0.06, 0.6 * length)
+            wide = min(3.2 * thick, 0.4 * head)
+            outline = [(0, thick), (length - head, thick), (length - head, wide), (length, 0)]
+            outline += [(length - head, -wide), (length - head, -thick), (0, -thick)]
+            self.pushes.append((np.array([start + far * along + off * aside for far, off in outline]), color))
+
+    def _add_marks(self, overlap: Overlap, centroid: Array, arrow: bool) -> None:
         ink = np.append(INK, 1.0)
         for ring in overlap.patch:
             self._add_lines(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1), ink, BEFORE)
-        if overlap.normal is None:
+        if overlap.normal is None or not arrow:
             return
         tip = centroid + arrow_length(overlap.area, self.size) * overlap.normal
         self._add_lines(np.array([[centroid, tip]]), ink, BEFORE)
@@ -222,15 +269,24 @@ class _Picture:
         self.heads.append(np.array([end, end - 0.2 * along + 0.25 * aside, end - 0.2 * along - 0.25 * aside]))
 
     def _add_sides(
-        self, faces: Sequence[Array], fronts: Sequence[Array], back: Array | None, opacity: float, to: list[_Side]
+        self,
+        faces: Sequence[Array],
+        fronts: Sequence[Array],
+        back: Array | None,
+        opacity: float,
+        to: list[_Side],
+        lit: bool = True,
     ) -> None:
-        """Faces, counter-clockwise from outside, flat and matt; first those seen from inside, if they have a colour."""
+        """Faces, counter-clockwise from outside, flat and matt; first those seen from inside, if they have a colour.
+
+        Those that are not `lit` have their colour from all sides.
+        """
         outside, inside = _Side(0.0, opacity, [], []), _Side(0.0, opacity, [], [])
         eye = self.target + self.distance * self.back
         for corners, front in zip(faces, fronts, strict=True):
             normal = np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
             normal /= np.linalg.norm(normal) or 1.0
-            light = 0.4 + 0.7 * (0.45 + 0.55 * max(0.0, float(normal @ LIGHT)))
+            light = 0.4 + 0.7 * (0.45 + 0.55 * max(0.0, float(normal @ LIGHT))) if lit else 1.0
             if normal @ (eye - corners[0]) > 0:
                 side, color = outside, front * light
             elif back is not None:
@@ -258,7 +314,7 @@ class _Picture:
         colors = np.broadcast_to(colors, (len(segments), 4))[seen]
         self.lines.append((self.seen(ends.reshape(-1, 3))[0].reshape(-1, 2, 2), colors, order))
 
-    def save(self, path: Path, title: str, overlaps: Sequence[tuple[tuple[str, str], Overlap]]) -> None:
+    def save(self, path: Path, title: str, table: Sequence[_Row], scale: Scale | None) -> None:
         figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, facecolor=BOTTOM)
         axes = figure.add_axes((0, 0, 1, 1), xlim=(-WIDTH / HEIGHT, WIDTH / HEIGHT), ylim=(-1, 1))
         axes.set_axis_off()
@@ -271,7 +327,12 @@ class _Picture:
         axes.add_collection(PolyCollection(self.heads, facecolors=[INK], zorder=BEFORE))
         for points, color, size in self.dots:
             axes.plot(*points.T, ".", color=tuple(color), markersize=size, zorder=BEFORE + 1)
-        axes.add_artist(_table(title, overlaps))
+        for polygon, color in self.pushes:
+            patch = Polygon(polygon, facecolor=color, edgecolor=BOTTOM, linewidth=0.8, zorder=BEFORE + 2)
+            axes.add_patch(patch)
+        axes.add_artist(_table(title, table))
+        if scale:
+            axes.add_artist(_legend(scale))
         with beside(path) as file:
             FigureCanvasAgg(figure).print_png(str(file))  # type: ignore[no-untyped-call]
 
@@ -288,30 +349,53 @@ def _painted(sides: Sequence[_Side]) -> Any:
     return np.asarray(canvas.resize((WIDTH, HEIGHT), Image.Resampling.BOX))
 
 
-def _table(title: str, overlaps: Sequence[tuple[tuple[str, str], Overlap]]) -> AnchoredOffsetbox:
-    """The title, and the pairs with volume and depth, the largest first."""
+def _text(words: str, color: Any = LINE) -> TextArea:
+    return TextArea(words, textprops={"color": color, "fontsize": 11, "family": "DejaVu Sans", "parse_math": False})
 
-    def text(words: str, color: Any = LINE) -> TextArea:
-        return TextArea(words, textprops={"color": color, "fontsize": 11, "family": "DejaVu Sans", "parse_math": False})
 
+def _boxed(content: Any, corner: str) -> AnchoredOffsetbox:
+    box = AnchoredOffsetbox(corner, child=content, pad=0.3, borderpad=0.7)
+    box.patch.set(facecolor="#16181d", edgecolor="none", alpha=0.8, boxstyle="round,pad=0.2")
+    box.set_zorder(20)
+    return box
+
+
+def _legend(scale: Scale) -> AnchoredOffsetbox:
+    """What colours and arrows stand for."""
+    ramp = DrawingArea(140, 10)
+    steps = 140
+    for k, color in enumerate(colors(np.arange(steps) / (steps - 1), 1.0)):
+        ramp.add_artist(Rectangle((140 * k / steps, 0), 140 / steps + 0.5, 10, facecolor=color, linewidth=0))
+    lines: list[Any] = [HPacker(children=[_text("0"), ramp, _text(scale.pressure)], pad=0, sep=8, align="center")]
+    for words, color in ((f"force, {scale}", FORCE), ("of it friction", FRICTION)):
+        arrow = DrawingArea(26, 10)
+        arrow.add_artist(Polygon([(0, 3.5), (15, 3.5), (15, 0), (26, 5), (15, 10), (15, 6.5), (0, 6.5)], color=color))
+        lines.append(HPacker(children=[arrow, _text(words)], pad=0, sep=8, align="center"))
+    return _boxed(VPacker(children=lines, pad=4, sep=6), "lower right")
+
+
+def _table(title: str, table: Sequence[_Row]) -> AnchoredOffsetbox:
+    """The title, and the pairs with volume, depth and force, the largest first."""
     names: list[Any] = []
     volumes: list[Any] = []
     depths: list[Any] = []
-    for (first, second), overlap in overlaps[:ROWS]:
-        parts: list[Any] = [text(first, OWNER_COLORS[0]), text("–", "#9aa3b0"), text(second, OWNER_COLORS[1])]
+    pushes: list[Any] = []
+    for (first, second), overlap, press in table[:ROWS]:
+        parts: list[Any] = [_text(first, OWNER_COLORS[0]), _text("–", "#9aa3b0"), _text(second, OWNER_COLORS[1])]
         names.append(HPacker(children=parts, pad=0, sep=4))
-        volumes.append(text(volume_text(overlap.volume)))
-        depths.append(text(f"{1e3 * (overlap.depth or 0.0):.3g} mm deep"))
+        volumes.append(_text(volume_text(overlap.volume)))
+        depths.append(_text(f"{1e3 * (overlap.depth or 0.0):.3g} mm deep"))
+        if press:
+            pushes.append(_text(force_text(float(np.linalg.norm(press.force)))))
     columns: list[Any] = [
         VPacker(children=names, pad=0, sep=5),
         VPacker(children=volumes, pad=0, sep=5, align="right"),
         VPacker(children=depths, pad=0, sep=5, align="right"),
     ]
-    lines: list[Any] = [text(title)] if title else []
-    lines += [HPacker(children=columns, pad=0, sep=18)] if names else [text("nothing overlaps", "#9aa3b0")]
-    if len(overlaps) > ROWS:
-        lines.append(text(f"and {len(overlaps) - ROWS:,} more", "#9aa3b0"))
-    box = AnchoredOffsetbox("upper left", child=VPacker(children=lines, pad=4, sep=7), pad=0.3, borderpad=0.7)
-    box.patch.set(facecolor="#16181d", edgecolor="none", alpha=0.8, boxstyle="round,pad=0.2")
-    box.set_zorder(20)
-    return box
+    if len(pushes) == len(names):
+        columns.append(VPacker(children=pushes, pad=0, sep=5, align="right"))
+    lines: list[Any] = [_text(title)] if title else []
+    lines += [HPacker(children=columns, pad=0, sep=18)] if names else [_text("nothing overlaps", "#9aa3b0")]
+    if len(table) > ROWS:
+        lines.append(_text(f"and {len(table) - ROWS:,} more", "#9aa3b0"))
+    return _boxed(VPacker(children=lines, pad=4, sep=7), "upper left")

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Overlap
+from overlapper.viewer.framing import Framing
 from overlapper.viewer.labels import Bodies, Contact, Link, labelled
-from overlapper.viewer.look import Array, channels
+from overlapper.viewer.look import Array, channels, to_draw
 from overlapper.viewer.outline import polytope_edges, triangles
 
 COLORS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21908c", "#27ad81", "#5dc863", "#aadc32", "#fde725")
@@ -132,7 +133,16 @@ def colors(pressure: Array, top: float) -> Array:
     return np.stack([np.interp(pressure / top, places, stops[:, part]) for part in range(3)], axis=-1)
 
 
-def rounded_up(value: float, digits: Sequence[int] = (1, 2, 5, 10)) -> float:
+def usual(values: Sequence[float], weights: Sequence[float]) -> float:
+    """The value up to which there are four fifths of the weights; 0 without any: a few that stand out do not count."""
+    if not len(values) or not sum(weights):
+        return 0.0
+    order = np.argsort(values)
+    below = np.cumsum(np.asarray(weights)[order])
+    return float(np.asarray(values)[order][np.searchsorted(below, 0.8 * below[-1] * (1 - 1e-12))])
+
+
+def rounded_up(value: float, digits: Sequence[float] = (1, 1.5, 2, 3, 4, 5, 6, 8, 10)) -> float:
     """To the next of those digits times a power of ten."""
     if not value > 0:
         return 1.0
@@ -154,7 +164,13 @@ class Scale:
         unit = 10.0 ** np.floor(np.log10(length))
         return cls(float(unit), rounded_up(force * unit / length, range(1, 11)), rounded_up(top))
 
+    def suits(self, force: float, top: float, length: float) -> bool:
+        """True where what is usual neither outgrows it nor is lost in it, or where there is nothing to see."""
+        drawn = force * self.length / self.force
+        return not force or (length / 6 <= drawn <= 1.5 * length and self.top / 12 <= top <= 1.5 * self.top)
+
     def arrow(self, force: Array) -> Array:
+        """As it is drawn, m."""
         return force * (self.length / self.force)
 
     def __str__(self) -> str:
@@ -164,6 +180,44 @@ class Scale:
     def pressure(self) -> str:
         """What the last colour stands for."""
         return _in_unit(self.top, PASCALS)
+
+
+def usual_force(some: Sequence[Arrow]) -> float:
+    forces = [float(np.linalg.norm(each.force)) for each in some]
+    return usual(forces, forces)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is seen of the forces of one frame: by pair of shapes, by pair of links, and the scale of both."""
+
+    pressed: Mapping[Key, Press]
+    arrows: Sequence[Arrow]
+    scale: Scale
+
+    @classmethod
+    def of(
+        cls,
+        bodies: Bodies,
+        contacts: Sequence[Contact],
+        forces: Forces | None,
+        length: float,
+        framing: Framing,
+        before: Scale | None = None,
+    ) -> Seen:
+        """With arrows of what is usual about as long as that, m; by the scale of `before` as long as that does."""
+        pressed = presses(forces)
+        found = arrows(bodies, contacts, pressed, framing.pushed_second) if pressed else []
+        overlapping = [each for each in contacts if each.overlap and key_of(each) in pressed]
+        tops = [
+            press.stiffness * deepest(to_draw(each.overlap, framing.size), press.normal)
+            for each in overlapping
+            for press in [pressed[key_of(each)]]
+        ]
+        top = usual(tops, [float(np.linalg.norm(pressed[key_of(each)].force)) for each in overlapping])
+        force = usual_force(found)
+        fits = before is not None and before.suits(force, top, length)
+        return cls(pressed, found, before if before is not None and fits else Scale.of(force, top, length))
 
 
 LENGTHS = ((1e-3, "mm"), (1e-2, "cm"), (1.0, "m"))

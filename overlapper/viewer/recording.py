@@ -48,6 +48,8 @@ from overlapper.viewer.pressure import (
     key_of,
     presses,
     rounded_up,
+    usual,
+    usual_force,
 )
 from overlapper.viewer.stage import Stage, rgb
 from overlapper.whole_file import beside
@@ -102,7 +104,7 @@ class Recording:
         self._contacts: dict[Pair, Contact] = {}  # the first of each
         self._presses: list[tuple[float, ...]] = []  # of each sighting
         self._depths: dict[int, float] = {}  # of polytopes
-        self._strongest: list[tuple[float, float]] = []  # N and Pa, in each frame that has forces
+        self._usual: list[tuple[float, float]] = []  # N and Pa, in each frame that has forces
 
     def add(
         self,
@@ -141,14 +143,16 @@ class Recording:
         contacts = list(contacts)
         self._framing.see(bodies, contacts)
         pressed = presses(forces)
-        most = 0.0
+        tops: list[float] = []
+        weights: list[float] = []
         for pair, links, contact in labelled(bodies, contacts):
             self._links.setdefault(pair, links)
             self._contacts.setdefault(pair, contact)
-            most = max(most, self._add_overlap(self._stage, pair, contact.overlap, pressed.get(key_of(contact))))
-        if most:
-            found = arrows(bodies, contacts, pressed)
-            self._strongest.append((max(float(np.linalg.norm(each.force)) for each in found), most))
+            press = pressed.get(key_of(contact))
+            tops.append(self._add_overlap(self._stage, pair, contact.overlap, press))
+            weights.append(float(np.linalg.norm(press.force)) if press else 0.0)
+        if any(weights):
+            self._usual.append((usual_force(arrows(bodies, contacts, pressed)), usual(tops, weights)))
 
     def __repr__(self) -> str:
         until = f", {self._times[-1]:g} s" if self._times else ""
@@ -202,9 +206,9 @@ class Recording:
 
     def _scale(self, framing: Framing) -> dict[str, Any] | None:
         """What is usual in a frame, for an impact of one moment is not what arrows and colours are to be told by."""
-        if not self._strongest:
+        if not self._usual:
             return None
-        force, pressure = np.median(self._strongest, axis=0).tolist()
+        force, pressure = np.median(self._usual, axis=0).tolist()
         return {
             "usual": force,
             "top": rounded_up(pressure),
@@ -232,7 +236,7 @@ class Recording:
 
     def _pressing(self) -> dict[str, NDArray[Any]]:
         """What there is beside of a recording with forces; empty without."""
-        rows = self._presses if self._strongest else []
+        rows = self._presses if self._usual else []
         columns = np.array(rows, dtype=np.float32).reshape(-1, 10)
         return {
             "presses": np.hstack([_rounded(columns[:, column], bits) for column, bits in PRESSES]).T,

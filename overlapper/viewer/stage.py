@@ -30,6 +30,7 @@ from overlapper.viewer.look import (
     to_draw,
 )
 from overlapper.viewer.outline import Ground, cone, ground, outline, polytope_edges, rotation_from_z, triangles
+from overlapper.viewer.pressure import FORCE, FRICTION, Arrow, Press, Scale, colors, pressures
 
 try:
     from meshcat import geometry
@@ -64,6 +65,10 @@ class Stage:
         self._dot = geometry.Points(
             _points(np.zeros((1, 3))), _DotMaterial(size=5, sizeAttenuation=False, **through_everything)
         )
+        self._pressures = geometry.MeshBasicMaterial(vertexColors=True, transparent=True, **fade)
+        self._pushes = [
+            geometry.MeshBasicMaterial(**through_everything | {"color": rgb(color)}) for color in (FORCE, FRICTION)
+        ]
         head = cone(radius=0.05, bottom=0.8, top=1.0)
         self._arrowhead = geometry.Mesh(
             _Mesh(head.vertices, head.faces), geometry.MeshBasicMaterial(**through_everything)
@@ -129,27 +134,53 @@ class Stage:
         skin = _skin(rgb(channels(look.back)), True, side=BACK, opacity=look.opacity, depthWrite=look.opacity == 1)
         return [(geometry.Mesh(mesh, skin), {"name": "inside", "visible": look.faces})]
 
-    def overlap(self, overlap: Overlap) -> Group:
-        """Facets by owner, patch outline and normal; about the centroid, where float32 is fine enough."""
+    def overlap(self, overlap: Overlap, press: Press | None = None, scale: Scale | None = None) -> Group:
+        """Facets by owner, patch outline and normal; about the centroid, where float32 is fine enough.
+
+        With what the two do to each other and a scale, facets are by pressure, and there is no normal.
+        """
         overlap, look = to_draw(overlap, self.size), self._overlaps
         centroid = np.asarray(overlap.centroid)
         vertices = overlap.vertices - centroid
-        parts = self._facets(overlap, vertices) if look.faces else []
+        parts: list[tuple[geometry.Object, dict[str, Any]]] = []
+        if look.faces and press and scale:
+            corners, found = (each.reshape(-1, *each.shape[2:]) for each in pressures(overlap, press, scale.top))
+            faces = np.arange(len(corners)).reshape(-1, 3)
+            mesh = _Mesh(corners - centroid, faces, paint=colors(found, scale.top))
+            parts.append((geometry.Mesh(mesh, self._pressures), {"renderOrder": 1}))
+        elif look.faces:
+            parts = self._facets(overlap, vertices)
         if look.edges:
             segments = vertices[polytope_edges(overlap.facets)]
             parts.append((geometry.LineSegments(_lines(segments), self._lines), {"renderOrder": 1}))
         if look.vertices:
             parts.append((geometry.Points(_points(vertices), self._corners), {"renderOrder": 1}))
         if look.marks:
-            parts += self._marks(overlap, centroid)
+            parts += self._marks(overlap, centroid, arrow=press is None)
         if np.ptp(vertices, axis=0).max() < 0.015 * self.size:
             parts.append((self._dot, {"renderOrder": 3}))
         return Group((Group(*parts), {"position": centroid.tolist()}))
 
-    def _marks(self, overlap: Overlap, centroid: Array) -> list[tuple[geometry.Object, dict[str, Any]]]:
+    def force(self, arrow: Arrow, scale: Scale) -> Group:
+        """The force of a pair of links, and what of it is friction."""
+        parts: list[tuple[geometry.Object, dict[str, Any]]] = []
+        for vector, material, thick in zip((arrow.force, arrow.friction), self._pushes, (1.0, 1.2), strict=True):
+            drawn = scale.arrow(vector)
+            length = float(np.linalg.norm(drawn))
+            if length < 0.002 * self.size:
+                continue
+            tip = min(0.02 * self.size, 0.6 * length)
+            wide = min(0.005 * thick * self.size, 0.4 * tip)
+            shaft, head = cone(wide / 3, 0.0, length - tip, wide / 3), cone(wide, length - tip, length)
+            faces = np.concatenate([shaft.faces, head.faces + len(shaft.vertices)])
+            vertices = np.concatenate([shaft.vertices, head.vertices]) @ rotation_from_z(drawn / length).T
+            parts.append((geometry.Mesh(_Mesh(vertices, faces), material), {"renderOrder": 2.5}))
+        return Group((Group(*parts), {"position": arrow.start.tolist()}))
+
+    def _marks(self, overlap: Overlap, centroid: Array, arrow: bool) -> list[tuple[geometry.Object, dict[str, Any]]]:
         parts: list[tuple[geometry.Object, dict[str, Any]]] = []
         lines = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) - centroid for ring in overlap.patch]
-        if overlap.normal is not None:
+        if arrow and overlap.normal is not None:
             length = arrow_length(overlap.area, self.size)
             lines.append(np.array([[np.zeros(3), length * overlap.normal]]))
             pose = np.eye(4)
@@ -232,13 +263,18 @@ class _DotMaterial(geometry.GenericMaterial):  # type: ignore[misc]
 
 
 class _Mesh(geometry.TriangularMeshGeometry):  # type: ignore[misc]
-    """meshcat's triangles, with normals; or with how much is seen of each vertex, from 0 to 1."""
+    """meshcat's triangles, with normals; with how much is seen of each vertex, from 0 to 1; or with their colours."""
 
     def __init__(
-        self, vertices: Array, faces: NDArray[Any], normals: Array | None = None, strength: Array | None = None
+        self,
+        vertices: Array,
+        faces: NDArray[Any],
+        normals: Array | None = None,
+        strength: Array | None = None,
+        paint: Array | None = None,
     ) -> None:
         super().__init__(vertices, faces)
-        self.normals, self.strength = normals, strength
+        self.normals, self.strength, self.paint = normals, strength, paint
 
     def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
         lowered: dict[str, Any] = super().lower(object_data)
@@ -246,6 +282,8 @@ class _Mesh(geometry.TriangularMeshGeometry):  # type: ignore[misc]
             lowered["data"]["attributes"]["normal"] = geometry.pack_numpy_array(self.normals.T)
         if self.strength is not None:
             lowered["data"]["attributes"]["color"] = geometry.pack_numpy_array(_faded(self.strength))
+        if self.paint is not None:
+            lowered["data"]["attributes"]["color"] = geometry.pack_numpy_array(self.paint.T)
         return lowered
 
 

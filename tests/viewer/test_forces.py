@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pybullet
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from pages import Film, looks, opened, panel, scene
+from PIL import Image
 
 from overlapper import Box, HalfSpace, Placed, overlap
 from overlapper.scenes.outputs import recorder
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import load_scene
 from overlapper.simulation import Bodies, Recorder, VolumetricContact
-from overlapper.viewer import Recording
-from overlapper.viewer.pressure import Press, Scale, colors, deepest, depths, force_text, presses, pressures
+from overlapper.viewer import Recording, picture
+from overlapper.viewer.look import BODIES, OVERLAPS
+from overlapper.viewer.pressure import Press, Scale, colors, deepest, depths, force_text, presses, pressures, usual
 
 STIFFNESS = 1e6
 
@@ -99,11 +103,11 @@ def test_colours_grow_lighter_from_no_pressure_to_the_highest_and_stay_so():
 @pytest.mark.parametrize(
     ("scale", "told", "top"),
     [
-        (Scale.of(9.81, 1234.0, 0.05), "1 cm = 2 N", "2 kPa"),
-        (Scale.of(2100.0, 3e6, 0.5), "10 cm = 500 N", "5 MPa"),
+        (Scale.of(9.81, 1234.0, 0.05), "1 cm = 2 N", "1.5 kPa"),
+        (Scale.of(2100.0, 3.1e6, 0.5), "10 cm = 500 N", "4 MPa"),
         (Scale.of(0.0, 0.0, 1.5), "1 m = 1 N", "1 Pa"),
-        (Scale.of(21.0, 7e4, 0.04), "1 cm = 6 N", "100 kPa"),
-        (Scale.of(3e-4, 7.0, 2e-3), "1 mm = 200 µN", "10 Pa"),
+        (Scale.of(21.0, 7e4, 0.04), "1 cm = 6 N", "80 kPa"),
+        (Scale.of(3e-4, 7.0, 2e-3), "1 mm = 200 µN", "8 Pa"),
     ],
 )
 def test_a_scale_has_round_numbers(scale, told, top):
@@ -243,3 +247,26 @@ def test_a_run_with_volumetric_contact_is_recorded_with_its_forces(tmp_path):
     film = Film.of(page)
     assert film.heading["forces"]["on_second"] == [True]
     assert film.arrays["presses"].reshape(10, -1)[2].max() < -1  # the first is the plane
+
+
+def picture_of(client, path, look=OVERLAPS, forces=True):
+    bodies, found = pressed_cube(client, tilt=0.02)
+    picture.save(path, bodies, found.contacts, looks=(BODIES, look), forces=found if forces else None)
+    return np.asarray(Image.open(path).convert("RGB"), dtype=int)
+
+
+def test_a_picture_has_pressures_an_arrow_and_their_scale_and_none_of_them_if_not_asked_to(client, tmp_path):
+    seen = picture_of(client, tmp_path / "forces.png")
+    stage, legend, table = seen[200:780], seen[800:, 850:], seen[:60]
+    assert yellow(stage) > 100 and white(stage) > 300 and yellow(legend) > 50
+    without = picture_of(client, tmp_path / "none.png", replace(OVERLAPS, forces=False))
+    assert yellow(without) == white(without[200:]) == 0
+    assert_array_equal(without, picture_of(client, tmp_path / "plain.png", forces=False))
+    # The row has one number more.
+    assert (table > 128).all(axis=-1).sum() > (without[:60] > 128).all(axis=-1).sum()
+
+
+def test_what_is_usual_is_not_what_a_few_have_that_stand_out():
+    assert usual([], []) == usual([3.0], [0.0]) == 0
+    assert usual([5.0, 1.0, 100.0], [4.0, 4.0, 1.0]) == 5
+    assert usual([1.0, 2.0], [1.0, 1.0]) == 2

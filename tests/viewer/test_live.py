@@ -6,14 +6,17 @@ import base64
 import re
 import subprocess
 import sys
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import pytest
 import umsgpack
-from pages import CUP, Bodies, hand_at
+from pages import CUP, HAND, Bodies, hand_at
 
 from overlapper import Placed, Sphere
 from overlapper.viewer import Viewer
+from overlapper.viewer.look import Look
 
 
 def test_a_live_view_is_seen_where_it_is_asked_to_be():
@@ -53,6 +56,41 @@ def test_a_live_view_shows_the_last_step_and_ends_with_its_server():
             viewer.show(Bodies({CUP: Placed(Sphere(0.1))}), [])
             assert live_paths(viewer) == {cup}
         assert server.returncode is not None
+
+
+@dataclass
+class Push:
+    """30 N on the cup, by the hand beside it, of which some is friction."""
+
+    pairs = np.array([[*CUP, *HAND]])
+    force = np.array([[-30.0, 0.0, 3.0]])
+    torque = slip = np.zeros((1, 3))
+    energy = np.zeros(1)
+    normal = np.array([[-1.0, 0.0, 0.0]])
+    stiffness: np.ndarray = field(default_factory=lambda: np.array([1e5]))
+
+
+def test_a_live_view_has_an_arrow_and_tells_its_scale_until_forces_are_gone():
+    with Viewer() as viewer:
+        bodies = hand_at(0.12)
+        viewer.show(bodies, bodies.contacts(), Push())
+        overlap = "/overlapper/overlaps/cup-arm.hand/1.34 dm³"
+        (arrow,) = {each for each in live_paths(viewer) if "forces" in each}
+        assert arrow == "/overlapper/forces/1 cm = 5 N, 8 kPa/cup-arm.hand/30.1 N"
+        # A scale stays until arrows or colours have outgrown it.
+        viewer.show(bodies, bodies.contacts(), Push(np.array([0.9e5])))
+        assert arrow in live_paths(viewer)
+        viewer.show(bodies, bodies.contacts(), Push(np.array([5e5])))
+        assert "/overlapper/forces/1 cm = 5 N, 40 kPa/cup-arm.hand/30.1 N" in live_paths(viewer)
+        viewer.show(bodies, bodies.contacts())
+        assert live_paths(viewer) == {"/overlapper/bodies/arm/hand/0", "/overlapper/bodies/cup/base/0", overlap}
+
+
+def test_a_live_view_without_forces_among_its_looks_has_none():
+    with Viewer(overlaps=Look(forces=False)) as viewer:
+        bodies = hand_at(0.12)
+        viewer.show(bodies, bodies.contacts(), Push())
+        assert not any("forces" in each for each in live_paths(viewer))
 
 
 def test_a_visualizer_passed_in_keeps_its_camera_and_its_server():
