@@ -286,6 +286,7 @@ def write_page(physics: Path, folder: Path, cost: Path | None = None) -> Path:
         soft=small(of["stack", "volumetric", "1e7 Pa/m"]["drift"]),
         soft_speed=small(of["stack", "volumetric", "1e7 Pa/m"]["speed"]),
         stiff=small(of["stack", "volumetric", "1e8 Pa/m"]["drift"]),
+        shove=f"{1e6 * of['shove', 'volumetric', 'box']['way']:.0f}",
         loop=small(of["loop", "volumetric", "edge across edge"]["work"]),
     )
     page = folder / "forces.md"

@@ -41,6 +41,7 @@ def measured() -> Iterator[Row]:
         rebounds,
         slides,
         inclines,
+        shoves,
         spins,
         slides_and_spins,
         rolls,
@@ -98,6 +99,10 @@ def inclines() -> Iterator[Row]:
             acceleration, way = experiments.incline(slope, law)
             yield Row("incline", law, "acceleration", slope, acceleration / G)
             yield Row("incline", law, "way", slope, way)
+
+
+def shoves() -> Iterator[Row]:
+    yield Row("shove", "volumetric", "box", "way", experiments.shove()[0])
 
 
 def spins() -> Iterator[Row]:

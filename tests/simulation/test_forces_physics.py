@@ -54,6 +54,14 @@ def test_what_lies_on_an_incline_above_the_angle_of_friction_slides_as_it_should
     assert acceleration == pytest.approx(G * (math.sin(angle) - FRICTION * math.cos(angle)), rel=1e-3) and way > 0
 
 
+@pytest.mark.parametrize("substeps", [1, 4])
+def test_a_force_that_sets_in_is_known_a_substep_later_and_then_held(substeps):
+    """Until then it moves the box freely: by F h² / m, and what friction takes to stop that."""
+    way, speed = experiments.shove(substeps)
+    alone = 2 * (STEP / substeps) ** 2
+    assert alone < way < 3 * alone and speed < 1e-9
+
+
 @pytest.mark.parametrize("friction", [None, "distributed"])
 @pytest.mark.parametrize("shape", ["box", "disc"])
 @pytest.mark.parametrize("substeps", [1, 4])

@@ -204,6 +204,20 @@ def slide(substeps: int, law="volumetric", speed=1.0) -> float:
     return way / (speed**2 / (2 * FRICTION * G))
 
 
+def shove(substeps: Any = "auto", force=2.0) -> tuple[float, float]:
+    """How far a flat box comes that is pushed by less than friction holds, from one step on, and its speed then."""
+    with World() as world:
+        box = world.box(HALF, HALF, 0.01, position=[0, 0, 0.01 - G / 1e5])
+        with world.contact(substeps=substeps) as contact:
+            run(contact, 1)
+            start = world.position(box)[0]
+            for _ in range(240):
+                at = world.position(box).tolist()
+                p.applyExternalForce(box, -1, [force, 0, 0], at, p.WORLD_FRAME, world.client)
+                contact.step()
+        return world.position(box)[0] - start, float(np.abs(world.velocity(box)).max())
+
+
 def incline(slope: float, law="volumetric", substeps: Any = "auto") -> tuple[float, float]:
     """A flat box on a plane that is slowly turned to `slope` times its angle of friction: its acceleration and way.
 
