@@ -160,12 +160,13 @@ class VolumetricContact:
                 if taken:
                     self.bodies.follow()
                 frequency2 = self._place(self._dynamics.solver)
+                velocity = self._dynamics.velocity()
                 if not self._planned:
                     # Once in a step is enough for what comes; a length that changes within a swing costs energy.
-                    highest = max(frequency2.max(initial=0.0), 0.0 if taken else self._coming(duration))
+                    highest = max(frequency2.max(initial=0.0), 0.0 if taken else self._coming(duration, velocity))
                     if not taken or highest * length**2 > 1:
                         length = left / min(_followed(highest, left), max(1, MOST_SUBSTEPS - taken))
-                wrenches = self._solve(length, frequency2)
+                wrenches = self._solve(length, velocity, frequency2)
                 pybullet.setTimeStep(length, client)
                 self._commands.prepare(length, first=not taken, share=length / duration)
                 self._dynamics.apply(wrenches, self._frames)
@@ -183,7 +184,8 @@ class VolumetricContact:
         client = self.bodies.physicsClientId
         self._refresh()
         frequency2 = self._place(self._dynamics.solver)
-        self._solve(pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"], frequency2)
+        duration = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
+        self._solve(duration, self._dynamics.velocity(), frequency2)
         self._after = None
         return self._found
 
@@ -306,14 +308,13 @@ class VolumetricContact:
             friction = self._friction.of(links, dynamics.links)
         return self._stiffness.of(links, dynamics.links), self._dissipation.of(links, dynamics.links), friction
 
-    def _coming(self, duration: float) -> float:
+    def _coming(self, duration: float, velocity: Array) -> float:
         """The square of the highest frequency of what bodies will share in a time as long as that.
 
         A body that came in by a long step would be deeper than its speed can take it: it would be thrown back. So steps
         are short before they have to be: before two touch, and before an edge comes down to a face.
         """
-        dynamics, solver = self._dynamics, self._dynamics.solver.copy()
-        velocity = dynamics.velocity()
+        solver = self._dynamics.solver.copy()
         if self._before:
             before, length, _ = self._before
             velocity = velocity + duration / length * (velocity - before)
@@ -347,10 +348,9 @@ class VolumetricContact:
         pairs = bodies._pairs_at(positions, orientations, self._among)
         return self._batch.overlaps(positions, orientations, pairs, separated=False)
 
-    def _solve(self, duration: float, frequency2: Array) -> Array:
+    def _solve(self, duration: float, velocity: Array, frequency2: Array) -> Array:
         """The forces of a step as long as that; (n, 6) force and torque on the links."""
         dynamics = self._dynamics
-        velocity = dynamics.velocity()
         self._other = self._others(velocity)
         self._after = None
         damped = frequency2 * duration**2 > COARSE**2

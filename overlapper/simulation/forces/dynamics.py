@@ -90,6 +90,7 @@ class Dynamics:
                 at += coordinates
             self._single += [(id, *single)] if single[0] else []
             self._spherical += [(id, *spherical)] if spherical[0] else []
+        self._of_bases = np.add.outer(np.array([*self._bases.values()], dtype=int), range(6))
         parents, numbers, axes, pivots = zip(*rows) if rows else ([], [], [], [])
         masses = [mass for mass, _ in self._masses]
         inertias = np.array([inertia for _, inertia in self._masses]).reshape(-1, 3)
@@ -116,7 +117,7 @@ class Dynamics:
         client = self._client
         velocity = np.empty(self.solver.coordinates)
         bases = np.array([*map(pybullet.getBaseVelocity, self._joints, repeat(client))]).reshape(-1, 6)
-        velocity[np.add.outer(np.array([*self._bases.values()], dtype=int), range(6))] = bases
+        velocity[self._of_bases] = bases
         for id, joints, at in self._single:
             velocity[at] = [state[1] for state in pybullet.getJointStates(id, joints, client)]
         for id, joints, at in self._spherical:
