@@ -172,19 +172,17 @@ def stacks() -> Iterator[Row]:
 
 
 def loops() -> Iterator[Row]:
-    """The work of an edge across an edge along a circle, over the energy stored: nought if there were a potential."""
-    a, b = Box([HALF] * 3), Placed(Box([HALF] * 3), (0, 0, 0), experiments.POSES["edge"])
-    across = (0, math.sin(math.pi / 8), 0, math.cos(math.pi / 8))  # on an edge along y
-    radius, depth, nodes = 1e-3, 2e-3, 256
-    work, stored = 0.0, 0.0
+    """The work on a box that goes round a circle over the rim of another, over the energy stored; 0 of a potential."""
+    box, across, depth, radius, nodes = Box([HALF] * 3), 0.03, 2e-3, 1e-3, 256
+    below, work, stored = Placed(box), 0.0, 0.0
     for turn in 2 * math.pi * np.arange(nodes) / nodes:
-        x, y, z = radius * math.cos(turn), 0.0, 2 * HALF * math.sqrt(2) - depth + radius * math.sin(turn)
-        shared = overlap(Placed(a, (x, y, z), across), b)
-        up = -np.ravel(shared.gradient)[:3]
-        force = shared.volume * up / np.linalg.norm(up)
+        at = (2 * HALF - across + radius * math.cos(turn), 0, 2 * HALF - depth + radius * math.sin(turn))
+        shared = overlap(Placed(box, at), below)
+        out = -shared.gradient[0, :3]
+        force = shared.volume * out / np.linalg.norm(out)
         work += float(force @ [-math.sin(turn), 0, math.cos(turn)]) * radius * 2 * math.pi / nodes
-        stored = max(stored, shared.volume * depth / 4)
-    yield Row("loop", "volumetric", "edge across edge", "work", abs(work) / stored)
+        stored = max(stored, shared.volume * (depth - radius * math.sin(turn)) / 2)
+    yield Row("loop", "volumetric", "over a rim", "work", abs(work) / stored)
 
 
 def main() -> None:

@@ -36,7 +36,8 @@ def test_the_parts_of_a_substep_are_timed_and_nothing_else_remains_of_it(tmp_pat
     forces.main()
     assert Bodies.update is update
     page = (tmp_path / "forces.md").read_text(encoding="utf-8")
-    assert all(f"| {scene} |" in page for scene in [*forces.SCENES, forces.PILE])
+    assert f"| {' | '.join([*forces.SCENES, forces.PILE])} |" in page
+    assert all(f"| {part} |" in page for part in [*forces.PARTS, "else", "**all**"])
     assert "The pile of 200 boxes, 10 contacts, at 240 Hz" in page
 
 
