@@ -40,6 +40,7 @@ CALLS: dict[tuple[Any, str], str] = {
     (Bodies, "update"): "poses",
     (Bodies, "follow"): "poses",
     (Dynamics, "frames"): "poses",
+    (VolumetricContact, "_coming"): "what comes",
     (Bodies, "overlaps"): "overlaps",
     (_core.ContactSolver, "place"): "patches",
     (Dynamics, "velocity"): "velocities",

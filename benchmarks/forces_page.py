@@ -248,7 +248,18 @@ def cost_table(path: Path | None) -> str:
         found: dict[str, dict[str, str]] = {}
         for row in csv.DictReader(file):
             found.setdefault(row["scene"], {})[row["part"]] = row["us"]
-    parts = ["poses", "overlaps", "patches", "velocities", "solve", "apply", "stepSimulation", "rest", "substep"]
+    parts = [
+        "poses",
+        "what comes",
+        "overlaps",
+        "patches",
+        "velocities",
+        "solve",
+        "apply",
+        "stepSimulation",
+        "rest",
+        "substep",
+    ]
     scenes = [scene for scene, of in found.items() if "substep" in of]
     rows = [
         [
