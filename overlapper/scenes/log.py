@@ -12,7 +12,7 @@ from overlapper.scenes.outputs import StepTable
 import pybullet  # isort: skip  # after what says what to install
 
 if TYPE_CHECKING:
-    from overlapper.simulation import Bodies
+    from overlapper.simulation import Bodies, Forces
     from overlapper.simulation.contacts import Contacts
 
 
@@ -26,8 +26,9 @@ class Log:
                 log.add(bodies.overlaps())
 
     `path` ends in .csv, .parquet or .sqlite. `per` says what a row is of: "shape", two shapes, or "link", two links as
-    a whole. The heading has the versions of this package and of pybullet, what `bodies` was told of surfaces and
-    concave meshes, and `settings`: what else is worth knowing, as `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
+    a whole, `forces` whether there are columns of forces, which `add` is given then. The heading has the versions of
+    this package and of pybullet, what `bodies` was told of surfaces and concave meshes, and `settings`: what else is
+    worth knowing, as `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
 
     A step is on disk when `add` returns. The table grows beside its place, as `run.unfinished.parquet`, and takes it at
     the end of the `with`, or by `close()`, also if Ctrl-C or sys.exit() ends the loop. It stays where it is after an
@@ -38,24 +39,35 @@ class Log:
     """
 
     def __init__(
-        self, path: str | Path, bodies: Bodies, *, per: Literal["shape", "link"] = "shape", **settings: Any
+        self,
+        path: str | Path,
+        bodies: Bodies,
+        *,
+        per: Literal["shape", "link"] = "shape",
+        forces: bool = False,
+        **settings: Any,
     ) -> None:
         self.steps = 0
         """The number of the last step added."""
         self.unfinished: Path | None = None
         """Where the rows are that an error has kept from their place, if there are any."""
-        self._bodies, self._time = bodies, 0.0
-        self._table: StepTable | None = StepTable(Path(path), {**bodies.settings, **settings}, per)
+        self._bodies, self._time, self._forces = bodies, 0.0, forces
+        self._table: StepTable | None = StepTable(Path(path), {**bodies.settings, **settings}, per, forces)
 
-    def add(self, contacts: Contacts, step: int | None = None, time: float | None = None) -> None:
+    def add(
+        self, contacts: Contacts, step: int | None = None, time: float | None = None, forces: Forces | None = None
+    ) -> None:
         """Write what `bodies.overlaps()` has found, before the next `bodies.update()`.
 
-        `step` is the one after the last by default, `time`, in s, that of so many of pybullet's time steps. ValueError
-        if a step comes no later than the last, if `time` is not finite, if `contacts` are not of these bodies, or if
-        the log is closed; OSError if it cannot be written.
+        `forces` are those between these bodies, as `VolumetricContact.look()` sees them; of pairs without any they are
+        empty. `step` is the one after the last by default, `time`, in s, that of so many of pybullet's time steps.
+        ValueError if a step comes no later than the last, if `time` is not finite, if `contacts` are not of these
+        bodies, if there are `forces` and no columns for them, or if the log is closed; OSError if it cannot be written.
         """
         if self._table is None:
             raise ValueError(f"this Log is closed: {contacts!r} came too late")
+        if forces is not None and not self._forces:
+            raise ValueError("this Log has no columns of forces: say Log(..., forces=True)")
         step = self.steps + 1 if step is None else step
         if step <= self.steps:
             raise ValueError(f"step must be larger from one add() to the next: {step} came after {self.steps}")
@@ -67,7 +79,7 @@ class Log:
         if strange := strange.difference(self._bodies.keys):
             body, link, shape = min(strange)
             raise ValueError(f"contacts has shape {shape} of link {link} of body {body}, which is not among the bodies")
-        self._table.add(step, time, self._bodies, contacts)
+        self._table.add(step, time, self._bodies, contacts, forces=forces)
         self.steps = step
 
     def close(self) -> None:

@@ -103,6 +103,12 @@ def unheard(name: str) -> Callable[..., Any]:
     return function
 
 
+def tell(name: str, arguments: Arguments) -> None:
+    """Let a call be heard that was made, or made of several, unheard."""
+    for listener in tuple(_listeners):
+        listener(name, arguments, None)
+
+
 class _Heard:
     """A function of pybullet that listeners hear of."""
 

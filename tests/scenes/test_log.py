@@ -15,7 +15,7 @@ from overlapper.scenes.run import run
 from overlapper.scenes.scene import load_scene
 from overlapper.scenes.table import link_rows, rows
 from overlapper.scenes.table_file import read_metadata, read_table
-from overlapper.simulation import Bodies, Log, link_contacts
+from overlapper.simulation import Bodies, Log, VolumetricContact, link_contacts
 
 ENDINGS = ["csv", "parquet", "sqlite"]
 
@@ -182,3 +182,21 @@ def test_the_loop_of_the_documents_writes_its_table(tmp_path, monkeypatch):
     found = read_table(Path("r2d2.csv"))
     assert len({row["nameB"] for row in found}) == 4  # wheels
     assert read_metadata(Path("r2d2.csv"))["floor"] == "plane.urdf"
+
+
+def test_a_log_has_the_forces_of_volumetric_contact_if_it_is_to_have_any(two_boxes, tmp_path):
+    with (
+        VolumetricContact(two_boxes) as contact,
+        Log(tmp_path / "run.csv", two_boxes, forces=True) as log,
+        Log(tmp_path / "without.csv", two_boxes) as without,
+    ):
+        seen, contacts = contact.look(), two_boxes.overlaps()
+        log.add(contacts, forces=seen)
+        log.add(contacts)
+        without.add(contacts)
+        with pytest.raises(ValueError, match=r"^this Log has no columns of forces: say Log\(\.\.\., forces=True\)$"):
+            without.add(contacts, forces=seen)
+    first, second = read_table(tmp_path / "run.csv")
+    assert [first[f"force_{axis}_n"] for axis in "xyz"] == seen.force[0].tolist() and seen.force[0].any()
+    assert second["energy_j"] is None
+    assert "energy_j" not in read_table(tmp_path / "without.csv")[0]

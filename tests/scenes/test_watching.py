@@ -15,7 +15,7 @@ import overlapper
 from overlapper.scenes import watching
 from overlapper.scenes.table import rows
 from overlapper.scenes.table_file import read_metadata, read_table
-from overlapper.simulation import Bodies, Log, Recorder
+from overlapper.simulation import Bodies, Log, Recorder, VolumetricContact
 
 
 @pytest.fixture(autouse=True)
@@ -175,3 +175,15 @@ def test_the_loop_of_the_documents_is_watched():
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) == 4  # wheels on the ground
     assert {row["step"] % 4 for row in read_table(Path("r2d2.csv"))} == {0}
+
+
+def test_a_step_of_volumetric_contact_is_one_step(client):
+    p.createMultiBody(0, p.createCollisionShape(p.GEOM_PLANE, physicsClientId=client), physicsClientId=client)
+    box = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
+    p.createMultiBody(1, box, -1, [0, 0, 0.0499], physicsClientId=client)
+    p.setGravity(0, 0, -9.81, physicsClientId=client)
+    with overlapper.watch(client) as watch, VolumetricContact(Bodies(client), substeps=4) as contact:
+        for _ in range(20):
+            contact.step()
+    assert (watch.steps, watch.measured, watch.time) == (20, 20, pytest.approx(20 / 240))
+    assert watch.summary.pairs[0, -1, 1, -1].steps == 20

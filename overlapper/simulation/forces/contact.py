@@ -15,7 +15,7 @@ from overlapper import Batch, Overlaps
 from overlapper._core import ContactSolver
 from overlapper.simulation.asked_pairs import Among, listed
 from overlapper.simulation.bodies import Bodies
-from overlapper.simulation.calls import listen, unheard, unlisten
+from overlapper.simulation.calls import listen, tell, unheard, unlisten
 from overlapper.simulation.commands import Commands
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.extraction.model import Array
@@ -178,6 +178,7 @@ class VolumetricContact:
             self._commands.stepped()
         self.substeps = taken
         self._after = self._dynamics.velocity()
+        tell("stepSimulation", {"physicsClientId": client})  # one, to whoever watches
 
     def forces(self) -> Forces:
         """The forces that would act in a step of the simulator, without taking it: for scripts that integrate."""
