@@ -11,11 +11,12 @@ function colored(pressure) {
 // The pressure at a point about a polytope's middle: stiffness times how far it reaches along the normal, there.
 function pressureIn(sighting, polytope) {
   const press = pressOf(sighting), total = film.owners.length, planes = [];
+  const unit = film.polytope_frame[3 * film.polytope_previous.length + polytope];
   if (!press) return () => 0;
   for (let f = firstFacet[polytope]; f < firstFacet[polytope + 1]; f++) {
     const plane = Array.from({length: 4}, (_, part) => film.planes[part * total + f]);
     const slope = plane[0] * press.normal[0] + plane[1] * press.normal[1] + plane[2] * press.normal[2];
-    if (Math.abs(slope) > 1e-6) planes.push([...plane, slope]);
+    if (Math.abs(slope) > 1e-6) planes.push([...plane.slice(0, 3), unit * plane[3], slope]);
   }
   return ([x, y, z]) => {
     let ahead = Infinity, behind = Infinity;
@@ -86,7 +87,8 @@ function inLengths(length) {
 }
 
 let fitted = 0, about = null, pushed = [];  // the height that arrows are drawn for, where they are from, and what they show
-const LONGEST = 0.45;  // of that height
+const [LONGEST, SHORTEST] = [0.45, 0.01];  // of that height: what is shorter would be a speck
+const MANY = 40;  // arrows, of which more are thinner
 
 // As long as it suits what is seen: the usual force is a quarter of it at most.
 function drawForces(middle) {
@@ -96,10 +98,11 @@ function drawForces(middle) {
   if (!forcesSeen()) return;
   const length = 10 ** Math.floor(Math.log10(fitted / 4)), force = roundedUp(film.forces.usual * length / (fitted / 4));
   byId("arrow-scale").textContent = `${inLengths(length)} = ${told(force, newtons, 3)}`;
+  const thick = (pushed.length > MANY ? 0.0016 : 0.0028) * fitted;
   for (const each of pushed) {
     const at = each.at.map((part, k) => part - center[k] + middle.getComponent(k));
-    drawForce(batches.forces, at, each.force.map(part => part * length / force), 0.0028 * fitted);
-    drawForce(batches.friction, at, each.friction.map(part => part * length / force), 0.0032 * fitted);
+    drawForce(batches.forces, at, each.force.map(part => part * length / force), thick);
+    drawForce(batches.friction, at, each.friction.map(part => part * length / force), 1.15 * thick);
   }
 }
 
@@ -114,9 +117,9 @@ function fitForces() {
 // A shaft and a head; two heads if it would be longer than is drawn.
 function drawForce(batch, at, vector, thick) {
   const whole = Math.hypot(...vector), length = Math.min(whole, LONGEST * fitted);
-  if (length < 0.004 * fitted) return;
-  const way = vector.map(part => part / whole), head = Math.min(0.03 * fitted, 0.6 * length);
-  const frame = aside(way), width = Math.min(3.4 * thick, 0.4 * head), shaft = Math.min(thick, 0.4 * width);
+  if (length < SHORTEST * fitted) return;
+  const way = vector.map(part => part / whole), head = Math.min(10 * thick, 0.5 * length);
+  const frame = aside(way), width = Math.min(3.4 * thick, 0.35 * head), shaft = Math.min(thick, 0.4 * width);
   const ring = (along, radius) => turns.map(([c, s]) => at.map((part, i) => part + along * way[i] + radius * (c * frame[0][i] + s * frame[1][i])));
   const wall = (lower, upper) => lower.forEach((point, i) => {
     const k = (i + 1) % lower.length;
