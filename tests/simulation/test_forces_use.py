@@ -50,6 +50,13 @@ def test_what_is_no_argument_is_said(world, given, said):
         world.contact(**given)
 
 
+def test_numbers_of_numpy_are_numbers(world):
+    resting(world)
+    with world.contact(stiffness=np.float32(1e7), friction=np.float64(0.5), substeps=np.int64(3)) as contact:
+        contact.step()
+    assert contact.substeps == 3
+
+
 @pytest.mark.parametrize("pairs", [[("nobody", "box")], "some", [(0, 99)], 7, [1, 2, 3]])
 def test_pairs_that_are_none_are_said_at_once_as_bodies_says_it(world, pairs):
     resting(world)

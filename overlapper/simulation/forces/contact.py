@@ -109,7 +109,8 @@ class VolumetricContact:
         self._friction = None
         if friction is not None and not distributed:
             self._friction = _Parameter("friction", friction, "")  # type: ignore[arg-type]  # no other text is a number
-        if substeps != "auto" and not (isinstance(substeps, int) and not isinstance(substeps, bool) and substeps >= 1):
+        whole = isinstance(substeps, (int, np.integer)) and not isinstance(substeps, bool)
+        if substeps != "auto" and not (whole and int(substeps) >= 1):
             raise ValueError(f"substeps must be a whole number from 1, or 'auto', not {substeps!r}")
         self._substeps = substeps
         self._response = Response(bodies.physicsClientId)
