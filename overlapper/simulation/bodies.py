@@ -205,13 +205,6 @@ class Bodies:
         links = [*self._layout.collider_rows]
         return [(links[a], links[b]) for a, b in self._pairs.colliders(asked, self._in_force.rules).tolist()]
 
-    def _read_anew(self, since: dict[int, object]) -> set[int]:
-        """The bodies that were read after the last call with the same `since`, which is of this method: at first {}."""
-        anew = {id for id, body in self._known.by_id.items() if since.get(id) is not body}
-        since.clear()
-        since.update(self._known.by_id)
-        return anew
-
     def close(self) -> None:
         """Take the marks off the bodies, unless another `Bodies` needs them. What was read stays; no update follows."""
         self._closed = True

@@ -4,7 +4,7 @@ import numpy as np
 import pybullet
 import pytest
 
-from overlapper.simulation import Bodies, VolumetricContact
+from overlapper.simulation import Bodies, Recorder, VolumetricContact
 
 G = 9.81
 
@@ -142,3 +142,46 @@ def test_what_turns_fast_is_pushed_wherever_its_pressures_are_more_than_none(cli
         assert (contact.force[row, 2] < 0) == (pressures > 0)
         pushed += pressures > 0
     assert 0 < pushed < len(boxes)
+
+
+def _rests(client, box, contact):
+    """Whether volumes alone carry it."""
+    for _ in range(240):
+        contact.step()
+    height = pybullet.getBasePositionAndOrientation(box, physicsClientId=client)[0][2]
+    return height == pytest.approx(0.05 - G / 1e5, abs=1e-9) and not pybullet.getContactPoints(physicsClientId=client)
+
+
+def test_bullet_does_not_respond_either_once_a_body_gets_a_mass(client):
+    pybullet.setGravity(0, 0, -G, physicsClientId=client)
+    _ground(client)
+    box = _box(client, [0, 0, 0.05], mass=0)
+    with VolumetricContact(Bodies(client)) as contact:
+        contact.step()
+        pybullet.changeDynamics(box, -1, mass=1, physicsClientId=client)
+        assert _rests(client, box, contact)
+
+
+def test_bullet_does_not_respond_either_to_pairs_that_a_script_lets_collide(client):
+    pybullet.setGravity(0, 0, -G, physicsClientId=client)
+    with Recorder(client) as recorder:
+        ground, box = _ground(client), _box(client, [0, 0, 0.05])
+        pybullet.setCollisionFilterGroupMask(ground, -1, 1, 1, physicsClientId=client)
+        pybullet.setCollisionFilterGroupMask(box, -1, 2, 2, physicsClientId=client)
+        with VolumetricContact(Bodies(client, recorder=recorder)) as contact:
+            pybullet.setCollisionFilterGroupMask(box, -1, 1, 1, physicsClientId=client)
+            assert _rests(client, box, contact)
+            pybullet.setCollisionFilterPair(ground, box, -1, -1, 0, physicsClientId=client)
+            contact.step()
+            pybullet.setCollisionFilterPair(ground, box, -1, -1, 1, physicsClientId=client)
+            assert _rests(client, box, contact)
+
+
+def test_a_client_is_within_one_contact_at_a_time(client):
+    _ground(client)
+    bodies = Bodies(client)
+    told = f"^physicsClientId {client} is within a `with` of a VolumetricContact already$"
+    with VolumetricContact(bodies), pytest.raises(RuntimeError, match=told), VolumetricContact(bodies):
+        pass
+    with VolumetricContact(bodies) as contact:
+        contact.step()

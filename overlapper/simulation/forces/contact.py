@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
+from weakref import WeakValueDictionary
 
 import numpy as np
 import pybullet
@@ -39,6 +40,10 @@ BISECTIONS = 8
 
 # What is swept in a step at most: stiffness beyond is damped.
 MOST_SUBSTEPS = 200
+
+
+_INSIDE: WeakValueDictionary[int, VolumetricContact] = WeakValueDictionary()
+"""Who is in its `with`, by client."""
 
 
 class VolumetricContact:
@@ -85,7 +90,7 @@ class VolumetricContact:
     After `step()` or `forces()` there is a row for each pair of shapes that overlaps, of the last substep, in SI units
     and the world: `contacts`, and parallel to it `force`, `torque`, `centre`, `energy`, `slip`; `last` has them all.
 
-    ValueError says what is wrong with an argument.
+    ValueError says what is wrong with an argument, RuntimeError at the `with` that its client is within one already.
     """
 
     def __init__(
@@ -116,7 +121,6 @@ class VolumetricContact:
         self._response = Response(bodies.physicsClientId)
         self._commands = bodies.recorder.commands if bodies.recorder else Commands(bodies.physicsClientId)
         self._inside = False
-        self._seen: dict[int, object] = {}  # the bodies of which Bullet's response is off
         self._after: Array | None = None  # the velocity that the last step left
         self._warned: set[tuple[str, Link, Link]] = set()
         self._model()
@@ -128,8 +132,11 @@ class VolumetricContact:
         """How often the solver went through all pairs in the last substep."""
 
     def __enter__(self) -> VolumetricContact:
+        client = self.bodies.physicsClientId
+        if client in _INSIDE:
+            raise RuntimeError(f"physicsClientId {client} is within a `with` of a VolumetricContact already")
+        _INSIDE[client] = self
         self._inside = True
-        self._seen.clear()
         self._turn_off()
         if not self.bodies.recorder:
             listen(self._commands.hear)
@@ -138,6 +145,7 @@ class VolumetricContact:
     def __exit__(self, *_: object) -> None:
         self._inside = False
         client = self.bodies.physicsClientId
+        _INSIDE.pop(client, None)
         if not self.bodies.recorder:
             unlisten(self._commands.hear)
         if pybullet.isConnected(client):
@@ -263,13 +271,15 @@ class VolumetricContact:
         self.bodies.update()
         if self._keys is not self.bodies.keys:
             self._model()
-            if self._inside:
-                self._turn_off()
         elif self._dynamics.read():
             self._forget()
+        if self._inside and self._rules is not self.bodies._in_force.rules:
+            self._turn_off()
 
     def _turn_off(self) -> None:
-        self._response.turn_off(self.bodies.link_pairs(self._among), self.bodies._read_anew(self._seen))
+        """Turn Bullet's response off, also of pairs that a script has let collide since, or made to."""
+        self._rules = self.bodies._in_force.rules
+        self._response.turn_off(self.bodies.link_pairs(self._among))
 
     def _model(self) -> None:
         """Read the masses and joints of the bodies that there are."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 
 from overlapper.simulation.calls import unheard
 from overlapper.simulation.recorder import Link, Recorder
@@ -19,12 +19,11 @@ class Response:
         self._client = client
         self._off: set[tuple[Link, Link]] = set()
 
-    def turn_off(self, pairs: Iterable[tuple[Link, Link]], new: Container[int]) -> None:
-        """Of those pairs, too; `new` bodies may have the id of one that is gone, of whose pairs Bullet knows."""
+    def turn_off(self, pairs: Iterable[tuple[Link, Link]]) -> None:
+        """Of those pairs, too."""
         for pair in pairs:
-            if pair not in self._off or pair[0][0] in new or pair[1][0] in new:
-                self._set(pair, 0)
-                self._off.add(pair)
+            self._set(pair, 0)
+            self._off.add(pair)
 
     def turn_on(self, recorder: Recorder | None) -> None:
         """Of all pairs of which it is off, but for those that a script has filtered itself, as a recorder has heard."""
