@@ -35,6 +35,9 @@ COARSE = 2.0
 # There is no patch where the area vector is less than this part of the surface of what is shared, as to the solver.
 NO_PATCH = 1e-6
 
+# What moves by less than that (m, rad) in a step rests.
+STILL = 1e-9
+
 # How often a step is halved to find when what is swallowed by its end has a patch.
 BISECTIONS = 8
 
@@ -332,6 +335,9 @@ class VolumetricContact:
             velocity = velocity + duration / length * (velocity - before)
         else:
             velocity = velocity + duration * self._other
+        # What rests brings nothing that is not there.
+        if np.abs(velocity).max(initial=0.0) * duration < STILL:
+            return 0.0
         highest = 0.0
         known = _swallowed(self._contacts.overlaps)
         # What is small and fast is swallowed within the step: then it counts when it was half in, and for how long.
