@@ -65,6 +65,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("userConstraintUniqueId", "jointChildPivot", "jointChildFrameOrientation", "maxForce", "gearRatio"),
         *("gearAuxLink", "relativePositionTarget", "erp", "physicsClientId"),
     ),
+    "restoreState": ("stateId", "fileName", "physicsClientId"),
     "loadBullet": ("bulletFileName", "physicsClientId"),
     "removeBody": ("bodyUniqueId", "physicsClientId"),
     "resetSimulation": ("flags", "physicsClientId"),

@@ -31,6 +31,8 @@ class Commands:
 
     def __init__(self, client: int) -> None:
         self._client = client
+        self.restored = 0
+        """How often the bodies were put back to a state that was saved."""
         self._lasting: dict[Any, Command] = {}  # by body and joint, or by constraint, in the order that they came
         self._momentary: list[Command] = []
         self._length = 0.0  # of the steps that lasting ones have been told for
@@ -61,7 +63,10 @@ class Commands:
 
     def hear(self, name: str, arguments: Arguments, _: Any) -> None:
         """A listener of calls."""
-        if name not in COMMANDS or arguments.get("physicsClientId", 0) != self._client:
+        if arguments.get("physicsClientId", 0) != self._client:
+            return
+        self.restored += name == "restoreState"
+        if name not in COMMANDS:
             return
         # A script may use its lists again.
         command = name, deepcopy(arguments)

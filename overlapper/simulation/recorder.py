@@ -18,7 +18,7 @@ UNNOTED = frozenset(
     {
         *("connect", "stepSimulation", "setRealTimeSimulation", "changeConstraint", "applyExternalForce"),
         *("applyExternalTorque", "setJointMotorControl2", "setJointMotorControlArray", "setJointMotorControlMultiDof"),
-        "setJointMotorControlMultiDofArray",
+        *("setJointMotorControlMultiDofArray", "restoreState"),
     }
 )
 

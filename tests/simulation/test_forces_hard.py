@@ -185,3 +185,25 @@ def test_a_client_is_within_one_contact_at_a_time(client):
         pass
     with VolumetricContact(bodies) as contact:
         contact.step()
+
+
+def test_what_goes_on_from_a_restored_state_knows_nothing_of_what_came_after_it(client):
+    pybullet.setGravity(0, 0, -G, physicsClientId=client)
+    _ground(client)
+    box, ways = _box(client, [0, 0, 0.05 - G / 1e5]), []
+    with VolumetricContact(Bodies(client)) as contact:
+        for _ in range(20):
+            contact.step()
+        state = pybullet.saveState(client)
+        for push in (0, 3000):
+            pybullet.restoreState(state, physicsClientId=client)
+            pybullet.applyExternalForce(
+                box, -1, [push, 0, push], [0, 0, 0], pybullet.LINK_FRAME, physicsClientId=client
+            )
+            contact.step()
+            pybullet.restoreState(state, physicsClientId=client)
+            for _ in range(5):
+                contact.step()
+            ways.append(pybullet.getBasePositionAndOrientation(box, physicsClientId=client))
+    assert ways[0] == ways[1]
+    assert np.abs(_speed(client, box)).max() < 1e-9

@@ -272,7 +272,7 @@ class VolumetricContact:
     def _refresh(self) -> None:
         """See what has come or gone, and how heavy things are."""
         self.bodies.update()
-        if self._keys is not self.bodies.keys:
+        if self._keys is not self.bodies.keys or self._restored != self._commands.restored:
             self._model()
         elif self._dynamics.read():
             self._forget()
@@ -286,7 +286,7 @@ class VolumetricContact:
 
     def _model(self) -> None:
         """Read the masses and joints of the bodies that there are."""
-        self._keys = self.bodies.keys
+        self._keys, self._restored = self.bodies.keys, self._commands.restored
         self._dynamics = Dynamics(self.bodies.physicsClientId, sorted({body for body, _, _ in self._keys}))
         self._links = np.array([self._dynamics.place[body, link] for body, link, _ in self._keys], dtype=np.int64)
         self._frames = self._dynamics.frames()
