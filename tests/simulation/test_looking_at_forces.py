@@ -37,3 +37,8 @@ def test_what_is_seen_is_of_the_bodies_where_they_are(client):
     assert seen.force[:, 2] == pytest.approx([-3 * 9.81, -2 * 9.81, -9.81], rel=1e-4)
     depth = 0.05 - where[0][0][2]
     assert seen.contacts[0].overlap.volume == pytest.approx(depth * 0.01, rel=1e-3)
+
+
+def test_a_contact_in_which_nothing_presses_is_there_all_the_same(client):
+    contact = VolumetricContact(Bodies(client))
+    assert contact and len(contact) == 0

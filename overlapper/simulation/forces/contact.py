@@ -266,6 +266,9 @@ class VolumetricContact:
     def __len__(self) -> int:
         return len(self._found)
 
+    def __bool__(self) -> bool:
+        return True  # also where nothing presses, as it steps all the same
+
     def __repr__(self) -> str:
         return f"VolumetricContact({len(self)} pairs of shapes press, {self.substeps} substeps)"
 
