@@ -59,7 +59,7 @@ class Log:
     ) -> None:
         """Write what `bodies.overlaps()` has found, before the next `bodies.update()`.
 
-        `forces` are those between these bodies, as `VolumetricContact.look()` sees them; of pairs without any they are
+        `forces` are those between these bodies, as `VolumetricContact.mean()` has them; of pairs without any they are
         empty. `step` is the one after the last by default, `time`, in s, that of so many of pybullet's time steps.
         ValueError if a step comes no later than the last, if `time` is not finite, if `contacts` are not of these
         bodies, if there are `forces` and no columns for them, or if the log is closed; OSError if it cannot be written.

@@ -24,8 +24,8 @@ class Frame(Generic[Shown]):
     """The bodies and what they share after `step` steps, `time` seconds into the simulation.
 
     Of a run, `bodies` is the same object in every frame; of what was recorded or is kept, a Still. `forces`, with
-    volumetric contact, are those with which the next step begins, between the pairs that it pushes apart: their
-    `contacts` are of these bodies, too, but not of what is only measured.
+    volumetric contact, are the mean over the step between the pairs that it pushes apart: their `contacts` are of these
+    bodies, too, but not of what is only measured.
     """
 
     step: int
@@ -91,7 +91,7 @@ def run(
             if only is None or i + 1 in only:
                 bodies.update()
                 contacts = bodies.overlaps(tolerance, method, pairs=among)
-                forces = None if volumetric is None else volumetric.look()
+                forces = None if volumetric is None else volumetric.mean()
                 yield Frame(i + 1, (i + 1) * seconds, bodies, contacts, forces)
     except NotSaved as error:
         raise SceneError(f"the scene {scene.path} cannot be read: {error}") from error

@@ -190,7 +190,7 @@ def test_a_log_has_the_forces_of_volumetric_contact_if_it_is_to_have_any(two_box
         Log(tmp_path / "run.csv", two_boxes, forces=True) as log,
         Log(tmp_path / "without.csv", two_boxes) as without,
     ):
-        seen, contacts = contact.look(), two_boxes.overlaps()
+        seen, contacts = contact.forces(), two_boxes.overlaps()
         log.add(contacts, forces=seen)
         log.add(contacts)
         without.add(contacts)

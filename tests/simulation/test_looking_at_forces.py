@@ -1,42 +1,109 @@
-"""The forces of bodies as they are now, seen without any change to what comes."""
+"""What is seen of forces: the mean over a step, between bodies where they are at its end."""
 
+import numpy as np
 import pybullet
 import pytest
 
 from overlapper.simulation import Bodies, VolumetricContact
 
+G = 9.81
+STEP = 1 / 240
 
-def dropped(client, steps, look, **arguments):
-    """Three boxes that fall on each other: where they are in the end, and the last forces seen."""
-    pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
-    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-    pybullet.createMultiBody(0, plane, physicsClientId=client)
-    box = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
-    for k in range(3):
-        pybullet.createMultiBody(1, box, -1, [0.01 * k, 0, 0.051 + 0.101 * k], physicsClientId=client)
-    seen = None
-    with VolumetricContact(Bodies(client), **arguments) as contact:
-        for _ in range(steps):
+
+@pytest.fixture
+def plane(client):
+    pybullet.setGravity(0, 0, -G, physicsClientId=client)
+    shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+    return pybullet.createMultiBody(0, shape, physicsClientId=client)
+
+
+def box(client, *position):
+    shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
+    body = pybullet.createMultiBody(1, shape, -1, position, physicsClientId=client)
+    pybullet.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
+    return body
+
+
+@pytest.mark.usefixtures("plane")
+@pytest.mark.parametrize("substeps", ["auto", 7])
+def test_the_mean_force_is_what_changes_the_momentum_in_a_step(client, substeps):
+    cube = box(client, 0, 0, 0.06)
+    with VolumetricContact(Bodies(client), stiffness=1e8, substeps=substeps) as contact:
+        pressed = 0
+        for _ in range(240):
+            before = pybullet.getBaseVelocity(cube, physicsClientId=client)[0][2]
             contact.step()
-            before = contact.last
-            if look:
-                seen = contact.look()
-                assert contact.last is before
-        where = [pybullet.getBasePositionAndOrientation(body, physicsClientId=client) for body in (1, 2, 3)]
-    pybullet.resetSimulation(physicsClientId=client)
-    return where, seen
+            change = pybullet.getBaseVelocity(cube, physicsClientId=client)[0][2] - before
+            if len(mean := contact.mean()):
+                pressed += 1
+                assert mean.on(cube)[0][2] == pytest.approx(change / STEP + G, rel=1e-9, abs=1e-9)
+    assert pressed > 50
 
 
+@pytest.mark.usefixtures("plane")
+def test_what_is_seen_is_of_the_bodies_where_they_are(client):
+    cubes = [box(client, 0.01 * k, 0, 0.051 + 0.101 * k) for k in range(3)]
+    with VolumetricContact(Bodies(client), stiffness=1e8) as contact:
+        for _ in range(1000):
+            contact.step()
+        seen = contact.mean()
+    assert seen.force[:, 2] == pytest.approx([-3 * G, -2 * G, -G], rel=1e-4)
+    depth = 0.05 - pybullet.getBasePositionAndOrientation(cubes[0], physicsClientId=client)[0][2]
+    assert seen.contacts[0].overlap.volume == pytest.approx(depth * 0.01, rel=1e-3)
+
+
+@pytest.mark.usefixtures("plane")
+def test_what_has_come_in_the_last_substep_has_no_force_yet_but_a_normal(client):
+    cube = box(client, 0, 0, 0.05 + 1e-4)
+    pybullet.resetBaseVelocity(cube, [0, 0, -0.1], physicsClientId=client)
+    with VolumetricContact(Bodies(client), substeps=1) as contact:
+        contact.step()
+        seen = contact.mean()
+    assert len(seen) == 1 and not seen.force.any() and seen.energy[0] > 0
+    assert seen.normal == pytest.approx(np.array([[0, 0, -1]])) and seen.directed.all()
+
+
+@pytest.mark.usefixtures("plane")
+def test_the_mean_of_what_has_no_direction_is_along_the_last_normal(client):
+    rod = box(client, 0, 0, 0.04)
+    plate = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[1, 1, 1], physicsClientId=client)
+    outer = pybullet.createMultiBody(0, plate, -1, [0, 0, 0.5], physicsClientId=client)
+    with VolumetricContact(Bodies(client), pairs=[(outer, rod)]) as contact:
+        with pytest.warns(UserWarning, match="without a side to push to"):
+            contact.step()
+        seen = contact.mean()
+    assert not seen.directed.any() and seen.normal == pytest.approx(contact.last.normal) and seen.force.any()
+
+
+@pytest.mark.usefixtures("plane")
 @pytest.mark.parametrize("substeps", ["auto", 4])
 def test_steps_go_on_to_the_last_bit_as_if_nobody_had_looked(client, substeps):
-    assert dropped(client, 60, True, substeps=substeps)[0] == dropped(client, 60, False, substeps=substeps)[0]
+    ends = []
+    cube = box(client, 0, 0, 0)
+    for look in (False, True):
+        pybullet.resetBasePositionAndOrientation(cube, [0, 0, 0.06], [0.1, 0, 0, 1], physicsClientId=client)
+        pybullet.resetBaseVelocity(cube, [0, 0, 0], [0, 0, 0], physicsClientId=client)
+        with VolumetricContact(Bodies(client), substeps=substeps) as contact:
+            for _ in range(60):
+                contact.step()
+                if look:
+                    contact.mean()
+        ends.append(pybullet.getBasePositionAndOrientation(cube, physicsClientId=client))
+    assert ends[0] == ends[1]
 
 
-def test_what_is_seen_is_of_the_bodies_where_they_are(client):
-    where, seen = dropped(client, 1000, True, stiffness=1e8)
-    assert seen.force[:, 2] == pytest.approx([-3 * 9.81, -2 * 9.81, -9.81], rel=1e-4)
-    depth = 0.05 - where[0][0][2]
-    assert seen.contacts[0].overlap.volume == pytest.approx(depth * 0.01, rel=1e-3)
+@pytest.mark.usefixtures("plane")
+def test_a_body_that_loses_its_place_is_left_out_and_the_others_go_on(client):
+    stays, goes = box(client, 0, 0, 0.0499), box(client, 1, 0, 0.0499)
+    with VolumetricContact(Bodies(client), substeps=3) as contact:
+        contact.step()
+        pybullet.applyExternalForce(goes, -1, [float("nan"), 0, 0], [1, 0, 0], pybullet.WORLD_FRAME, client)
+        with pytest.warns(UserWarning, match="has no finite pose"):
+            contact.step()
+        for _ in range(480):
+            contact.step()
+    assert contact.pairs[:, 3].tolist() == [stays]
+    assert contact.on(stays)[0][2] == pytest.approx(G)
 
 
 def test_a_contact_in_which_nothing_presses_is_there_all_the_same(client):

@@ -91,7 +91,8 @@ class VolumetricContact:
     pushed last, or along the least translation that frees it, with one NoDirectionWarning for each pair.
 
     After `step()` or `forces()` there is a row for each pair of shapes that overlaps, of the last substep, in SI units
-    and the world: `contacts`, and parallel to it `force`, `torque`, `centre`, `energy`, `slip`; `last` has them all.
+    and the world: `contacts`, and parallel to it `force`, `torque`, `centre`, `energy` and `slip`; `last` has them all,
+    and `mean()` the mean over the whole step.
 
     ValueError says what is wrong with an argument, RuntimeError at the `with` that its client is within one already.
     """
@@ -124,6 +125,7 @@ class VolumetricContact:
         self._response = Response(bodies.physicsClientId)
         self._commands = bodies.recorder.commands if bodies.recorder else Commands(bodies.physicsClientId)
         self._inside = False
+        self._parts: list[tuple[float, Forces]] = []  # of a step, the parts that substeps are, and their forces
         self._after: Array | None = None  # the velocity that the last step left
         self._warned: set[tuple[str, Link, Link]] = set()
         self._model()
@@ -167,10 +169,11 @@ class VolumetricContact:
         self._refresh()
         left, taken = duration, 0
         length = duration / (self._planned or 1)
+        self._parts = []
         try:
             while left > 1e-9 * duration:
                 if taken:
-                    self.bodies.follow()
+                    self._follow()
                 frequency2 = self._place(self._dynamics.solver)
                 velocity = self._dynamics.velocity()
                 if not self._planned:
@@ -183,6 +186,7 @@ class VolumetricContact:
                 self._commands.prepare(length, first=not taken, share=length / duration)
                 self._dynamics.apply(wrenches, self._frames)
                 unheard("stepSimulation")(client)
+                self._parts.append((length / duration, self._found))
                 left -= length
                 taken += 1
         finally:
@@ -193,31 +197,42 @@ class VolumetricContact:
         tell("stepSimulation", {"physicsClientId": client})  # one, to whoever watches
 
     def forces(self) -> Forces:
-        """The forces that would act in a step of the simulator, without taking it: for scripts that integrate."""
-        client = self.bodies.physicsClientId
+        """The forces with which a step of the simulator would begin, without taking it: for scripts that integrate."""
         self._refresh()
         frequency2 = self._place(self._dynamics.solver)
-        duration = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
-        self._solve(duration, self._dynamics.velocity(), frequency2)
+        duration = pybullet.getPhysicsEngineParameters(self.bodies.physicsClientId)["fixedTimeStep"]
+        substeps = self._planned or min(_followed(frequency2.max(initial=0.0), duration), MOST_SUBSTEPS)
+        self._solve(duration / substeps, self._dynamics.velocity(), frequency2)
         self._after = None
         return self._found
 
-    def look(self) -> Forces:
-        """The forces with which the next step would begin, of the bodies as they are now.
+    def mean(self) -> Forces:
+        """What the bodies share now, with the mean of force and torque over the last step: what moved them in it.
 
-        Nothing changes by it: steps go on as if nobody had looked, and `last` has what it had.
+        Forces of single substeps go up and down about it, as motors do. `slip` is of the end of the step. What has
+        pressed and parted within the step is not among the rows; what has come at its very end has no force yet.
         """
-        self._refresh()
-        dynamics = self._dynamics
-        solver = dynamics.solver.copy()
-        frequency2 = self._place(solver)
-        duration = pybullet.getPhysicsEngineParameters(self.bodies.physicsClientId)["fixedTimeStep"]
-        length = duration / (self._planned or min(_followed(frequency2.max(initial=0.0), duration), MOST_SUBSTEPS))
-        velocity = dynamics.velocity()
-        force, torque, slip, normal, directed, *_ = solver.solve(
-            length, velocity, self._others(velocity), frequency2 * length**2 > COARSE**2, self._distributed
-        )
-        return Forces(self._contacts, force, torque, slip, normal, directed, self._moduli)
+        self._follow()
+        contacts = self.bodies.overlaps(pairs=self._among)
+        found = contacts.overlaps
+        codes = self._codes(found)
+        area = found.gradient[:, 1, :3]
+        size = np.linalg.norm(area, axis=1)
+        directed = (size > NO_PATCH * found.area) | (found.volume == 0)
+        normal: Array = np.array(found.normal)
+        patches = directed & (size > 0)
+        normal[patches] = area[patches] / size[patches, None]
+        force, torque, slip = (np.zeros((len(found), 3)) for _ in range(3))
+        for part, forces in self._parts:
+            before = self._codes(forces.contacts.overlaps)
+            _, now, then = np.intersect1d(codes, before, assume_unique=True, return_indices=True)
+            force[now] += part * forces.force[then]
+            torque[now] += part * forces.torque[then]
+            if forces is self._parts[-1][1]:
+                slip[now] = forces.slip[then]
+                lost = ~directed[now]
+                normal[now[lost]] = forces.normal[then[lost]]
+        return Forces(contacts, force, torque, slip, normal, directed, self._parameters(found)[0])
 
     @property
     def last(self) -> Forces:
@@ -281,6 +296,18 @@ class VolumetricContact:
             self._forget()
         if self._inside and self._rules is not self.bodies._in_force.rules:
             self._turn_off()
+
+    def _follow(self) -> None:
+        """Where the bodies are within a step, or at its end."""
+        self.bodies.follow()
+        if self._keys is not self.bodies.keys:
+            self._model()
+            self._parts = []
+
+    def _codes(self, found: Overlaps) -> NDArray[np.int64]:
+        """Of the pairs of rows, a number each."""
+        first, second = found.pairs.T.astype(np.int64)
+        return np.asarray(first * len(self._keys) + second)
 
     def _turn_off(self) -> None:
         """Turn Bullet's response off, also of pairs that a script has let collide since, or made to."""
