@@ -9,7 +9,7 @@ namespace overlapper {
 namespace {
 
 /// Sweeps end when no slip changes by more than this fraction of the largest that there was.
-constexpr double kSettled = 1e-9;
+constexpr double kSettled = 1e-8;
 
 /// Patches visited in all sweeps of a step, but so many sweeps at least and at most.
 constexpr int kVisits = 10000;

@@ -369,7 +369,7 @@ class VolumetricContact:
         if np.abs(velocity).max(initial=0.0) * duration < STILL:
             return 0.0
         highest = 0.0
-        known = _swallowed(self._contacts.overlaps)
+        known: set[tuple[int, int]] | None = None
         # What is small and fast is swallowed within the step: then it counts when it was half in, and for how long.
         lost: set[tuple[int, int]] = set()
         early, late, part = 0.0, 1.0, 1.0
@@ -377,7 +377,10 @@ class VolumetricContact:
             found = self._at(part * duration, velocity)
             frequency2 = solver.place(self._frames, found, self._links, *self._parameters(found))
             highest = max(highest, float(frequency2.max(initial=0.0)))
-            swallowed = _swallowed(found) - known
+            swallowed = _swallowed(found)
+            if swallowed:
+                known = _swallowed(self._contacts.overlaps) if known is None else known
+                swallowed -= known
             if swallowed:
                 late, lost = part, swallowed
             elif lost and lost.isdisjoint(map(tuple, found.pairs[found.volume > 0].tolist())):
@@ -465,8 +468,9 @@ def _followed(frequency2: float, duration: float) -> int:
 
 def _swallowed(found: Overlaps) -> set[tuple[int, int]]:
     """The pairs of which one lies wholly in the other: what they share has no patch."""
-    rows = (found.volume > 0) & (np.linalg.norm(found.gradient[:, 1, :3], axis=1) <= NO_PATCH * found.area)
-    return {(a, b) for a, b in found.pairs[rows].tolist()}
+    area = found.gradient[:, 1, :3]
+    rows = (found.volume > 0) & ((area * area).sum(axis=1) <= (NO_PATCH * found.area) ** 2)
+    return {(a, b) for a, b in found.pairs[rows].tolist()} if rows.any() else set()
 
 
 class _Parameter:
