@@ -117,7 +117,7 @@ def test_the_bounds_of_a_lens_hold_its_closed_form():
     assert lower < truth < upper < lower * (1 + Fraction(1, 10**14))
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(in_general_position(solids, 2, 2))
 def test_pairs_are_proved(bodies):
     proved(found(bodies))
@@ -129,7 +129,7 @@ def test_several_polyhedra_are_proved(bodies):
     proved(found(bodies))
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(placed(solids, 3.0), placed(solids, 3.0), placed(solids, 3.0))
 def test_three_bodies_somewhere_are_proved(a, b, c):
     proved(found((a, b, c)))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from typing import Literal
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -23,11 +22,9 @@ from overlapper.simulation.extraction.model import Array
 from overlapper.simulation.forces.cautions import NoDirectionWarning, SubstepsWarning
 from overlapper.simulation.forces.dynamics import Dynamics
 from overlapper.simulation.forces.forces import Forces
+from overlapper.simulation.forces.parameter import OfPair, Parameter
 from overlapper.simulation.forces.response import Response
 from overlapper.simulation.recorder import Link
-
-OfPair = Callable[[Link, Link], float]
-"""What a pair of links ((body, link), (body, link)) has, the lesser first."""
 
 # A swing that turns by more than so many radians in a step is followed by backward Euler.
 COARSE = 2.0
@@ -113,11 +110,11 @@ class VolumetricContact:
         bodies.link_pairs(self._among)  # says what is wrong with them
         distributed = isinstance(friction, str) and friction == "distributed"
         self._distributed = distributed
-        self._stiffness = _Parameter("stiffness", stiffness, "Pa/m", positive=True)
-        self._dissipation = _Parameter("dissipation", dissipation, "s")
+        self._stiffness = Parameter("stiffness", stiffness, "Pa/m", positive=True)
+        self._dissipation = Parameter("dissipation", dissipation, "s")
         self._friction = None
         if friction is not None and not distributed:
-            self._friction = _Parameter("friction", friction, "")  # type: ignore[arg-type]  # no other text is a number
+            self._friction = Parameter("friction", friction, "")  # type: ignore[arg-type]  # no other text is a number
         whole = isinstance(substeps, (int, np.integer)) and not isinstance(substeps, bool)
         if substeps != "auto" and not (whole and int(substeps) >= 1):
             raise ValueError(f"substeps must be a whole number from 1, or 'auto', not {substeps!r}")
@@ -471,40 +468,3 @@ def _swallowed(found: Overlaps) -> set[tuple[int, int]]:
     area = found.gradient[:, 1, :3]
     rows = (found.volume > 0) & ((area * area).sum(axis=1) <= (NO_PATCH * found.area) ** 2)
     return {(a, b) for a, b in found.pairs[rows].tolist()} if rows.any() else set()
-
-
-class _Parameter:
-    """A number, or one for each pair of links."""
-
-    def __init__(self, name: str, given: float | OfPair, unit: str, positive: bool = False) -> None:
-        self._name, self._unit, self._positive = name, f" {unit}" if unit else "", positive
-        self._function = given if callable(given) else None
-        self._number = 0.0 if callable(given) else self._checked(given, "")
-        self._known: dict[tuple[int, int], float] = {}
-        self._links: Sequence[Link] = ()
-
-    def of(self, pairs: NDArray[np.int64], links: Sequence[Link]) -> Array:
-        """(p,) of pairs (p, 2) of places in `links`."""
-        if self._function is None:
-            return np.full(len(pairs), self._number)
-        if links is not self._links:
-            self._links, self._known = links, {}
-        return np.array([self._of_pair(a, b) for a, b in pairs.tolist()], dtype=float)
-
-    def _of_pair(self, a: int, b: int) -> float:
-        assert self._function is not None
-        if (a, b) not in self._known:
-            first, second = self._links[a], self._links[b]
-            of = f" of {first} and {second}"
-            self._known[a, b] = self._checked(self._function(first, second), of)
-        return self._known[a, b]
-
-    def _checked(self, given: Any, of: str) -> float:
-        least = "greater than 0" if self._positive else "0 or greater"
-        try:
-            number = float(given)
-        except (TypeError, ValueError):
-            number = math.nan
-        if isinstance(given, str) or not (number > 0 or (number == 0 and not self._positive)) or math.isinf(number):
-            raise ValueError(f"{self._name}{of} must be a number{self._unit} {least}, not {given!r}")
-        return number
