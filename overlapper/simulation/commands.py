@@ -18,6 +18,8 @@ COMMANDS = MOTORS | PUSHES | {"changeConstraint", "resetSimulation", "stepSimula
 # What pybullet takes where a script says nothing: parts of an error that a step takes away.
 DEFAULT_GAINS = {"positionGain": 0.1, "velocityGain": 1.0}
 
+MAX_FORCE, DEFAULT_MAX_FORCE = 10, 500.0  # of getConstraintInfo
+
 Command = tuple[str, Arguments]
 
 
@@ -36,6 +38,19 @@ class Commands:
         self._lasting: dict[Any, Command] = {}  # by body and joint, or by constraint, in the order that they came
         self._momentary: list[Command] = []
         self._length = 0.0  # of the steps that lasting ones have been told for
+
+    def learn(self) -> None:
+        """What pybullet tells of constraints that were told before anybody heard it: their forces.
+
+        Of one that it was never told for it says its default, which it does not keep as that of any length.
+        """
+        client = self._client
+        for k in range(pybullet.getNumConstraints(client)):
+            constraint = pybullet.getConstraintUniqueId(k, client)
+            force = pybullet.getConstraintInfo(constraint, client)[MAX_FORCE]
+            if force != DEFAULT_MAX_FORCE and constraint not in self._lasting:
+                told = {"userConstraintUniqueId": constraint, "maxForce": force, "physicsClientId": client}
+                self._keep([constraint], ("changeConstraint", told))
 
     def prepare(self, length: float, first: bool, share: float = 1.0) -> None:
         """Tell them again for a substep as long as that (s), the `first` of a step or a later one.

@@ -61,3 +61,29 @@ def test_a_motor_takes_a_joint_as_far_in_sixteen_substeps_as_in_a_step(client, a
     # The same but for the step by which it is later.
     fastest = np.abs(np.diff(whole, axis=0)).max()
     assert fastest > 1e-3 and np.abs(sixteen - whole).max() < 2 * fastest
+
+
+@pytest.mark.parametrize("substeps", [1, 2, 16])
+@pytest.mark.parametrize("told", ["before", "within"])
+def test_a_constraint_presses_as_hard_in_substeps_whenever_it_was_told(client, told, substeps):
+    floor = p.createCollisionShape(p.GEOM_BOX, halfExtents=[1, 1, 0.5], physicsClientId=client)
+    p.createMultiBody(0, floor, -1, [0, 0, -0.5], physicsClientId=client)
+    ball = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
+    body = p.createMultiBody(1, ball, -1, [0, 0, 0.05], physicsClientId=client)
+    constraint = p.createConstraint(
+        body, -1, -1, -1, p.JOINT_FIXED, [0, 0, 0], [0, 0, 0], [0, 0, 0.05], physicsClientId=client
+    )
+
+    def pull():
+        p.changeConstraint(constraint, [0, 0, -0.1], maxForce=200, physicsClientId=client)
+
+    if told == "before":
+        pull()
+    with VolumetricContact(Bodies(client), substeps=substeps) as contact:
+        if told == "within":
+            pull()
+        for _ in range(480):
+            contact.step()
+        pressing = -contact.mean().on(0)[0][2]
+    p.resetSimulation(physicsClientId=client)
+    assert pressing == pytest.approx(200, rel=1e-3)

@@ -141,6 +141,7 @@ class VolumetricContact:
         self._inside = True
         self._turn_off()
         if not self.bodies.recorder:
+            self._commands.learn()
             listen(self._commands.hear)
         return self
 
