@@ -38,7 +38,8 @@ def main() -> NoReturn:
     except MemoryError:
         give_up("there is not enough memory for this")
     except usage_error as error:
-        give_up(error.format_message())
+        # Some versions of typer let a library check choices, and hand on how that begins.
+        give_up(error.format_message().replace(": Value error, ", ": "))
     # Whatever a script raises is its own, and Python's to tell.
     sys.exit(answer() if callable(answer) else answer)
 

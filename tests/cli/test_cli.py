@@ -82,6 +82,16 @@ def refusal(*arguments):
     return done.stderr.removeprefix("a scene may talk\n")
 
 
+@pytest.mark.parametrize(
+    ("option", "choices"),
+    [("--contact", "'bullet', 'volumetric'"), ("--surface", "'nominal', 'margin'"), ("--method", "'auto', 'paper'")],
+)
+def test_a_choice_that_is_none_is_answered_with_those_that_there_are(option, choices):
+    assert refusal("run", "franka_lift", option, "some") == (
+        f"overlapper: Invalid value for '{option}': 'some' is not one of {choices}.\n"
+    )
+
+
 def test_the_version_is_that_of_the_package():
     assert re.fullmatch(r"overlapper \d+\.\d+\.\d+\n", overlapper("--version").stdout)
 
