@@ -13,7 +13,7 @@
 #include "distance/gjk.h"
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
-#include "methods/closed_forms.h"
+#include "methods/round/closed_forms/closed_forms.h"
 #include "shapes/planes_asked.h"
 
 namespace overlapper {

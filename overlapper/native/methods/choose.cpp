@@ -11,7 +11,7 @@
 #include "geometry/predicates.h"
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
-#include "methods/closed_forms.h"
+#include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/round.h"
 #include "methods/tracing/trace.h"
 #include "shapes/canonical_order.h"

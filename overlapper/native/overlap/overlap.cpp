@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "methods/clipping/clip.h"
-#include "methods/closed_forms.h"
 #include "methods/paper.h"
+#include "methods/round/closed_forms/closed_forms.h"
 #include "methods/tracing/trace.h"
 
 namespace overlapper {

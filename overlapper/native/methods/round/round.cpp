@@ -10,12 +10,12 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/scratch.h"
-#include "methods/quadric/ball.h"
-#include "methods/quadric/cylinder.h"
-#include "methods/round/culling.h"
-#include "methods/round/nodes.h"
-#include "methods/round/quadrature.h"
-#include "methods/round/stack.h"
+#include "methods/round/pieces/culling.h"
+#include "methods/round/quadric/ball.h"
+#include "methods/round/quadric/cylinder.h"
+#include "methods/round/slicing/nodes.h"
+#include "methods/round/slicing/quadrature.h"
+#include "methods/round/slicing/stack.h"
 
 namespace overlapper {
 namespace {

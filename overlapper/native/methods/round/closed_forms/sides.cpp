@@ -1,10 +1,10 @@
-#include "methods/sides.h"
+#include "methods/round/closed_forms/sides.h"
 
 #include <array>
 #include <cmath>
 #include <numbers>
 
-#include "methods/quadric/segment.h"
+#include "methods/round/quadric/segment.h"
 
 namespace overlapper {
 namespace {

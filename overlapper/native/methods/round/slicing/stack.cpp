@@ -1,4 +1,4 @@
-#include "methods/round/stack.h"
+#include "methods/round/slicing/stack.h"
 
 #include <algorithm>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "methods/round/slice.h"
+#include "methods/round/slicing/slice.h"
 
 #include <algorithm>
 #include <cfloat>

@@ -1,4 +1,4 @@
-#include "methods/quadric/polyhedron.h"
+#include "methods/round/quadric/polyhedron.h"
 
 #include <algorithm>
 #include <array>

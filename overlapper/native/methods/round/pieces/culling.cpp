@@ -1,4 +1,4 @@
-#include "methods/round/culling.h"
+#include "methods/round/pieces/culling.h"
 
 #include <algorithm>
 

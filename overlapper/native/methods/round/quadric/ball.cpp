@@ -1,4 +1,4 @@
-#include "methods/quadric/ball.h"
+#include "methods/round/quadric/ball.h"
 
 #include <algorithm>
 #include <cmath>

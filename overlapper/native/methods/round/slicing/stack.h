@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "methods/round/pieces.h"
-#include "methods/round/slice.h"
+#include "methods/round/pieces/pieces.h"
+#include "methods/round/slicing/slice.h"
 
 namespace overlapper::slicing {
 

@@ -1,4 +1,4 @@
-#include "methods/quadric/shallow_ball.h"
+#include "methods/round/quadric/shallow_ball.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "methods/quadric/segment.h"
+#include "methods/round/quadric/segment.h"
 
 namespace overlapper::quadric {
 namespace {

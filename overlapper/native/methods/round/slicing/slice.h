@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "geometry/moments.h"
-#include "methods/round/stretch.h"
+#include "methods/round/quadric/stretch.h"
 
 namespace overlapper::slicing {
 

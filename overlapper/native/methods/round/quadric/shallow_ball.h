@@ -4,7 +4,7 @@
 #include <functional>
 #include <optional>
 
-#include "methods/quadric/ball.h"
+#include "methods/round/quadric/ball.h"
 #include "shapes/wide_body.h"
 
 namespace overlapper::quadric {

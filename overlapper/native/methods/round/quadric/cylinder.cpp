@@ -1,4 +1,4 @@
-#include "methods/quadric/cylinder.h"
+#include "methods/round/quadric/cylinder.h"
 
 #include <algorithm>
 #include <array>

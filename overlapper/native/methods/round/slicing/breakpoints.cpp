@@ -1,10 +1,10 @@
-#include "methods/round/breakpoints.h"
+#include "methods/round/slicing/breakpoints.h"
 
 #include <algorithm>
 #include <limits>
 #include <numbers>
 
-#include "methods/round/nodes.h"
+#include "methods/round/slicing/nodes.h"
 
 namespace overlapper::slicing {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "geometry/moments.h"
-#include "methods/quadric/polyhedron.h"
+#include "methods/round/quadric/polyhedron.h"
 
 namespace overlapper::quadric {
 

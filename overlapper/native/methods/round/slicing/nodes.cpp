@@ -1,4 +1,4 @@
-#include "methods/round/nodes.h"
+#include "methods/round/slicing/nodes.h"
 
 #include <algorithm>
 #include <cfloat>
@@ -6,7 +6,7 @@
 #include <numbers>
 #include <utility>
 
-#include "methods/round/segment.h"
+#include "methods/round/quadric/segment_series.h"
 
 namespace overlapper::slicing {
 namespace {

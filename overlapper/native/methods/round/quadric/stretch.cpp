@@ -1,4 +1,4 @@
-#include "methods/round/stretch.h"
+#include "methods/round/quadric/stretch.h"
 
 #include <cfloat>
 #include <numbers>

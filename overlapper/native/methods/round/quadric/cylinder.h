@@ -5,7 +5,7 @@
 
 #include "geometry/measures.h"
 #include "geometry/moments.h"
-#include "methods/quadric/polyhedron.h"
+#include "methods/round/quadric/polyhedron.h"
 
 namespace overlapper::quadric {
 

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "methods/round/breakpoints.h"
+#include "methods/round/slicing/breakpoints.h"
 
 namespace overlapper::slicing {
 

@@ -1,4 +1,4 @@
-#include "methods/round/pieces.h"
+#include "methods/round/pieces/pieces.h"
 
 #include <algorithm>
 #include <limits>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "methods/round/segment.h"
+#include "methods/round/quadric/segment_series.h"
 
 namespace overlapper::quadric {
 

@@ -1,4 +1,4 @@
-#include "methods/round/quadrature.h"
+#include "methods/round/slicing/quadrature.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <span>
 
 #include "geometry/wide.h"
-#include "methods/round/nodes.h"
+#include "methods/round/slicing/nodes.h"
 
 namespace overlapper::slicing {
 namespace {

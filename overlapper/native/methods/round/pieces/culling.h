@@ -3,8 +3,8 @@
 #include <array>
 #include <vector>
 
-#include "methods/round/enclosure.h"
-#include "methods/round/pieces.h"
+#include "methods/round/pieces/enclosure.h"
+#include "methods/round/pieces/pieces.h"
 
 namespace overlapper::slicing {
 

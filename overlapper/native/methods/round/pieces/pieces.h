@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "geometry/wide_pose.h"
-#include "methods/round/enclosure.h"
-#include "methods/round/slice.h"
+#include "methods/round/pieces/enclosure.h"
+#include "methods/round/slicing/slice.h"
 #include "shapes/shape.h"
 
 namespace overlapper::slicing {

@@ -1,4 +1,4 @@
-#include "methods/closed_forms.h"
+#include "methods/round/closed_forms/closed_forms.h"
 
 #include <algorithm>
 #include <array>
@@ -8,11 +8,11 @@
 #include <span>
 #include <vector>
 
-#include "methods/quadric/ball.h"
-#include "methods/quadric/cylinder.h"
-#include "methods/quadric/shallow_ball.h"
-#include "methods/round/stretch.h"
-#include "methods/sides.h"
+#include "methods/round/closed_forms/sides.h"
+#include "methods/round/quadric/ball.h"
+#include "methods/round/quadric/cylinder.h"
+#include "methods/round/quadric/shallow_ball.h"
+#include "methods/round/quadric/stretch.h"
 #include "shapes/solid.h"
 
 namespace overlapper {

@@ -1,4 +1,4 @@
-#include "methods/round/enclosure.h"
+#include "methods/round/pieces/enclosure.h"
 
 #include <algorithm>
 #include <limits>

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "methods/round/slice.h"
+#include "methods/round/slicing/slice.h"
 
 namespace overlapper::slicing {
 
