@@ -26,7 +26,7 @@ from overlapper.audit.examiner import Examiner
 from overlapper.audit.robot import read_robot
 from overlapper.audit.sampling import Sampling
 from overlapper.audit.verdicts import audit
-from overlapper.simulation.model_file import NotRead
+from overlapper.simulation.bullet.model_file import NotRead
 
 ROBOTS = Path(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots"))
 FRANKA = "panda_description/urdf/panda.urdf"

@@ -28,7 +28,7 @@ from scene_steps import machine, on_one_processor, results_path
 
 from overlapper import _core
 from overlapper.simulation import Bodies, VolumetricContact
-from overlapper.simulation.forces.dynamics import Dynamics
+from overlapper.simulation.bullet.dynamics import Dynamics
 
 G = 9.81
 COLUMNS = ("scene", "part", "us")

@@ -16,8 +16,8 @@ from overlapper import Placed, Sphere, overlap, process
 from overlapper.polytopes import decomposition
 from overlapper.process import Ended, NotStarted, Worker
 from overlapper.reference import Fcl
-from overlapper.simulation.inventory import inventory
-from overlapper.simulation.model_file import NotRead
+from overlapper.simulation.bullet.inventory import inventory
+from overlapper.simulation.bullet.model_file import NotRead
 from overlapper.viewer import Viewer
 
 

@@ -118,7 +118,7 @@ def audit(
             from overlapper.audit.verdicts import audit as look
             from overlapper.scenes.allowed import must_name_some
             from overlapper.scenes.outputs import can_be_written
-            from overlapper.simulation.model_file import NotRead
+            from overlapper.simulation.bullet.model_file import NotRead
 
             can_be_written(out, html, srdf)
             disabled = read_srdf(against) if against else {}

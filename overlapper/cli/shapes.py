@@ -17,7 +17,7 @@ from overlapper.cli.refusals import Refused, say
 from overlapper.printable import printable
 
 if TYPE_CHECKING:
-    from overlapper.simulation.inventory import Inventory, ListedShape
+    from overlapper.simulation.bullet.inventory import Inventory, ListedShape
 
 
 def shapes(
@@ -42,8 +42,8 @@ def shapes(
 
     [bold]overlapper shapes humanoid.xml --self-collision --json[/bold]
     """
-    from overlapper.simulation.inventory import inventory
-    from overlapper.simulation.model_file import NotRead
+    from overlapper.simulation.bullet.inventory import inventory
+    from overlapper.simulation.bullet.model_file import NotRead
 
     try:
         found = inventory(file, self_collision, surface=surface, concave=concave, concave_threshold=concave_threshold)

@@ -91,7 +91,7 @@ def watch(
         from overlapper.reference import Fcl
         from overlapper.scenes.outputs import can_be_written
         from overlapper.scenes.watching import Watches
-        from overlapper.simulation.windows import open_no_window, tell_of_windows
+        from overlapper.simulation.bullet.windows import open_no_window, tell_of_windows
 
         if check:
             Fcl().close()

@@ -10,9 +10,9 @@ from typing import Generic, Literal, TypeVar, get_args
 from overlapper.scenes.scene import ContactModel, Scene, SceneError, Step, broken
 from overlapper.scenes.still import Still
 from overlapper.simulation import Among, Bodies, Concave, Forces, Recorder, Surface, VolumetricContact
+from overlapper.simulation.bullet.saved_scene import NotSaved
 from overlapper.simulation.contacts import Contacts
-from overlapper.simulation.extraction.naming import named
-from overlapper.simulation.extraction.saved_scene import NotSaved
+from overlapper.simulation.naming import named
 
 import pybullet  # isort: skip  # after the simulation, which says what to install
 

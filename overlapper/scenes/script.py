@@ -10,7 +10,7 @@ from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType, TracebackType
 
-from overlapper.simulation import calls
+from overlapper.simulation.bullet import calls
 
 
 def run_script(path: Path, arguments: Sequence[str]) -> BaseException | None:

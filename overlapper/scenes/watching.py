@@ -17,8 +17,8 @@ from overlapper.scenes.outputs import Per, can_be_written, outputs
 from overlapper.scenes.run import Frame
 from overlapper.scenes.summary import Summary
 from overlapper.simulation import Among, Bodies, Concave, Recorder, SelfCollisionWarning, SkippedShapeWarning, Surface
-from overlapper.simulation.calls import Arguments, listen, unlisten
-from overlapper.simulation.extraction.model import Settings
+from overlapper.simulation.bullet.calls import Arguments, listen, unlisten
+from overlapper.simulation.model import Settings
 
 import pybullet  # isort: skip  # after the simulation, which says what to install
 

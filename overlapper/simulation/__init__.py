@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from overlapper.scenes.log import Log
     from overlapper.simulation.asked_pairs import Among
     from overlapper.simulation.bodies import Bodies, SelfCollisionWarning, SkippedShapeWarning
+    from overlapper.simulation.bullet.recorder import Recorder
     from overlapper.simulation.contacts import Contact, Contacts
-    from overlapper.simulation.extraction.model import Concave, Decomposed, Skipped, Surface
     from overlapper.simulation.forces.cautions import NoDirectionWarning, SubstepsWarning
     from overlapper.simulation.forces.contact import VolumetricContact
     from overlapper.simulation.forces.forces import Forces
     from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
-    from overlapper.simulation.recorder import Recorder
+    from overlapper.simulation.model import Concave, Decomposed, Skipped, Surface
     from overlapper.simulation.report import Report
 
 __all__ = [
@@ -53,12 +53,12 @@ __getattr__ = lazily(
         "asked_pairs": ("Among",),
         "bodies": ("Bodies", "SelfCollisionWarning", "SkippedShapeWarning"),
         "contacts": ("Contact", "Contacts"),
-        "extraction.model": ("Concave", "Decomposed", "Skipped", "Surface"),
+        "model": ("Concave", "Decomposed", "Skipped", "Surface"),
         "forces.cautions": ("NoDirectionWarning", "SubstepsWarning"),
         "forces.contact": ("VolumetricContact",),
         "forces.forces": ("Forces",),
         "links": ("LinkContact", "LinkContacts", "link_contacts"),
-        "recorder": ("Recorder",),
+        "bullet.recorder": ("Recorder",),
         ".scenes.log": ("Log",),  # a table, which is above what it is of
         "report": ("Report",),
     },

@@ -13,10 +13,14 @@ from numpy.typing import NDArray
 
 from overlapper import Overlaps, Placed, Shape, overlaps
 from overlapper.simulation.asked_pairs import Among, AskedPairs, Numbered, Who, listed
-from overlapper.simulation.bullet_contacts import links_in_contact_with_each_other, touching_within_margins
+from overlapper.simulation.bullet.contact_points import links_in_contact_with_each_other, touching_within_margins
+from overlapper.simulation.bullet.known_bodies import KnownBodies
+from overlapper.simulation.bullet.recorder import Link, Recorder
 from overlapper.simulation.collision_rules import CollisionRules, RulesInForce
 from overlapper.simulation.contacts import Contacts
-from overlapper.simulation.extraction.model import (
+from overlapper.simulation.ground import Grounds
+from overlapper.simulation.layout import Layout
+from overlapper.simulation.model import (
     BASE,
     Array,
     Body,
@@ -27,11 +31,7 @@ from overlapper.simulation.extraction.model import (
     Skipped,
     Surface,
 )
-from overlapper.simulation.extraction.naming import named
-from overlapper.simulation.ground import Grounds
-from overlapper.simulation.known_bodies import KnownBodies
-from overlapper.simulation.layout import Layout
-from overlapper.simulation.recorder import Link, Recorder
+from overlapper.simulation.naming import named
 from overlapper.simulation.report import Report
 
 

@@ -11,9 +11,9 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from overlapper.simulation.known_bodies import KnownBodies
+from overlapper.simulation.bullet.known_bodies import KnownBodies
+from overlapper.simulation.bullet.recorder import Link, Recorder
 from overlapper.simulation.layout import Layout
-from overlapper.simulation.recorder import Link, Recorder
 
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]

@@ -11,9 +11,9 @@ import pybullet
 from overlapper import Shape
 from overlapper.quaternion import composed, rotated
 from overlapper.simulation.collision_rules import CollisionRules, Mask
-from overlapper.simulation.extraction.height_field import Numbers
-from overlapper.simulation.extraction.model import BASE, Array, Body, Ground
+from overlapper.simulation.height_field import Numbers
 from overlapper.simulation.layout import Layout
+from overlapper.simulation.model import BASE, Array, Body, Ground
 
 
 class GroundBelow:

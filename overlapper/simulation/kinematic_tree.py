@@ -1,7 +1,7 @@
 """The links of a file that pybullet loads, with their shapes, and the joints that move them.
 
 What pybullet tells of a joint is enough to place its link without pybullet (`Joint`). It is read in a process of its
-own (`overlapper.simulation.model_file`).
+own (`overlapper.simulation.bullet.model_file`).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 from overlapper import Shape
 from overlapper.printable import printable
 from overlapper.quaternion import composed, rotated
-from overlapper.simulation.extraction.model import BASE, Array, Concave, Settings, Surface
-from overlapper.simulation.model_file import NotRead, load, read_apart
+from overlapper.simulation.bullet.model_file import NotRead, load, read_apart
+from overlapper.simulation.model import BASE, Array, Concave, Settings, Surface
 
 ENDINGS = (".urdf", ".sdf", ".xml")
 
@@ -117,8 +117,8 @@ def _answers(request: tuple[Path, Settings]) -> Iterator[KinematicTree | str]:
 def _read(path: Path, settings: Settings) -> KinematicTree:
     import pybullet
 
-    from overlapper.simulation.known_bodies import KnownBodies
-    from overlapper.simulation.recorder import Recorder
+    from overlapper.simulation.bullet.known_bodies import KnownBodies
+    from overlapper.simulation.bullet.recorder import Recorder
 
     client = pybullet.connect(pybullet.DIRECT)
     with Recorder(client) as recorder:

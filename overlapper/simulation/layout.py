@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Batch, Shape, Sphere, _core
-from overlapper.simulation.collider_poses import ColliderPoses
-from overlapper.simulation.extraction.model import BASE, Array, Body
+from overlapper.simulation.bullet.collider_poses import ColliderPoses
+from overlapper.simulation.model import BASE, Array, Body
 
 
 class Layout:

@@ -8,7 +8,7 @@ from overlapper.audit.kinematics import Kinematics
 from overlapper.audit.robot import read_robot
 from overlapper.audit.sampling import Sampling
 from overlapper.simulation import Bodies
-from overlapper.simulation.model_file import NotRead, load
+from overlapper.simulation.bullet.model_file import NotRead, load
 
 SEVERAL = [
     DATA / "franka_panda" / "panda.urdf",

@@ -27,7 +27,7 @@ from overlapper.audit.sampling import BLOCK, Sampling
 from overlapper.audit.verdicts import audit, wilson
 from overlapper.quaternion import rotated
 from overlapper.simulation import Bodies
-from overlapper.simulation.model_file import load
+from overlapper.simulation.bullet.model_file import load
 from overlapper.sweep.cluster import Cluster
 from overlapper.sweep.hand import Failed
 from overlapper.sweep.processes import Processes

@@ -12,7 +12,7 @@ from simulated import body, box
 
 from overlapper import Box, Placed, overlap
 from overlapper.simulation import Bodies, NoDirectionWarning, Recorder, VolumetricContact
-from overlapper.simulation.forces.dynamics import Dynamics
+from overlapper.simulation.bullet.dynamics import Dynamics
 
 
 def heap(world, count=12):

@@ -8,7 +8,7 @@ import pytest
 
 from overlapper import Placed, Sphere, distance, penetration_depth
 from overlapper.simulation import Bodies, SkippedShapeWarning, link_contacts
-from overlapper.simulation.extraction.height_field import HeightField
+from overlapper.simulation.height_field import HeightField
 
 PROBE = 1e-6
 TILTED = p.getQuaternionFromEuler([0.2, -0.1, 0.7])

@@ -6,7 +6,7 @@ import pytest
 from simulated import DATA, box
 
 from overlapper.simulation import Bodies, Recorder
-from overlapper.simulation.extraction.naming import body_name
+from overlapper.simulation.naming import body_name
 
 
 def bases(client, **how) -> list[str]:

@@ -15,16 +15,16 @@ from overlapper import Batch, Overlaps
 from overlapper._core import ContactSolver
 from overlapper.simulation.asked_pairs import Among, listed
 from overlapper.simulation.bodies import Bodies
-from overlapper.simulation.calls import listen, tell, unheard, unlisten
-from overlapper.simulation.commands import Commands
+from overlapper.simulation.bullet.calls import listen, tell, unheard, unlisten
+from overlapper.simulation.bullet.commands import Commands
+from overlapper.simulation.bullet.dynamics import Dynamics
+from overlapper.simulation.bullet.recorder import Link
+from overlapper.simulation.bullet.response import Response
 from overlapper.simulation.contacts import Contacts
-from overlapper.simulation.extraction.model import Array
 from overlapper.simulation.forces.cautions import NoDirectionWarning, SubstepsWarning
-from overlapper.simulation.forces.dynamics import Dynamics
 from overlapper.simulation.forces.forces import Forces
 from overlapper.simulation.forces.parameter import OfPair, Parameter
-from overlapper.simulation.forces.response import Response
-from overlapper.simulation.recorder import Link
+from overlapper.simulation.model import Array
 
 # A swing that turns by more than so many radians in a step is followed by backward Euler.
 COARSE = 2.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from overlapper import HalfSpace, Overlaps, Placed, overlaps
 from overlapper.quaternion import rotated
-from overlapper.simulation.extraction.model import Array
+from overlapper.simulation.model import Array
 
 # Gauss and Legendre's, from 0 to 1.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from overlapper.columns import FORCE_MEASURES, Columns, Tabular
 from overlapper.simulation.contacts import Contacts
-from overlapper.simulation.extraction.model import Array
 from overlapper.simulation.forces.energy import energies
+from overlapper.simulation.model import Array
 
 
 @dataclass(frozen=True, eq=False)

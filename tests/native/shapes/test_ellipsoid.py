@@ -29,7 +29,7 @@ from overlapper import (
 )
 from overlapper.polytopes.shape_text import alike, shape_of, text_of
 from overlapper.reference import Fcl, fcl
-from overlapper.simulation.inventory import _listed
+from overlapper.simulation.bullet.inventory import _listed
 from overlapper.viewer.outline import outline
 
 EXACT = 1e-12

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import pybullet
 
-from overlapper.simulation.calls import Arguments, listen, unlisten
-from overlapper.simulation.commands import Commands
-from overlapper.simulation.extraction.height_field import HeightField
+from overlapper.simulation.bullet.calls import Arguments, listen, unlisten
+from overlapper.simulation.bullet.commands import Commands
+from overlapper.simulation.height_field import HeightField
 
 Link = tuple[int, int]  # body and link, -1 for the base
 

@@ -13,12 +13,12 @@ import numpy as np
 import pybullet
 
 from overlapper.printable import printable
-from overlapper.simulation.extraction.bullet_file import BulletFile, Leaf, SavedBody
-from overlapper.simulation.extraction.height_field import HeightField
-from overlapper.simulation.extraction.model import BASE, Body, Color, Decomposed, Ground, Part, Settings, Skipped
-from overlapper.simulation.extraction.modelling import in_one_sentence, modelled
-from overlapper.simulation.extraction.naming import body_name
-from overlapper.simulation.extraction.saved_scene import MULTIBODY, SOFT_BODY, body_type
+from overlapper.simulation.bullet.bullet_file import BulletFile, Leaf, SavedBody
+from overlapper.simulation.bullet.saved_scene import MULTIBODY, SOFT_BODY, body_type
+from overlapper.simulation.height_field import HeightField
+from overlapper.simulation.model import BASE, Body, Color, Decomposed, Ground, Part, Settings, Skipped
+from overlapper.simulation.modelling import in_one_sentence, modelled
+from overlapper.simulation.naming import body_name
 
 REPORTED = {  # by getCollisionShapeData
     pybullet.GEOM_MESH: "hull",

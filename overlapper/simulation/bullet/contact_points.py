@@ -9,9 +9,9 @@ import pybullet
 
 from overlapper import Hull
 from overlapper.simulation.asked_pairs import AskedPairs, Numbered
+from overlapper.simulation.bullet.recorder import Link
 from overlapper.simulation.collision_rules import CollisionRules
 from overlapper.simulation.contacts import Contacts
-from overlapper.simulation.recorder import Link
 
 DISTANCE = 8  # of a contact point
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pybullet
 
-from overlapper.simulation.calls import Arguments, unheard
+from overlapper.simulation.bullet.calls import Arguments, unheard
 
 ARRAYS = frozenset({"setJointMotorControlArray", "setJointMotorControlMultiDofArray"})
 MOTORS = ARRAYS | {"setJointMotorControl2", "setJointMotorControlMultiDof"}

@@ -23,9 +23,9 @@ from simulated import (
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Sphere, distance
 from overlapper.simulation import Bodies, Recorder, SkippedShapeWarning
-from overlapper.simulation.extraction.bullet_file import Leaf
-from overlapper.simulation.extraction.model import Settings
-from overlapper.simulation.extraction.modelling import modelled
+from overlapper.simulation.bullet.bullet_file import Leaf
+from overlapper.simulation.model import Settings
+from overlapper.simulation.modelling import modelled
 
 # --- shapes
 

@@ -1,6 +1,6 @@
 """What is modelled of a file that pybullet can load: every shape, and which links the simulator lets collide.
 
-It is read in a process of its own (`overlapper.simulation.model_file`).
+It is read in a process of its own (`overlapper.simulation.bullet.model_file`).
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import numpy as np
 
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere
 from overlapper.quaternion import composed, rotated
-from overlapper.simulation.model_file import NotRead, load, read_apart
+from overlapper.simulation.bullet.model_file import NotRead, load, read_apart
 
 if TYPE_CHECKING:
-    from overlapper.simulation.extraction.model import Concave, Surface
+    from overlapper.simulation.model import Concave, Surface
 
 Listed = dict[tuple[int, int], list[Placed]]
 
@@ -121,10 +121,10 @@ def _of_bullet_file(
     path: Path, surface: Surface = "nominal", concave: Concave = "decompose", concave_threshold: float = 0.05
 ) -> Inventory:
     """Of what saveBullet wrote; loadBullet would not load all of it. Bodies have numbers, and no names."""
+    from overlapper.simulation.bullet.bullet_file import BulletFile
     from overlapper.simulation.collision_rules import Colliders, CollisionRules
-    from overlapper.simulation.extraction.bullet_file import BulletFile
-    from overlapper.simulation.extraction.model import Settings
-    from overlapper.simulation.extraction.modelling import in_one_sentence, modelled
+    from overlapper.simulation.model import Settings
+    from overlapper.simulation.modelling import in_one_sentence, modelled
 
     file, settings = BulletFile(path), Settings(concave, concave_threshold, surface)
     colliders = {

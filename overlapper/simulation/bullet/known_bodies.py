@@ -7,12 +7,12 @@ from collections.abc import Collection, Mapping
 
 import pybullet
 
-from overlapper.simulation.body_marks import BodyMarks
-from overlapper.simulation.extraction.body import read_body
-from overlapper.simulation.extraction.bullet_file import BulletFile
-from overlapper.simulation.extraction.model import BASE, Body, Color, Decomposed, Settings, Skipped
-from overlapper.simulation.extraction.saved_scene import body_ids, saved_bodies
-from overlapper.simulation.recorder import Recorder
+from overlapper.simulation.bullet.body import read_body
+from overlapper.simulation.bullet.body_marks import BodyMarks
+from overlapper.simulation.bullet.bullet_file import BulletFile
+from overlapper.simulation.bullet.recorder import Recorder
+from overlapper.simulation.bullet.saved_scene import body_ids, saved_bodies
+from overlapper.simulation.model import BASE, Body, Color, Decomposed, Settings, Skipped
 
 
 class KnownBodies:

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from overlapper.simulation.extraction import bullet_file
-from overlapper.simulation.extraction.bullet_file import BulletFile
+from overlapper.simulation.bullet import bullet_file
+from overlapper.simulation.bullet.bullet_file import BulletFile
 
 CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 POSITION, ORIENTATION = [0.1, -0.2, 0.3], p.getQuaternionFromEuler([0.3, -0.5, 0.7])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from overlapper.simulation.calls import unheard
-from overlapper.simulation.recorder import Link, Recorder
+from overlapper.simulation.bullet.calls import unheard
+from overlapper.simulation.bullet.recorder import Link, Recorder
 
 
 class Response:

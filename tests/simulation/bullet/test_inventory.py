@@ -10,8 +10,8 @@ import pybullet as p
 import pybullet_data
 import pytest
 
-from overlapper.simulation.inventory import inventory
-from overlapper.simulation.model_file import NotRead
+from overlapper.simulation.bullet.inventory import inventory
+from overlapper.simulation.bullet.model_file import NotRead
 
 DATA = Path(pybullet_data.getDataPath())
 FLAT = """<robot name="plate"><link name="top"><collision><geometry><mesh filename="flat.obj"/></geometry></collision>

@@ -11,8 +11,8 @@ import numpy as np
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Shape, Sphere
 from overlapper.polytopes.decomposition import Decomposition, NotDecomposed, decompose
 from overlapper.quaternion import composed, rotated
-from overlapper.simulation.extraction.bullet_file import Leaf
-from overlapper.simulation.extraction.model import Part, Settings
+from overlapper.simulation.bullet.bullet_file import Leaf
+from overlapper.simulation.model import Part, Settings
 
 
 def modelled(

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from overlapper import _core
 from overlapper.quaternion import rotated
-from overlapper.simulation.calls import unheard
-from overlapper.simulation.extraction.model import BASE, Array
+from overlapper.simulation.bullet.calls import unheard
 from overlapper.simulation.kinematic_tree import joint_between
+from overlapper.simulation.model import BASE, Array
 
 # By kinematic_tree.Kind: the number that _core.ContactSolver knows it by, and how many coordinates it has.
 JOINTS = {"held": (0, 0), "planar": (0, 0), "revolute": (1, 1), "prismatic": (2, 1), "spherical": (3, 3)}

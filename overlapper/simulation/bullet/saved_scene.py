@@ -11,8 +11,8 @@ from itertools import count
 import pybullet
 
 from overlapper.printable import first_line
-from overlapper.simulation.extraction.bullet_file import BulletFile
-from overlapper.simulation.extraction.model import BASE
+from overlapper.simulation.bullet.bullet_file import BulletFile
+from overlapper.simulation.model import BASE
 
 MULTIBODY, SOFT_BODY = 2, 3  # of getDynamicsInfo; 1 is a rigid body in maximal coordinates
 

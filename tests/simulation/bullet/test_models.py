@@ -9,7 +9,7 @@ from pathlib import Path
 import pybullet_data
 import pytest
 
-WALK = Path(__file__).parents[1] / "support" / "model_walk.py"
+WALK = Path(__file__).parents[2] / "support" / "model_walk.py"
 SHARES = 6  # of the models, walked side by side where there are cores
 PYBULLET_DATA = Path(pybullet_data.getDataPath())
 ROBOTS = Path(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots"))

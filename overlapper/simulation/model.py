@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from overlapper import Shape
 from overlapper.polytopes.decomposition import check_threshold
-from overlapper.simulation.extraction.height_field import HeightField
+from overlapper.simulation.height_field import HeightField
 
 Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]

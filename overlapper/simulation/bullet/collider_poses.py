@@ -8,9 +8,9 @@ from itertools import repeat
 import numpy as np
 import pybullet
 
-from overlapper.simulation.extraction.bullet_file import orientations
-from overlapper.simulation.extraction.model import BASE
-from overlapper.simulation.extraction.saved_scene import save
+from overlapper.simulation.bullet.bullet_file import orientations
+from overlapper.simulation.bullet.saved_scene import save
+from overlapper.simulation.model import BASE
 
 ReportedPose = Sequence[Sequence[float]]  # begins with position and quaternion xyzw
 

@@ -1,0 +1,1 @@
+"""Bullet's own half: pybullet is asked here and nowhere else."""
