@@ -22,10 +22,10 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
+from overlapper.jobs.hand import Job
+from overlapper.jobs.processes import Processes
 from overlapper.scenes.run import run
-from overlapper.sweep.hand import Job
 from overlapper.sweep.points import Space
-from overlapper.sweep.processes import Processes
 from overlapper.sweep.study import Study, Task
 from overlapper.sweep.sweep import Progress, Sweep
 from overlapper.sweep.tasks import prepared

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from overlapper.polytopes.mesh_file import read_hull as read_hull
     from overlapper.polytopes.mesh_file import write_mesh as write_mesh
     from overlapper.polytopes.random import random_polytope
-    from overlapper.scenes.log import Log as Log
     from overlapper.scenes.watching import Watch
+    from overlapper.tables.log import Log as Log
 
     watch = Watch
 
@@ -67,7 +67,7 @@ __getattr__ = _lazily(
         "polytopes.database": ("read_polytopes", "write_polytopes"),
         "polytopes.mesh_file": ("read_hull", "write_mesh"),
         "polytopes.random": ("random_polytope",),
-        "scenes.log": ("Log",),
+        "tables.log": ("Log",),
         "watch": ("watch",),
     },
 )

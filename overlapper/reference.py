@@ -16,7 +16,7 @@ import numpy as np
 
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Overlap, RoundedHull, Shape, Sphere
 from overlapper.install import hint
-from overlapper.process import Ended, NotStarted, Worker
+from overlapper.jobs.worker import Ended, NotStarted, Worker
 from overlapper.proof.signed_distance import signed_distance_bounds
 
 try:

@@ -42,7 +42,7 @@ def test_python_imports_only_downwards_and_each_library_in_one_room():
 @pytest.mark.parametrize(
     ("file", "line", "arrow"),
     [
-        ("viewer/stage.py", "from overlapper.scenes.still import Still", "viewer.stage -> overlapper.scenes.still"),
+        ("viewer/stage.py", "from overlapper.tables.still import Still", "viewer.stage -> overlapper.tables.still"),
         ("union.py", "import overlapper.reference", "union -> overlapper.reference"),
         ("viewer/live.py", "from overlapper.simulation import Bodies", "viewer.live -> overlapper.simulation"),
         ("viewer/live.py", "import pybullet", "viewer.live -> pybullet"),
@@ -50,7 +50,7 @@ def test_python_imports_only_downwards_and_each_library_in_one_room():
         ("cli/view.py", "import meshcat.geometry", "cli.view -> meshcat"),
         ("cli/refusals.py", "from sqlalchemy.exc import SQLAlchemyError", "cli.refusals -> sqlalchemy"),
         ("simulation/contacts.py", "import coacd", "simulation.contacts -> coacd"),
-        ("scenes/table.py", "import matplotlib.pyplot", "scenes.table -> matplotlib"),
+        ("tables/table.py", "import matplotlib.pyplot", "tables.table -> matplotlib"),
     ],
 )
 def test_an_arrow_that_is_broken_is_named_with_both_ends(file, line, arrow, tmp_path):

@@ -10,9 +10,9 @@ import pytest
 
 from overlapper import Box, Hull
 from overlapper.polytopes.mesh_file import write_mesh
-from overlapper.scenes.expected import DRIFT, ROUNDING, Expected
-from overlapper.scenes.still import Still
-from overlapper.scenes.table_file import TABLES, read_table
+from overlapper.tables.still import Still
+from overlapper.tables.table_file import TABLES, read_table
+from overlapper.verdicts.expected import DRIFT, ROUNDING, Expected
 from overlapper.viewer import Recording, picture
 from overlapper.whole_file import beside, settle, unfinished
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from overlapper.audit.allowed import Patterns, is_allowed
 from overlapper.audit.robot import Robot
 from overlapper.audit.srdf import Names
 from overlapper.audit.verdicts import Audit, Verdict
-from overlapper.scenes.allowed import Patterns, is_allowed
 
 
 def findings(audit: Audit, expected: Sequence[Patterns], disabled: Mapping[Names, str]) -> list[str]:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from overlapper.audit.verdicts import Audit, Pose, Verdict
-from overlapper.scenes.table import Row, Value
-from overlapper.scenes.table_file import TABLES, origin
+from overlapper.tables.table import Row, Value
+from overlapper.tables.table_file import TABLES, origin
 
 # Every column, in order, with its type; the unit is in the name. `adjacent` is 1 or 0. Joints are JSON, by name, in rad
 # and m. `page` is a link to the pose of the largest volume.

@@ -15,10 +15,10 @@ from overlapper.audit.pairs import LinkPair
 from overlapper.audit.robot import Robot, shape_keys
 from overlapper.audit.sampling import Sampling
 from overlapper.audit.tally import Array, Tally
+from overlapper.jobs.engines import Engine
+from overlapper.jobs.hand import Failed, Job
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.links import LinkContact, link_contacts
-from overlapper.sweep.engines import Engine
-from overlapper.sweep.hand import Failed, Job
 
 Status = Literal["never", "sometimes", "always"]
 

@@ -110,15 +110,15 @@ def audit(
     written: list[Path] = []
     try:
         with input_refusals(), quiet():
+            from overlapper.audit.allowed import must_name_some
             from overlapper.audit.findings import findings, remarks
             from overlapper.audit.page import addresses, write_page
             from overlapper.audit.robot import read_robot
             from overlapper.audit.srdf import read_srdf, write_srdf
             from overlapper.audit.table import facts, write_table
             from overlapper.audit.verdicts import audit as look
-            from overlapper.scenes.allowed import must_name_some
-            from overlapper.scenes.outputs import can_be_written
             from overlapper.simulation.bullet.model_file import NotRead
+            from overlapper.tables.outputs import can_be_written
 
             can_be_written(out, html, srdf)
             disabled = read_srdf(against) if against else {}

@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say, scene_refusals, without_banner
-from overlapper.process import NotStarted
+from overlapper.jobs.worker import NotStarted
 from overlapper.scenes.scene import SceneError, scenes_in
 
 
@@ -88,8 +88,8 @@ def _in_turn(scenes: Sequence[Path], out: Path, record: bool) -> Generator[_Held
 
 def _at_once(scenes: Sequence[Path], out: Path, record: bool, workers: int | None) -> Generator[_Held, None, None]:
     """As _in_turn, in the same order, by several processes."""
-    from overlapper.sweep.hand import Done, Job, Outcome
-    from overlapper.sweep.processes import Processes
+    from overlapper.jobs.hand import Done, Job, Outcome
+    from overlapper.jobs.processes import Processes
 
     job = Job(__name__, prepared.__name__, (out, record))
     found: dict[int, Outcome] = {}
@@ -145,9 +145,9 @@ def diff(
 
     [bold]overlapper diff monday.csv tuesday.csv[/bold]
     """
-    from overlapper.scenes.comparison import compare_forces, compare_measures, compare_poses
-    from overlapper.scenes.expected import DRIFT, FORCES, ROUNDING, read_budgets
-    from overlapper.scenes.table_file import read_table
+    from overlapper.tables.table_file import read_table
+    from overlapper.verdicts.comparison import compare_forces, compare_measures, compare_poses
+    from overlapper.verdicts.expected import DRIFT, FORCES, ROUNDING, read_budgets
 
     with input_refusals():
         recorded, found = read_table(before), read_table(after)

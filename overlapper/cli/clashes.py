@@ -24,7 +24,7 @@ from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet,
 from overlapper.printable import printable
 
 if TYPE_CHECKING:
-    from overlapper.scenes.clashes import Body, Clash, Clashes
+    from overlapper.audit.clashes import Body, Clash, Clashes
 
 IN_MATRIX = 12  # bodies at most, so that a terminal holds it
 LISTED = 20  # pairs at most
@@ -80,8 +80,8 @@ def clashes(
     written: list[Path] = []
     try:
         with input_refusals(), quiet():
-            from overlapper.scenes import clashes as scene
-            from overlapper.scenes.outputs import can_be_written
+            from overlapper.audit import clashes as scene
+            from overlapper.tables.outputs import can_be_written
 
             can_be_written(out, html)
             parts, failures = scene.read(sources, units)
@@ -144,7 +144,7 @@ def _facts(found: Clashes) -> dict[str, Any]:
 
 
 def _show(found: Clashes, written: list[Path]) -> None:
-    from overlapper.scenes.clashes import Status
+    from overlapper.audit.clashes import Status
 
     count = len(found.bodies)
     if found.pairs:

@@ -11,7 +11,7 @@ import typer
 from overlapper.cli.refusals import Refused
 
 if TYPE_CHECKING:
-    from overlapper.sweep.engines import Engine
+    from overlapper.jobs.engines import Engine
 
 EngineOption = Annotated[
     Literal["processes", "ray"], typer.Option(help="Who does it: processes of this machine, or a Ray cluster.")
@@ -36,11 +36,11 @@ def refuse_address(engine: str, address: str | None) -> None:
 def engine_of(name: str, address: str | None, workers: int | None) -> Iterator[Engine]:
     """The engine of that name; NotStarted if there is no cluster, ImportError without Ray."""
     if name == "processes":
-        from overlapper.sweep.processes import Processes
+        from overlapper.jobs.processes import Processes
 
         yield Processes(workers)
         return
-    from overlapper.sweep.cluster import Cluster
+    from overlapper.jobs.cluster import Cluster
 
     cluster = Cluster(address, workers)
     try:

@@ -107,8 +107,8 @@ def _of_meshes(sources: Sequence[str], method: str) -> tuple[dict[str, Any], lis
         raise Refused("--concave is of two mesh files; overlapper clashes takes all pairs of more")
     import numpy as np
 
+    from overlapper.audit.clashes import clashes
     from overlapper.polytopes.mesh_file import Part, read_triangles
-    from overlapper.scenes.clashes import clashes
 
     with quiet():
         found = clashes([(source, Part(source, read_triangles(source), np.eye(4))) for source in sources])

@@ -87,7 +87,7 @@ ExpectOption = Annotated[
 
 def expected_pairs(given: list[str] | None) -> list[tuple[str, str]]:
     """What --expect was given."""
-    from overlapper.scenes.allowed import allowed_pair
+    from overlapper.audit.allowed import allowed_pair
 
     try:
         return [allowed_pair(each) for each in given or ()]
@@ -97,7 +97,7 @@ def expected_pairs(given: list[str] | None) -> list[tuple[str, str]]:
 
 def refuse_out_of_range(tolerance: float, concave_threshold: float, out: Path | None) -> None:
     """Refuse what types cannot."""
-    from overlapper.scenes.table_file import TABLES
+    from overlapper.tables.table_file import TABLES
 
     if not 0 < tolerance < 1:
         raise Refused(f"--tolerance must lie between 0 and 1, not {tolerance}")

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from typing import BinaryIO, NoReturn, TextIO
 
+from overlapper.jobs.worker import NotStarted
 from overlapper.printable import first_line, printable
-from overlapper.process import NotStarted
 from overlapper.scenes.scene import SceneError
 from overlapper.simulation.forces.cautions import NoDirectionWarning, SubstepsWarning
 

@@ -34,7 +34,7 @@ from overlapper.scenes.parameters import heading_of
 from overlapper.scenes.scene import Scene, load_scene
 
 if TYPE_CHECKING:
-    from overlapper.scenes.summary import Summary
+    from overlapper.tables.summary import Summary
 
 
 def run(
@@ -126,8 +126,8 @@ def _measure(
         with without_banner():
             from overlapper.scenes.run import run as frames_of
         from overlapper.reference import Fcl
-        from overlapper.scenes.outputs import outputs
-        from overlapper.scenes.summary import Summary
+        from overlapper.tables.outputs import outputs
+        from overlapper.tables.summary import Summary
 
         scene = load_scene(name, parameters)
         fcl = stack.enter_context(Fcl()) if check else None

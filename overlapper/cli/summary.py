@@ -8,8 +8,8 @@ from rich.text import Text
 
 from overlapper.cli.figures import ROUNDED_UP, VOLUME_UNITS, plain_table, volume_unit
 from overlapper.printable import printable
-from overlapper.scenes.summary import Summary
 from overlapper.simulation import Decomposed
+from overlapper.tables.summary import Summary
 
 
 def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:

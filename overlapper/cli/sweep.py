@@ -29,8 +29,8 @@ from overlapper.cli.options import (
 from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
 
 if TYPE_CHECKING:
+    from overlapper.jobs.engines import Engine
     from overlapper.sweep.comparison import Comparison
-    from overlapper.sweep.engines import Engine
     from overlapper.sweep.points import Point, Space
     from overlapper.sweep.store import Store
     from overlapper.sweep.sweep import Progress as Reached

@@ -105,7 +105,7 @@ def view(
 
 def _film(playback: Playback, html: Path, looks: Sequence[Look], written: list[Path]) -> bool:
     """False if it was interrupted; then the page has what came before. KeyboardInterrupt if that is nothing."""
-    from overlapper.scenes.outputs import PICTURES_PER_SECOND, recorder
+    from overlapper.tables.outputs import PICTURES_PER_SECOND, recorder
 
     html.parent.mkdir(parents=True, exist_ok=True)
     rate = math.inf if playback.sparse else PICTURES_PER_SECOND
@@ -146,7 +146,7 @@ def _picture(playback: Playback, png: Path, step: int | None, close: bool, looks
 
 def _live(playback: Playback, looks: Sequence[Look], host: str) -> None:
     """As fast as the simulation is in the world, or as it can be; stays until it is interrupted, on a terminal."""
-    from overlapper.scenes.outputs import PICTURES_PER_SECOND
+    from overlapper.tables.outputs import PICTURES_PER_SECOND
     from overlapper.viewer import Viewer
 
     with Viewer(None, *looks, host=host) as viewer, suppress(KeyboardInterrupt):

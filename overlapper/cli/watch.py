@@ -89,9 +89,9 @@ def watch(
     }
     try:
         from overlapper.reference import Fcl
-        from overlapper.scenes.outputs import can_be_written
         from overlapper.scenes.watching import Watches
         from overlapper.simulation.bullet.windows import open_no_window, tell_of_windows
+        from overlapper.tables.outputs import can_be_written
 
         if check:
             Fcl().close()

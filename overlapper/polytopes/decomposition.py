@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from overlapper._core import Hull, Placed
 from overlapper.install import hint
-from overlapper.process import Ended, Worker
+from overlapper.jobs.worker import Ended, Worker
 from overlapper.union import union_volume
 
 Vertices = NDArray[np.float64]

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from overlapper._core import Hull, Overlap
 from overlapper.install import hint
+from overlapper.jobs.worker import Ended, Worker
 from overlapper.printable import first_line
-from overlapper.process import Ended, Worker
 from overlapper.whole_file import beside
 
 try:

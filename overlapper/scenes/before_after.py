@@ -10,9 +10,9 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 
-from overlapper.scenes.comparison import Move
-from overlapper.scenes.still import Still
 from overlapper.scenes.verdict import Verdict
+from overlapper.tables.still import Still
+from overlapper.verdicts.comparison import Move
 from overlapper.viewer import Recording
 from overlapper.viewer.page_text import filled
 from overlapper.whole_file import beside

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from overlapper.scenes.expected import read_expected
 from overlapper.scenes.record import record
 from overlapper.scenes.scene import SceneError, load_scene
 from overlapper.scenes.verdict import Verdict, examine
+from overlapper.verdicts.expected import read_expected
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,16 +13,17 @@ from pathlib import Path
 from typing import Any
 
 from overlapper.printable import printable
-from overlapper.scenes.comparison import compare_measures
-from overlapper.scenes.expected import HUNDREDTHS, read_expected
 from overlapper.scenes.parameters import read_heading
-from overlapper.scenes.run import Frame, run
+from overlapper.scenes.run import run
 from overlapper.scenes.scene import ContactModel, Scene, load_scene
-from overlapper.scenes.still import Still
-from overlapper.scenes.table import Row, link_rows, rows
-from overlapper.scenes.table_file import TABLES, csv_text, read_metadata, read_table
 from overlapper.simulation import Bodies
 from overlapper.simulation.links import link_contacts
+from overlapper.tables.frame import Frame
+from overlapper.tables.still import Still
+from overlapper.tables.table import Row, link_rows, rows
+from overlapper.tables.table_file import TABLES, csv_text, read_metadata, read_table
+from overlapper.verdicts.comparison import compare_measures
+from overlapper.verdicts.expected import HUNDREDTHS, read_expected
 
 STEP = 1 / 240  # s, what pybullet takes for a step; an expected file says nothing of time
 

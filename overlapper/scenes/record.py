@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from overlapper.scenes.comparison import compare_measures
-from overlapper.scenes.expected import DRIFT, FORCES, MEASURES, ROUNDING, Budget, Expected, read_expected
 from overlapper.scenes.parameters import heading_of
 from overlapper.scenes.run import stills
 from overlapper.scenes.scene import Scene
-from overlapper.scenes.still import Still
-from overlapper.scenes.table import Row
-from overlapper.scenes.table_file import origin
+from overlapper.tables.still import Still
+from overlapper.tables.table import Row
+from overlapper.tables.table_file import origin
+from overlapper.verdicts.comparison import compare_measures
+from overlapper.verdicts.expected import DRIFT, FORCES, MEASURES, ROUNDING, Budget, Expected, read_expected
 
 # Where a scene is put to see what rounding alone does to its measures, in m.
 ASIDES = ((0.3, 0.7, 0.1), (-0.2, 0.4, 0.9), (0.6, -0.5, -0.3))

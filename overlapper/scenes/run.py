@@ -4,43 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Container, Generator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar, get_args
+from typing import Literal, get_args
 
 from overlapper.scenes.scene import ContactModel, Scene, SceneError, Step, broken
-from overlapper.scenes.still import Still
-from overlapper.simulation import Among, Bodies, Concave, Forces, Recorder, Surface, VolumetricContact
+from overlapper.simulation import Among, Bodies, Concave, Recorder, Surface, VolumetricContact
 from overlapper.simulation.bullet.saved_scene import NotSaved
-from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.naming import named
+from overlapper.tables.frame import Frame
+from overlapper.tables.still import Still
 
 import pybullet  # isort: skip  # after the simulation, which says what to install
-
-Shown = TypeVar("Shown", bound="Bodies | Still", covariant=True)
-
-
-@dataclass(frozen=True, slots=True)
-class Frame(Generic[Shown]):
-    """The bodies and what they share after `step` steps, `time` seconds into the simulation.
-
-    Of a run, `bodies` is the same object in every frame; of what was recorded or is kept, a Still. `forces`, with
-    volumetric contact, are the mean over the step between the pairs that it pushes apart: their `contacts` are of these
-    bodies, too, but not of what is only measured.
-    """
-
-    step: int
-    time: float
-    bodies: Shown
-    contacts: Contacts
-    forces: Forces | None = None
-
-    def kept(self) -> Frame[Still]:
-        """The same, unmoved by what the simulation does next."""
-        return Frame(self.step, self.time, self.still(), self.contacts, self.forces)
-
-    def still(self) -> Still:
-        """The bodies apart from the simulation."""
-        return self.bodies if isinstance(self.bodies, Still) else Still.of(self.bodies, self.forces)
 
 
 def run(

@@ -11,7 +11,11 @@ from dataclasses import dataclass, field, replace
 
 from overlapper import Hull, Shape
 from overlapper.polytopes.shape_text import alike
-from overlapper.scenes.comparison import (
+from overlapper.scenes.record import replay, rounding
+from overlapper.scenes.run import stills
+from overlapper.scenes.scene import Scene
+from overlapper.tables.still import Still
+from overlapper.verdicts.comparison import (
     Differences,
     Move,
     compare_forces,
@@ -20,11 +24,7 @@ from overlapper.scenes.comparison import (
     loose_budgets,
     shape_label,
 )
-from overlapper.scenes.expected import HUNDREDTHS, Expected
-from overlapper.scenes.record import replay, rounding
-from overlapper.scenes.run import stills
-from overlapper.scenes.scene import Scene
-from overlapper.scenes.still import Still
+from overlapper.verdicts.expected import HUNDREDTHS, Expected
 
 
 @dataclass(frozen=True, slots=True)

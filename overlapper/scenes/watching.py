@@ -13,12 +13,12 @@ from types import FrameType, TracebackType
 from typing import Any, Literal, TypedDict, get_args
 
 from overlapper.reference import Fcl
-from overlapper.scenes.outputs import Per, can_be_written, outputs
-from overlapper.scenes.run import Frame
-from overlapper.scenes.summary import Summary
 from overlapper.simulation import Among, Bodies, Concave, Recorder, SelfCollisionWarning, SkippedShapeWarning, Surface
 from overlapper.simulation.bullet.calls import Arguments, listen, unlisten
 from overlapper.simulation.model import Settings
+from overlapper.tables.frame import Frame
+from overlapper.tables.outputs import Per, can_be_written, outputs
+from overlapper.tables.summary import Summary
 
 import pybullet  # isort: skip  # after the simulation, which says what to install
 

@@ -11,7 +11,6 @@ from overlapper.face import lazily
 from overlapper.install import simulator_hint
 
 if TYPE_CHECKING:
-    from overlapper.scenes.log import Log
     from overlapper.simulation.asked_pairs import Among
     from overlapper.simulation.bodies import Bodies, SelfCollisionWarning, SkippedShapeWarning
     from overlapper.simulation.bullet.recorder import Recorder
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
     from overlapper.simulation.model import Concave, Decomposed, Skipped, Surface
     from overlapper.simulation.report import Report
+    from overlapper.tables.log import Log
 
 __all__ = [
     "Among",
@@ -59,7 +59,7 @@ __getattr__ = lazily(
         "forces.forces": ("Forces",),
         "links": ("LinkContact", "LinkContacts", "link_contacts"),
         "bullet.recorder": ("Recorder",),
-        ".scenes.log": ("Log",),  # a table, which is above what it is of
+        ".tables.log": ("Log",),  # a table, which is above what it is of
         "report": ("Report",),
     },
     needs=simulator_hint(),

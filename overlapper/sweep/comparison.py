@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.printable import first_line
-from overlapper.scenes.comparison import off_by
-from overlapper.scenes.expected import FORCES, ROUNDING, Budget, read_budgets
 from overlapper.scenes.parameters import Parameter, described
 from overlapper.sweep.part import FAILURES, OF, TASK, TASKS
 from overlapper.sweep.store import Store, rows_in
 from overlapper.sweep.sweep import Sweep
+from overlapper.verdicts.comparison import off_by
+from overlapper.verdicts.expected import FORCES, ROUNDING, Budget, read_budgets
 
 Row = Mapping[str, Any]
 Key = tuple[Parameter, ...]

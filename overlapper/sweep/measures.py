@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from overlapper.simulation.links import LinkContact, link_contacts
 
 if TYPE_CHECKING:
-    from overlapper.scenes.run import Frame
-    from overlapper.scenes.table import Value
+    from overlapper.tables.frame import Frame
+    from overlapper.tables.table import Value
 
 # Every measure, in order, with its type; the unit is in the name. The columns of the worst pair, that of the largest
 # volume, and of the deepest are empty if nothing overlaps.

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from overlapper.scenes.outputs import recorder
 from overlapper.scenes.run import run
 from overlapper.sweep import charts
 from overlapper.sweep.comparison import Comparison, mean_force
 from overlapper.sweep.part import FAILURES, TASKS
 from overlapper.sweep.store import Store
 from overlapper.sweep.sweep import Sweep
+from overlapper.tables.outputs import recorder
 from overlapper.viewer.page_text import filled
 from overlapper.whole_file import beside
 

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from overlapper.install import hint
-from overlapper.scenes.table import COLUMNS
-from overlapper.scenes.table import FORCES as FORCE_COLUMNS
 from overlapper.sweep.measures import FORCES, MEASURES
+from overlapper.tables.table import COLUMNS
+from overlapper.tables.table import FORCES as FORCE_COLUMNS
 
 if TYPE_CHECKING:
     from overlapper.scenes.parameters import Parameter
-    from overlapper.scenes.table import Row
+    from overlapper.tables.table import Row
 
 # The name of the task, and of the tables in which tasks are.
 TASK = "task"

@@ -11,7 +11,7 @@ from typing import Any
 
 from overlapper.scenes.parameters import Parameter
 from overlapper.scenes.scene import Scene, scene_of
-from overlapper.scenes.table_file import origin
+from overlapper.tables.table_file import origin
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from overlapper.jobs.engines import Engine
+from overlapper.jobs.hand import Done, Failed, Job
 from overlapper.scenes.parameters import Parameter
 from overlapper.sweep import tasks
-from overlapper.sweep.engines import Engine
-from overlapper.sweep.hand import Done, Failed, Job
 from overlapper.sweep.part import FAILURES, arrow, part
 from overlapper.sweep.store import Store
 from overlapper.sweep.study import Study, Task

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 
 from overlapper.scenes.run import run
-from overlapper.scenes.table import Row, rows
-from overlapper.scenes.table_file import origin
 from overlapper.sweep.measures import Measures
 from overlapper.sweep.part import STEPS, TASKS, part
 from overlapper.sweep.study import Study, Task
+from overlapper.tables.table import Row, rows
+from overlapper.tables.table_file import origin
 
 Parts = dict[str, bytes]
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from overlapper.process import START_LIMIT, Ended, NotStarted, Worker
+from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker
 from overlapper.viewer.framing import Framing
 from overlapper.viewer.labels import Bodies, Contact, body_paths, labelled
 from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, volume_text

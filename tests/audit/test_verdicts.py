@@ -25,12 +25,12 @@ from overlapper.audit.examiner import Examiner, ball, prepared
 from overlapper.audit.robot import read_robot
 from overlapper.audit.sampling import BLOCK, Sampling
 from overlapper.audit.verdicts import audit, wilson
+from overlapper.jobs.cluster import Cluster
+from overlapper.jobs.hand import Failed
+from overlapper.jobs.processes import Processes
 from overlapper.quaternion import rotated
 from overlapper.simulation import Bodies
 from overlapper.simulation.bullet.model_file import load
-from overlapper.sweep.cluster import Cluster
-from overlapper.sweep.hand import Failed
-from overlapper.sweep.processes import Processes
 
 
 def by_names(found):

@@ -18,9 +18,9 @@ from pages import Film, drawings, enclosed, meshes, numbers
 from step_text import step_text
 
 from overlapper import Hull, write_mesh
+from overlapper.audit import clashes as scene
 from overlapper.polytopes import mesh_overlap
-from overlapper.scenes import clashes as scene
-from overlapper.scenes.table_file import read_metadata, read_table
+from overlapper.tables.table_file import read_metadata, read_table
 
 # Cuts an L in two, in the place of CoACD.
 SAW = """

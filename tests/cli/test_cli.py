@@ -14,7 +14,7 @@ import pytest
 
 from overlapper.cli.check import check
 from overlapper.cli.refusals import Refused
-from overlapper.scenes.table_file import read_csv, read_table
+from overlapper.tables.table_file import read_csv, read_table
 
 TWO_CUBES = '''
 """A cube rests 2 cm deep in another."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow.parquet
 import pytest
 
-from overlapper.scenes.table_file import read_csv
+from overlapper.tables.table_file import read_csv
 
 CUBE = '''"""A cube on a plane."""
 import pybullet as p

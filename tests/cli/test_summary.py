@@ -7,8 +7,8 @@ from pathlib import Path
 from rich.console import Console
 
 from overlapper.cli.summary import overlaps_table, remarks
-from overlapper.scenes.summary import Disagreement, PairSummary, Summary
 from overlapper.simulation import Decomposed, Report, Skipped
+from overlapper.tables.summary import Disagreement, PairSummary, Summary
 
 
 def printed(table):

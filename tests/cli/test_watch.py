@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from overlapper.scenes.table_file import read_metadata, read_table
+from overlapper.tables.table_file import read_metadata, read_table
 
 SCENE = '''
 """Two cubes on a third."""

@@ -5,18 +5,18 @@ from dataclasses import replace
 
 import pytest
 
-from overlapper.scenes.comparison import compare_forces
-from overlapper.scenes.expected import FORCES as FORCE_BUDGETS
-from overlapper.scenes.expected import read_expected
-from overlapper.scenes.outputs import outputs
 from overlapper.scenes.record import record
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import SceneError, load_scene
-from overlapper.scenes.summary import Summary
-from overlapper.scenes.table import FORCES, link_rows, rows
-from overlapper.scenes.table_file import read_table
 from overlapper.scenes.verdict import examine
 from overlapper.simulation import link_contacts
+from overlapper.tables.outputs import outputs
+from overlapper.tables.summary import Summary
+from overlapper.tables.table import FORCES, link_rows, rows
+from overlapper.tables.table_file import read_table
+from overlapper.verdicts.comparison import compare_forces
+from overlapper.verdicts.expected import FORCES as FORCE_BUDGETS
+from overlapper.verdicts.expected import read_expected
 
 SCENE = '''"""A cube on a plane."""
 import pybullet as p

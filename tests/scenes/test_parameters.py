@@ -13,7 +13,7 @@ from overlapper.scenes.playback import play
 from overlapper.scenes.record import record
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import SceneError, load_scene
-from overlapper.scenes.table_file import read_metadata, read_table
+from overlapper.tables.table_file import read_metadata, read_table
 
 BALLS = '''
 """Two balls, so far apart."""

@@ -13,9 +13,9 @@ from simulated import box
 
 import overlapper
 from overlapper.scenes import watching
-from overlapper.scenes.table import rows
-from overlapper.scenes.table_file import read_metadata, read_table
 from overlapper.simulation import Bodies, Log, Recorder, VolumetricContact
+from overlapper.tables.table import rows
+from overlapper.tables.table_file import read_metadata, read_table
 
 
 @pytest.fixture(autouse=True)

@@ -9,8 +9,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from simulated import body, box, random_robot
 
-from overlapper.scenes.table import COLUMNS
 from overlapper.simulation import Bodies, SkippedShapeWarning, link_contacts
+from overlapper.tables.table import COLUMNS
 
 # --- overlaps
 

@@ -62,7 +62,7 @@ def sweep_of(grids, kept=0, steps=3):
 
 def swept(folder, grids, workers=2, kept=0, steps=3, limit=None, retry=False, engine=None):
     """What became of it in that folder."""
-    from overlapper.sweep.processes import Processes
+    from overlapper.jobs.processes import Processes
 
     sweep = sweep_of(grids, kept, steps)
     with sweep.opened(Path(folder)) as store:
@@ -92,7 +92,7 @@ def rows(folder, table="tasks"):
 def main(folder, address=None):
     engine = None
     if address:
-        from overlapper.sweep.cluster import Cluster
+        from overlapper.jobs.cluster import Cluster
 
         engine = Cluster(address)
         with closing(engine):

@@ -11,9 +11,9 @@ import pytest
 import ray_nodes
 from sweeping import begun, parts
 
-from overlapper.process import NotStarted
-from overlapper.sweep.cluster import LOSSES, Cluster
-from overlapper.sweep.hand import Done, Job
+from overlapper.jobs.cluster import LOSSES, Cluster
+from overlapper.jobs.hand import Done, Job
+from overlapper.jobs.worker import NotStarted
 
 
 @pytest.mark.usefixtures("balls")

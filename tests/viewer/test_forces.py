@@ -12,10 +12,10 @@ from pages import Film, looks, opened, panel, scene
 from PIL import Image
 
 from overlapper import Box, HalfSpace, Placed, overlap
-from overlapper.scenes.outputs import recorder
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import load_scene
 from overlapper.simulation import Bodies, Recorder, VolumetricContact
+from overlapper.tables.outputs import recorder
 from overlapper.viewer import Recording, picture
 from overlapper.viewer.look import BODIES, OVERLAPS
 from overlapper.viewer.pressure import Press, Scale, colors, deepest, depths, force_text, presses, pressures, usual

@@ -16,7 +16,7 @@ from overlapper.cli import view as cli
 from overlapper.scenes.playback import largest, play
 from overlapper.scenes.record import record
 from overlapper.scenes.scene import load_scene
-from overlapper.scenes.table_file import NEEDED
+from overlapper.tables.table_file import NEEDED
 from overlapper.viewer import picture
 from overlapper.viewer.look import Look
 

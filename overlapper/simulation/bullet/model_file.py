@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from overlapper.install import simulator_hint
-from overlapper.process import Ended, Worker
+from overlapper.jobs.worker import Ended, Worker
 
 ENDINGS = (".urdf", ".sdf", ".xml", ".bullet")
 

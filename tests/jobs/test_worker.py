@@ -12,9 +12,10 @@ import time
 import numpy as np
 import pytest
 
-from overlapper import Placed, Sphere, overlap, process
+from overlapper import Placed, Sphere, overlap
+from overlapper.jobs import worker
+from overlapper.jobs.worker import Ended, NotStarted, Worker
 from overlapper.polytopes import decomposition
-from overlapper.process import Ended, NotStarted, Worker
 from overlapper.reference import Fcl
 from overlapper.simulation.bullet.inventory import inventory
 from overlapper.simulation.bullet.model_file import NotRead
@@ -157,7 +158,7 @@ def test_whoever_needs_a_process_says_in_one_sentence_that_there_is_none(failing
 
 
 def test_fcl_that_cannot_be_started_is_an_error_of_one_sentence(monkeypatch):
-    monkeypatch.setattr(process, "START_LIMIT", 0.0)
+    monkeypatch.setattr(worker, "START_LIMIT", 0.0)
     cannot = r"^overlapper\.reference cannot start FCL: its process gave no answer within 0 s$"
     with Fcl() as fcl, pytest.raises(RuntimeError, match=cannot):
         fcl.compare(overlap(Sphere(1.0), Placed(Sphere(1.0), (1.5, 0, 0))))

@@ -15,11 +15,9 @@ from pathlib import Path
 
 from overlapper import Shape
 from overlapper.polytopes.shape_text import shape_of, text_of
-from overlapper.scenes.table import COLUMNS, Row, key
-from overlapper.scenes.table import FORCES as FORCE_COLUMNS
-from overlapper.scenes.table_file import CsvTable, csv_text, read_csv
-
-Key = tuple[int, int, int]  # (body, link, shape)
+from overlapper.tables.table import COLUMNS, Key, Row, key
+from overlapper.tables.table import FORCES as FORCE_COLUMNS
+from overlapper.tables.table_file import CsvTable, csv_text, read_csv
 
 # A shape that meets no other has a row with the status "alone", of which the columns of B and the measures are empty,
 # so that every shape of a step is placed, and a pair out of nothing is noticed.

@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, Literal
 
+from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker
 from overlapper.printable import first_line
-from overlapper.process import START_LIMIT, Ended, NotStarted, Worker
 
 DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
 
-from overlapper.scenes.outputs import StepTable
+from overlapper.tables.outputs import StepTable
 
 import pybullet  # isort: skip  # after what says what to install
 

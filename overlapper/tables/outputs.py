@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from overlapper import Overlaps
-from overlapper.scenes.summary import Summary
-from overlapper.scenes.table import COLUMNS, FORCES, Bodies, link_rows, rows
-from overlapper.scenes.table_file import TABLES, must_be_a_table, origin
 from overlapper.simulation.links import link_contacts
+from overlapper.tables.summary import Summary
+from overlapper.tables.table import COLUMNS, FORCES, Bodies, link_rows, rows
+from overlapper.tables.table_file import TABLES, must_be_a_table, origin
 from overlapper.whole_file import must_be_writable, unfinished
 
 if TYPE_CHECKING:
     from overlapper.reference import Comparison, Fcl
-    from overlapper.scenes.run import Frame
     from overlapper.simulation.contacts import Contacts
     from overlapper.simulation.forces.forces import Forces
+    from overlapper.tables.frame import Frame
     from overlapper.viewer.look import Look
 
 PICTURES_PER_SECOND = 30  # of simulated time: as smooth as a film, and a tenth of the size that every step would take

@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from overlapper import Batch, Placed, Shape
 from overlapper.polytopes.shape_text import shape_of, text_of
-from overlapper.scenes.comparison import poses
-from overlapper.scenes.expected import Key
-from overlapper.scenes.table import Row, key, placements, rows
 from overlapper.simulation.contacts import Contacts
+from overlapper.tables.table import Key, Row, key, placements, poses, rows
 
 if TYPE_CHECKING:
     from overlapper.simulation import Bodies, Forces

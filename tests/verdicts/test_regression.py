@@ -8,13 +8,13 @@ import pytest
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Sphere
 from overlapper.polytopes.shape_text import alike, shape_of, text_of
-from overlapper.scenes.comparison import compare_measures, compare_poses, loose_budgets
-from overlapper.scenes.expected import DRIFT, Budget, read_expected
 from overlapper.scenes.record import record, replay
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import SceneError, load_scene
-from overlapper.scenes.table import COLUMNS, POSE
 from overlapper.scenes.verdict import examine
+from overlapper.tables.table import COLUMNS, POSE
+from overlapper.verdicts.comparison import compare_measures, compare_poses, loose_budgets
+from overlapper.verdicts.expected import DRIFT, Budget, read_expected
 
 TWO_CUBES = '''
 """Two unit cubes, the second of which slides over the first by a centimetre a step."""

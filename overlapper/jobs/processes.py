@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from overlapper.process import NotStarted
-from overlapper.sweep.engines import Found
-from overlapper.sweep.hand import Done, Hand, Job, Outcome
-from overlapper.sweep.shares import Shares
+from overlapper.jobs.engines import Found
+from overlapper.jobs.hand import Done, Hand, Job, Outcome
+from overlapper.jobs.shares import Shares
+from overlapper.jobs.worker import NotStarted
 
 SHARE = 0.2  # s of work that are sent at once
 

@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.scenes.expected import FORCE_MEASURES, MEASURES, Budget, Key
-from overlapper.scenes.table import POSE, Row, Value, key
+from overlapper.tables.table import Row, Value, key, poses
+from overlapper.verdicts.expected import FORCE_MEASURES, MEASURES, Budget
 
 Names = Mapping[tuple[int, int], str]
 
@@ -161,16 +161,6 @@ def compare_poses(
                 was, now = (_numbers(each[k][part_of]) for each in (old, new))
                 moves.append(Move(step, who, f"{name}_{unit}", was, now, difference, budget.allowed(0.0), part))
     return Differences(moves, spent)
-
-
-def poses(rows: Sequence[Row]) -> dict[tuple[int, Key], NDArray[np.float64]]:
-    """Position and orientation (7,) of every shape, by step and (body, link, shape)."""
-    where = {}
-    for row in rows:
-        for side in "A" if row["status"] == "alone" else "AB":
-            body, link, shape = (int(row[f"{word}{side}"] or 0) for word in ("body", "link", "shape"))
-            where[_step(row), (body, link, shape)] = np.array([row[part.format(side)] for part in POSE], dtype=float)
-    return where
 
 
 def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

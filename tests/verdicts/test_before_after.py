@@ -16,11 +16,11 @@ from tornado.websocket import websocket_connect
 
 from overlapper import scenes
 from overlapper.scenes import before_after, check
-from overlapper.scenes.comparison import Move
-from overlapper.scenes.expected import read_expected
 from overlapper.scenes.record import record
 from overlapper.scenes.scene import load_scene
 from overlapper.scenes.verdict import examine
+from overlapper.verdicts.comparison import Move
+from overlapper.verdicts.expected import read_expected
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 

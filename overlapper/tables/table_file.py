@@ -24,7 +24,7 @@ from typing import Any, Protocol
 from overlapper import __version__
 from overlapper.install import hint
 from overlapper.printable import first_line, printable
-from overlapper.scenes.table import COLUMNS, FORCES, POSE, Row, Value
+from overlapper.tables.table import COLUMNS, FORCES, POSE, Row, Value
 from overlapper.whole_file import claim, settle
 
 __all__ = ["TABLES", "CsvTable", "ParquetTable", "SqliteTable", "Table", "read_csv", "read_metadata", "read_table"]

@@ -15,11 +15,11 @@ from mutation import mutated, said_by
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Sphere
 from overlapper.polytopes import shape_text
 from overlapper.polytopes.shape_text import shape_of, text_of
-from overlapper.scenes.comparison import compare_measures, compare_poses
-from overlapper.scenes.expected import DRIFT, ROUNDING, Expected, read_expected
-from overlapper.scenes.still import Still
-from overlapper.scenes.table import COLUMNS, POSE
-from overlapper.scenes.table_file import TABLES, read_metadata, read_table
+from overlapper.tables.still import Still
+from overlapper.tables.table import COLUMNS, POSE
+from overlapper.tables.table_file import TABLES, read_metadata, read_table
+from overlapper.verdicts.comparison import compare_measures, compare_poses
+from overlapper.verdicts.expected import DRIFT, ROUNDING, Expected, read_expected
 
 CORNERS = np.random.default_rng(0).normal(size=(12, 3))
 SHAPES = [Box([1, 2, 3]), Sphere(1), Capsule(1, 2), Cylinder(1, 2), HalfSpace([0, 0, 1], 0), Hull(CORNERS)]

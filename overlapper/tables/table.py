@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 Value = int | float | str | None
 Row = dict[str, Value]
+Key = tuple[int, int, int]  # (body, link, shape)
 
 POSE = [f"position{{}}_{axis}_m" for axis in "xyz"] + [f"orientation{{}}_{part}" for part in "xyzw"]
 # Every column of a run, in order, with its type; the unit is in the name. `link` is -1 for the base, `shape` counts the
@@ -58,6 +59,18 @@ class Bodies(Protocol):
 def key(row: Row) -> tuple[Value, ...]:
     """(bodyA, linkA, shapeA, bodyB, linkB, shapeB); None for a missing B."""
     return tuple(row.get(f"{word}{side}") for side in "AB" for word in ("body", "link", "shape"))
+
+
+def poses(rows: Sequence[Row]) -> dict[tuple[int, Key], NDArray[np.float64]]:
+    """Position and orientation (7,) of every shape, by step and (body, link, shape)."""
+    where = {}
+    for row in rows:
+        for side in "A" if row["status"] == "alone" else "AB":
+            body, link, shape = (int(row[f"{word}{side}"] or 0) for word in ("body", "link", "shape"))
+            where[int(row["step"] or 0), (body, link, shape)] = np.array(
+                [row[part.format(side)] for part in POSE], dtype=float
+            )
+    return where
 
 
 def placements(bodies: Bodies, side: str) -> dict[tuple[int, int, int], Row]:

@@ -15,9 +15,9 @@ import pyarrow.parquet
 import pytest
 
 from overlapper import Box, Placed, overlap
-from overlapper.scenes.table import COLUMNS, rows
-from overlapper.scenes.table_file import NEEDED, TABLES, CsvTable, ParquetTable, read_csv, read_metadata, read_table
 from overlapper.simulation.contacts import Contact
+from overlapper.tables.table import COLUMNS, rows
+from overlapper.tables.table_file import NEEDED, TABLES, CsvTable, ParquetTable, read_csv, read_metadata, read_table
 from overlapper.whole_file import must_be_writable
 
 ENDINGS = sorted(TABLES)
@@ -97,7 +97,7 @@ import sys
 from itertools import count
 from contextlib import closing
 from pathlib import Path
-from overlapper.scenes.table_file import TABLES
+from overlapper.tables.table_file import TABLES
 
 path = Path(sys.argv[1])
 table = TABLES[path.suffix](path, {})

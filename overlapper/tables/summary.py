@@ -13,8 +13,8 @@ from overlapper.simulation.links import LinkContact, link_contacts
 
 if TYPE_CHECKING:
     from overlapper.reference import Comparison
-    from overlapper.scenes.run import Frame
     from overlapper.simulation import Bodies, Decomposed, Report, Skipped
+    from overlapper.tables.frame import Frame
 
 
 @dataclass(slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from typing import Any, Protocol
 
-from overlapper.sweep.hand import Job, Outcome
+from overlapper.jobs.hand import Job, Outcome
 
 Found = Generator[tuple[int, Outcome], None, None]
 

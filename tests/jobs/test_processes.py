@@ -8,11 +8,11 @@ from contextlib import closing
 import psutil
 import pytest
 
-from overlapper import process
-from overlapper.process import NotStarted
-from overlapper.sweep.hand import Done, Failed, Hand, Job
-from overlapper.sweep.processes import Processes, cores
-from overlapper.sweep.shares import Shares
+from overlapper.jobs import worker
+from overlapper.jobs.hand import Done, Failed, Hand, Job
+from overlapper.jobs.processes import Processes, cores
+from overlapper.jobs.shares import Shares
+from overlapper.jobs.worker import NotStarted
 
 
 def job(setup="x"):
@@ -81,7 +81,7 @@ def test_a_process_that_cannot_be_started_is_refused(monkeypatch):
     def lacking(*_, **__):
         raise OSError(12, "Cannot allocate memory")
 
-    monkeypatch.setattr(process.subprocess, "Popen", lacking)
+    monkeypatch.setattr(worker.subprocess, "Popen", lacking)
     words = r"^a worker process could not be started \(.*Cannot allocate memory\)$"
     with pytest.raises(NotStarted, match=words):
         [*Processes(2).outcomes(job(), [("give", 1)])]

@@ -20,16 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Batch, Hull, Overlaps, Placed
+from overlapper.audit.allowed import is_allowed, must_name_some
 from overlapper.columns import MEASURES
 from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, Surface, decompose
 from overlapper.polytopes.mesh_file import ASSEMBLIES, BODIES, Part, read_parts
 from overlapper.polytopes.mesh_overlap import mesh_overlap, window
 from overlapper.printable import first_line
-from overlapper.scenes.allowed import is_allowed, must_name_some
-from overlapper.scenes.still import Still
-from overlapper.scenes.table import Row
-from overlapper.scenes.table_file import TABLES, origin
 from overlapper.simulation.links import LinkContact, link_contacts
+from overlapper.tables.still import Still
+from overlapper.tables.table import Row
+from overlapper.tables.table_file import TABLES, origin
 from overlapper.union import union_volume
 
 Array = NDArray[np.float64]

@@ -56,7 +56,7 @@ class Worker:
 
     def __init__(self, answers: Callable[[Any], Iterator[Any]], cause: str = UNCAUGHT) -> None:
         where = f"{answers.__module__!r}, {answers.__name__!r}"
-        program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.process import serve; serve({where})"
+        program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.jobs.worker import serve; serve({where})"
         self._cause = cause
         self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
         with contextlib.ExitStack() as started:

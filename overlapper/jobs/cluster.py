@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from overlapper.install import hint
+from overlapper.jobs.engines import Found
+from overlapper.jobs.hand import Done, Hand, Job, Outcome
+from overlapper.jobs.shares import Shares
+from overlapper.jobs.worker import NotStarted
 from overlapper.printable import first_line
-from overlapper.process import NotStarted
-from overlapper.sweep.engines import Found
-from overlapper.sweep.hand import Done, Hand, Job, Outcome
-from overlapper.sweep.shares import Shares
 
 SHARE = 1.0  # s of work that are sent at once: a task of Ray costs some milliseconds
 

@@ -13,9 +13,9 @@ from simulated import body, box
 
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import load_scene
-from overlapper.scenes.table import link_rows, rows
-from overlapper.scenes.table_file import read_metadata, read_table
 from overlapper.simulation import Bodies, Log, VolumetricContact, link_contacts
+from overlapper.tables.table import link_rows, rows
+from overlapper.tables.table_file import read_metadata, read_table
 
 ENDINGS = ["csv", "parquet", "sqlite"]
 

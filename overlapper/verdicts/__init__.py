@@ -1,0 +1,1 @@
+"""Tables of the same scene compared: what was recorded, how far it may be off, and what has moved."""
