@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "geometry/scratch.h"
+#include "methods/round/quadric/segment.h"
 
 namespace overlapper::quadric {
 namespace {
@@ -21,74 +22,38 @@ constexpr double kGrazing = 1e-6;        ///< the square of the sine between a f
 constexpr double kBeyond = 1e-12;        ///< of how far numbers reach: a plane is out of reach
 constexpr double kOpen = 1e-9;           ///< of what sums to zero, without a wrong turn
 
-/// Functions of half an arc's angle x that closed forms leave to rounding where it is small.
+/// Functions of an arc's half angle x, as in SegmentSeries. All are odd.
 struct Arc {
-  double segment;  ///< x − sin x cos x: the area of a unit disc's segment
-  double across;   ///< ⅔ sin³ x − cos x times that: its first moment about the middle of its chord
-  double bulge;    ///< sin x − x cos x: ½ ∫ (cos t − cos x) dt from −x to x
-  double square;   ///< ∫ (cos t − cos x)² dt
+  double segment, across, bulge, bulge_square;
 };
 
-/// Integrals over a unit disc's segment, of a across its chord, towards the arc, and b along, about the chord's middle.
-struct Second {
-  double aa, bb, aaa, abb;
-};
-
-struct ArcSeries {
-  static constexpr int kTerms = 12;
-  std::array<Arc, kTerms> term{};
-  std::array<Second, kTerms> second{};
-
-  constexpr ArcSeries() {
-    double factorial = 1, two = 2, three = 3, four = 4, five = 5, sign = 1;  // of and to the power of n
-    for (int k = 1; k <= kTerms; ++k) {
-      const double n = 2.0 * k + 1;
-      factorial *= (n - 1) * n;
-      two *= 4, three *= 9, four *= 16, five *= 25, sign = -sign;
-      term[k - 1] = {-sign * two / 2 / factorial, sign * (9 + three - 12 * n) / (12 * factorial),
-                     -sign * 2 * k / factorial, sign * two * (k - 1) / factorial};
-      second[k - 1] = {sign * (12 * n * two - 28 * two - four) / (48 * factorial),
-                       sign * (four - 8 * two) / (48 * factorial),
-                       sign * (300 + 175 * three + 3 * five - n * (720 + 40 * three)) / (480 * factorial),
-                       sign * (80 + 15 * three - five - 120 * n) / (480 * factorial)};
-    }
-  }
-};
-
-constexpr ArcSeries kSeries;
-
-/// Of half an arc's angle, its sine and its cosine.
+/// Of an arc's half angle, the sine and the cosine of that.
 Arc arc(double x, double s, double c) {
-  if (std::abs(x) < 0.4) {
+  if (std::abs(x) < kNarrow) {
     const double square = x * x, cube = square * x;
-    Arc sum{};
-    for (int k = ArcSeries::kTerms - 1; k >= 0; --k) {
-      const Arc& term = kSeries.term[k];
-      sum = {sum.segment * square + term.segment, sum.across * square + term.across, sum.bulge * square + term.bulge,
-             sum.square * square + term.square};
-    }
-    return {cube * sum.segment, cube * sum.across, cube * sum.bulge, cube * sum.square};
+    const SegmentSeries& of = kSegmentSeries;
+    return {cube * series(of.area, square), cube * series(of.first_across, square), cube * series(of.bulge, square),
+            cube * series(of.bulge_square, square)};
   }
   const double segment = x - s * c;
+  // ⅔ s first: segment() in segment.h multiplies in another order.
   return {segment, 2.0 / 3 * s * s * s - c * segment, s - x * c, 2 * x * c * c + x - 3 * s * c};
 }
 
-Second second(double x, double s, double c) {
-  if (x < 0.4) {
+/// ∫ a³ dA and ∫ a b² dA over the segment of a unit disc, as in SegmentSeries.
+struct ThirdMoments {
+  double across, across_along;
+};
+
+ThirdMoments third_moments(double x, double s, double c, double along) {
+  if (x < kNarrow) {
     const double square = x * x, cube = square * x;
-    Second sum{};
-    for (int k = ArcSeries::kTerms - 1; k >= 0; --k) {
-      const Second& term = kSeries.second[k];
-      sum = {sum.aa * square + term.aa, sum.bb * square + term.bb, sum.aaa * square + term.aaa,
-             sum.abb * square + term.abb};
-    }
-    return {cube * sum.aa, cube * sum.bb, cube * sum.aaa, cube * sum.abb};
+    return {cube * series(kSegmentSeries.third_across, square), cube * series(kSegmentSeries.across_along, square)};
   }
   // About the middle of the disc, then about the chord's.
   const double s2 = s * s, s3 = s2 * s, s5 = s3 * s2;
   const double one = x - s * c, to1 = 2.0 / 3 * s3, to2 = one / 4 + s3 * c / 2, to3 = 2 * (s3 / 3 - s5 / 5);
-  const double bb = one / 4 - s3 * c / 6;
-  return {to2 - 2 * c * to1 + c * c * one, bb, to3 - c * (3 * to2 - c * (3 * to1 - c * one)), 2.0 / 15 * s5 - c * bb};
+  return {to3 - c * (3 * to2 - c * (3 * to1 - c * one)), 2.0 / 15 * s5 - c * along};
 }
 
 /// The part of an edge inside the cylinder.
@@ -303,7 +268,7 @@ class Measuring {
     const double steep = radius_ / n.z, fall = steep * dot2(n, w);
     levels_ -= 2 * fall * of.bulge;
     sizes_ += radius_ * radius_ * std::abs(2 * fall * of.bulge);
-    squares_ += -4 * mean * fall * of.bulge + fall * fall * of.square;
+    squares_ += -4 * mean * fall * of.bulge + fall * fall * of.bulge_square;
     const double slope = steep * (n.y * w.x - n.x * w.y);
     if (std::abs(x) < 1e-4) squares_ += rise * rise * x / 6;
     else if (std::abs(x) < 1.5) squares_ += rise * rise / 4 * of.segment / (s * s);
@@ -315,19 +280,20 @@ class Measuring {
     const Vec3 middle{(p.x + q.x) / 2, (p.y + q.y) / 2, mean};
     const Vec3 out{w.x, w.y, -dot2(n, w) / n.z};
     section.first += area * middle + beyond * out;
-    add_segment(middle, radius_ * out, {-radius_ * w.y, radius_ * w.x, -slope}, std::abs(x), std::abs(s), c,
+    add_segment(middle, radius_ * out, {-radius_ * w.y, radius_ * w.x, -slope}, of, std::abs(x), std::abs(s), c,
                 radius_ * radius_ / std::abs(n.z), section);
     return true;
   }
 
   /// The segment of a unit disc of which that is half the angle, as it lies in the face, `scale` times as large: about
   /// the middle of its chord, across that towards the arc, and along it.
-  void add_segment(Vec3 middle, Vec3 across, Vec3 along, double half, double s, double c, double scale,
+  void add_segment(Vec3 middle, Vec3 across, Vec3 along, const Arc& of, double half, double s, double c, double scale,
                    Sum& section) const {
-    const Arc of = arc(half, s, c);
-    const double one = scale * of.segment, a = scale * of.across;
-    const Second two = second(half, s, c);
-    const double aa = scale * two.aa, bb = scale * two.bb, aaa = scale * two.aaa, abb = scale * two.abb;
+    const double one = scale * std::abs(of.segment), a = scale * std::abs(of.across);
+    const Segment two = segment(half, s, c);
+    const ThirdMoments three = third_moments(half, s, c, two.second_along);
+    const double aa = scale * two.second_across, bb = scale * two.second_along;
+    const double aaa = scale * three.across, abb = scale * three.across_along;
     const auto product = [&](double p, double q, double p_across, double q_across, double p_along, double q_along) {
       return one * p * q + a * (p * q_across + q * p_across) + aa * p_across * q_across + bb * p_along * q_along;
     };

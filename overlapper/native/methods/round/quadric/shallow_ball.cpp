@@ -75,7 +75,7 @@ void ShallowBall::add_arc(Vec3 from, Vec3 to, Vec3 back) {
   const double angle = std::atan2(half, to_chord);
   const double sine = half / disc_radius_, cosine = to_chord / disc_radius_;
   add_chord(from, to);
-  const slicing::Segment part_of = segment(angle, sine, cosine);
+  const Segment part_of = segment(angle, sine, cosine);
   const double square = disc_radius_ * disc_radius_, area = square * part_of.area;
   const double first = square * part_of.first_across;
   const Vec3 outwards = disc_radius_ * out, onwards = disc_radius_ * along;

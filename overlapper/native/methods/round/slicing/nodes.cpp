@@ -6,7 +6,7 @@
 #include <numbers>
 #include <utility>
 
-#include "methods/round/quadric/segment_series.h"
+#include "methods/round/quadric/segment.h"
 
 namespace overlapper::slicing {
 namespace {
@@ -19,6 +19,36 @@ double sum(const Row& row) { return ((row[0] + row[1]) + (row[2] + row[3])) + ((
 
 /// Of the radius: the direction of a shorter chord is mostly what rounding has made of its ends.
 constexpr double kShort = 1e-6;
+
+/// quadric::Segment of each slice.
+struct Segments {
+  Row area, first_across, second_across, second_along;
+};
+
+template <size_t kTerms>
+void narrow_segments(const Row& angle, Segments& result) {
+  const quadric::SegmentSeries& of = quadric::kSegmentSeries;
+  for (int k = 0; k < kRow; ++k) {
+    const double square = angle[k] * angle[k], cube = square * angle[k];
+    result.area[k] = cube * quadric::series<kTerms>(of.area, square);
+    result.first_across[k] = cube * quadric::series<kTerms>(of.first_across, square);
+    result.second_across[k] = cube * quadric::series<kTerms>(of.second_across, square);
+    result.second_along[k] = cube * quadric::series<kTerms>(of.second_along, square);
+  }
+}
+
+/// Sets the segments that are not narrow. Sums are in another order than in quadric::segment().
+void wide_segments(const Row& angle, const Row& sine, const Row& cosine, Segments& result) {
+  for (int k = 0; k < kRow; ++k) {
+    const double s = sine[k], c = cosine[k], cube = s * s * s, area = angle[k] - s * c;
+    const bool wide = angle[k] >= quadric::kNarrow;
+    result.area[k] = wide ? area : result.area[k];
+    result.first_across[k] = wide ? 2.0 / 3 * cube - c * area : result.first_across[k];
+    result.second_across[k] =
+        wide ? (area + 2 * cube * c) / 4 - 4.0 / 3 * c * cube + c * c * area : result.second_across[k];
+    result.second_along[k] = wide ? (3 * area - 2 * cube * c) / 12 : result.second_along[k];
+  }
+}
 
 /// Slices of one outline, a row of them after the other.
 class Bundle {
@@ -257,29 +287,17 @@ class Bundle {
       const double far = std::copysign(norm(away), distance[k]);
       if (far != 0) ax[k] = away.x / far, ay[k] = away.y / far;
     }
-    Row segment_area{}, first_across{}, second_across{}, second_along{};
-    if (least < kNarrow)
-      for (int k = 0; k < kRow; ++k) {
-        const double a = angle[k], cube = a * a * a;
-        const Segment narrow = most < 0.1 ? series(a * a, std::make_index_sequence<8>{})
-                                          : series(a * a, std::make_index_sequence<SegmentSeries::kTerms>{});
-        segment_area[k] = cube * narrow.area, first_across[k] = cube * narrow.first_across;
-        second_across[k] = cube * narrow.second_across, second_along[k] = cube * narrow.second_along;
-      }
-    if (most >= kNarrow) {
-      for (int k = 0; k < kRow; ++k) {
-        const double s = sine[k], c = cosine[k], cube = s * s * s, area = angle[k] - s * c;
-        const bool wide = angle[k] >= kNarrow;
-        segment_area[k] = wide ? area : segment_area[k];
-        first_across[k] = wide ? 2.0 / 3 * cube - c * area : first_across[k];
-        second_across[k] = wide ? (area + 2 * cube * c) / 4 - 4.0 / 3 * c * cube + c * c * area : second_across[k];
-        second_along[k] = wide ? (3 * area - 2 * cube * c) / 12 : second_along[k];
-      }
+    Segments segments{};
+    if (least < quadric::kNarrow) {
+      if (most < 0.1) narrow_segments<8>(angle, segments);
+      else narrow_segments<quadric::SegmentSeries::kTerms>(angle, segments);
     }
+    if (most >= quadric::kNarrow) wide_segments(angle, sine, cosine, segments);
     Row strip, blur, px, py, up, t_up, size;
     for (int k = 0; k < kRow; ++k) {
-      const double r = radius[k], r2 = r * r, w = segment_area[k] * r2, f = first_across[k] * r2 * r;
-      const double a = second_across[k] * r2 * r2, b = second_along[k] * r2 * r2, x = ax[k], y = ay[k];
+      const double r = radius[k], r2 = r * r, w = segments.area[k] * r2, f = segments.first_across[k] * r2 * r;
+      const double a = segments.second_across[k] * r2 * r2, b = segments.second_along[k] * r2 * r2, x = ax[k],
+                   y = ay[k];
       const double mx = 0.5 * (p.x[k] + q.x[k]), my = 0.5 * (p.y[k] + q.y[k]), t = t_[k];
       area_[k] += w;
       x_[k] += w * mx + f * x;
@@ -313,19 +331,6 @@ class Bundle {
       surface_[k] += strip, surface += counts_[k] * strip;
     }
     return surface;
-  }
-
-  /// The polynomials of the first terms.
-  template <size_t... Index>
-  static Segment series(double square, std::index_sequence<Index...>) {
-    static constexpr SegmentSeries kSeries;
-    constexpr size_t kLast = sizeof...(Index) - 1;
-    Segment sum{};
-    ((sum.area = sum.area * square + kSeries.term[kLast - Index].area), ...);
-    ((sum.first_across = sum.first_across * square + kSeries.term[kLast - Index].first_across), ...);
-    ((sum.second_across = sum.second_across * square + kSeries.term[kLast - Index].second_across), ...);
-    ((sum.second_along = sum.second_along * square + kSeries.term[kLast - Index].second_along), ...);
-    return sum;
   }
 
   /// Of the disc's centre, positive where a line leaves nearly all of the disc.
