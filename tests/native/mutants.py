@@ -1,11 +1,12 @@
 """Which small faults of the core its tests notice: `make mutants`.
 
 A mutant is the core with one operator or constant changed: + for -, < for <=, && for ||, min for max, no ! and so on.
-Some are drawn by a seed, built all at once in a copy of the tree under build/mutants, each behind its number, and shown
-to the tests of the core one by one: first to the recorded answers, which notice most within a second or two, then to
-the others. A mutant that no test notices either changes nothing that can be seen, and is then named in EQUIVALENT with
-the reason, or a test is missing. Results are in build/mutants, and what is there is not shown again; `--again` shows
-what survived.
+A seed draws some of them. They are built all at once in a copy of the tree under build/mutants, each behind its number,
+and shown to the tests of the core one by one. The recorded answers come first, as they notice most mutants within a
+second or two; the tests of the mutant's folder follow, and then all tests of the core. Mutants of forces/ are shown to
+the tests of forces alone, as no other native test reaches them. A mutant that no test notices is either equivalent, and
+then named in EQUIVALENT with the reason, or a test is missing. Results are kept in build/mutants and not asked for
+again; `--again` shows the survivors once more.
 """
 
 from __future__ import annotations
@@ -51,6 +52,7 @@ NOT_RUN = re.compile(r"^\s*(#|assert\(|static_assert|throw |using |template|///|
 LEFT_OUT = ("test_stub.py", "test_out_of_memory.py", "test_mutants.py")
 NOT_ASKED = "not memory and not ctrl_c and not spawn and not process"
 QUICK = "tests/native/test_recorded_answers.py"
+OF_FORCES = ["tests/native/forces", "tests/native/python/test_contact_solver.py"]
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,16 @@ class Mutant:
     @property
     def after(self) -> str:
         return self.before[: self.start] + self.new + self.before[self.end :]
+
+    @property
+    def tests(self) -> list[list[str]]:
+        """The tests that may notice it, in stages: tests mirror the folders of the core."""
+        folder = self.file.split("/")[0]
+        if folder == "forces":
+            return [OF_FORCES]
+        own = f"tests/native/{folder}"
+        stages = [[QUICK], [own], ["tests/native", f"--ignore={QUICK}", f"--ignore={own}"]]
+        return [stage for stage in stages if (ROOT / stage[0]).exists()]
 
     @property
     def name(self) -> tuple[str, str, str]:
@@ -247,14 +259,15 @@ class Bench:
                     shutil.copy2(ROOT / "overlapper" / "native" / file, self.native / file)
         for module in self.build.glob("_core*.so"):
             shutil.copyfile(module, self.tree / "overlapper" / module.name)
-        if failed := self.tests(0, quick=True, seconds=600):
-            raise SystemExit(f"without a mutant: {failed}")
+        for tests in ([QUICK], OF_FORCES):
+            if failed := self.complaint(0, tests, seconds=600):
+                raise SystemExit(f"without a mutant: {failed}")
 
-    def tests(self, number: int, quick: bool, seconds: float) -> str:
-        """Nothing if all pass, or what noticed."""
-        which = [QUICK] if quick else ["tests/native", f"--ignore={QUICK}", "-k", NOT_ASKED]
+    def complaint(self, number: int, tests: list[str], seconds: float) -> str:
+        """The test that fails with the mutant of that number, or nothing if all pass."""
         left_out = [f"--ignore-glob=*/{name}" for name in LEFT_OUT]
-        command = [str(self.python), "-m", "pytest", "-q", "-x", "--tb=no", "-p", "no:cacheprovider", *which, *left_out]
+        command = [str(self.python), "-m", "pytest", "-q", "-x", "--tb=no", "-p", "no:cacheprovider"]
+        command += [*tests, "-k", NOT_ASKED, *left_out]
         try:
             done = run(command, self.tree, seconds, check=False, mutant=number)
         except subprocess.TimeoutExpired:
@@ -267,7 +280,10 @@ class Bench:
         return f"the process ended by {done.returncode}" if done.returncode < 0 else done.stdout[-300:].strip()
 
     def noticed(self, number: int) -> str:
-        return self.tests(number, quick=True, seconds=90) or self.tests(number, quick=False, seconds=900)
+        first, *others = self.mutants[number].tests
+        return self.complaint(number, first, seconds=90) or next(
+            filter(None, (self.complaint(number, tests, seconds=900) for tests in others)), ""
+        )
 
 
 def run(command, folder, seconds=None, check=True, mutant=None):
@@ -296,6 +312,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int, default=200, help="mutants drawn that are not known as equivalent")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="mutants shown to the tests at once")
+    parser.add_argument("--under", default="", help="the folder or file that mutants are drawn from, as in forces/")
     parser.add_argument("--again", action="store_true", help="show those once more that survived")
     chosen = parser.parse_args()
 
@@ -304,7 +321,7 @@ def main() -> None:
     if gone := equivalent.keys() - {mutant.name for mutant in everything}:
         raise SystemExit(f"{EQUIVALENT.name} names what is not in the source: {sorted(gone)}")
     drawn = random.Random(chosen.seed).sample(everything, len(everything))
-    asked = [mutant for mutant in drawn if mutant.name not in equivalent]
+    asked = [mutant for mutant in drawn if mutant.name not in equivalent and mutant.file.startswith(chosen.under)]
     bench = Bench(WORK, dict(enumerate(asked[: chosen.count], 1)))
     print(f"{len(bench.mutants)} of {chosen.count} mutants compile", flush=True)
 

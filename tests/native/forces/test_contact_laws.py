@@ -1,0 +1,246 @@
+"""The contact solver keeps the laws of mechanics, as tests/support/mechanics.py states them by another route."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mechanics import PRISMATIC, REVOLUTE, SPHERICAL, Link, Links, Scene, broken_laws
+from scipy.spatial.transform import Rotation
+from strategies import directions, quaternion
+
+from overlapper import Box, Capsule, HalfSpace, Placed, Sphere, overlap
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+FLOOR = HalfSpace([0, 0, 1], 0)
+HALF = 0.05
+
+
+def bodies(rng):
+    """A floor, a free body, a branched free body, a held arm and a held pair, at random poses."""
+
+    def jointed(parent, joint):
+        return replace(single(), parent=parent, joint=joint, axis=directions(rng, 1)[0], pivot=rng.normal(size=3) * 0.1)
+
+    def single():
+        return Link(mass=rng.uniform(0.3, 2), inertia=rng.uniform(0.5, 2, 3) * 1e-2)
+
+    held = Link(mass=0)
+    links = [
+        *(held, single()),
+        *(single(), jointed(2, REVOLUTE), jointed(3, PRISMATIC), jointed(2, SPHERICAL), jointed(5, 0)),
+        *(held, jointed(7, REVOLUTE), jointed(8, SPHERICAL), jointed(8, PRISMATIC)),
+        *(held, jointed(11, 0)),
+    ]
+    count = len(links)
+    return Links(links, rng.normal(size=(count, 3)) * 0.12, np.array([quaternion(rng) for _ in range(count)]))
+
+
+def scene(seed, **given):
+    """Shallow overlaps of the shapes of all these links, two pairs that are apart, and one body on the floor."""
+    rng = np.random.default_rng(seed)
+    links = bodies(rng)
+    sizes = rng.uniform(0.06, 0.12, (len(links.links), 3))
+    kinds = [Box, Box, lambda size: Sphere(size[0]), lambda size: Capsule(size[0] / 2, size[1])]
+    shapes = [
+        Placed(kinds[rng.integers(4)](size), at + rng.normal(size=3) * 0.02, quaternion(rng))
+        for size, at in zip(sizes, links.positions)
+    ]
+    shapes[0] = Placed(HalfSpace([0, 0, 1], shapes[1].bounds[0, 2] + 0.01))
+    pairs = [(a, b) for a in range(1, len(shapes)) for b in range(a + 1, len(shapes))]
+    pairs = [pairs[i] if rng.integers(2) else pairs[i][::-1] for i in rng.permutation(len(pairs))]
+    found = {pair: overlap(shapes[pair[0]], shapes[pair[1]]) for pair in pairs}
+    shallow = [pair for pair in pairs if found[pair] and found[pair].depth < 0.03][:7]
+    apart = [pair for pair in pairs if not found[pair]][:2]
+    drawn = {
+        "stiffness": 10 ** rng.uniform(4, 7),
+        "dissipation": rng.choice([0.0, 2e-3]),
+        "friction": rng.choice([0.0, 0.1, 0.5, 2.0]),
+        "damped": bool(rng.integers(2)),
+        "velocity": rng.normal(size=len(links.coordinates)) * 0.3,
+        "acceleration": rng.normal(size=len(links.coordinates)) * 3,
+    }
+    return Scene(links, shapes, range(len(shapes)), [(1, 0), *shallow, *apart], **(drawn | given))
+
+
+# Laws in scenes at random
+
+
+@pytest.mark.parametrize("seed", range(32))
+def test_forces_between_bodies_of_any_links_keep_the_laws(seed):
+    assert broken_laws(scene(seed, rounds=40).solve(), 1e-8) == []
+
+
+@pytest.mark.parametrize("seed", range(32))
+def test_friction_at_points_keeps_the_laws(seed):
+    """Every solution begins with points that share the known force evenly, so that sweeps leave more."""
+    assert broken_laws(scene(seed, distributed=True, rounds=40).solve(), 1e-4) == []
+
+
+def test_a_solution_with_a_fault_breaks_the_law_about_it():
+    found = scene(7, rounds=40).solve()
+    for name, law in (
+        ("force", "forces on links"),
+        ("slip", "slip"),
+        ("acceleration", "acceleration"),
+        ("on_links", "forces on links"),
+    ):
+        faulty = replace(found, **{name: getattr(found, name) * (1 + 1e-6)})
+        assert any(complaint.startswith(law) for complaint in broken_laws(faulty, 1e-8)), name
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_links_go_on_by_the_velocity_of_their_coordinates(seed):
+    drawn = scene(seed)
+    links, h = drawn.links, 0.3
+    on = np.array(drawn.on)
+    given = [each.position for each in drawn.shapes], [each.given_orientation for each in drawn.shapes]
+    positions, orientations = drawn.solver.ahead(h, drawn.velocity, on, *given)
+    for i, link in enumerate(on):
+        twist = links.jacobian(link, links.positions[link]) @ drawn.velocity
+        turn = Rotation.from_rotvec(h * twist[3:])
+        arm = drawn.shapes[i].position - links.positions[link]
+        assert positions[i] == pytest.approx(links.positions[link] + h * twist[:3] + turn.apply(arm), abs=1e-9)
+        off = Rotation.from_quat(orientations[i]) * (turn * Rotation.from_quat(given[1][i])).inv()
+        assert off.magnitude() < 1e-9
+
+
+# Masses
+
+
+def cube_on(links, position=(0, 0, HALF - 1e-3), **given):
+    """The last link carries a cube, and the first one a floor, into which the cube has sunk by 1 mm."""
+    shapes = [Placed(FLOOR), Placed(Box([HALF] * 3), position)]
+    return Scene(links, shapes, [0, len(links.links) - 1], [(1, 0)], **given)
+
+
+def at_rest(*links, positions=None):
+    count = len(links)
+    return Links(
+        links, np.zeros((count, 3)) if positions is None else np.array(positions), np.tile(UPRIGHT, (count, 1))
+    )
+
+
+def test_a_joint_that_moves_no_mass_stands_still():
+    links = at_rest(
+        Link(mass=0),
+        Link(mass=1),
+        Link(1, REVOLUTE, (0, 1, 0), (0.1, 0, 0), mass=0),
+        Link(1, PRISMATIC, (0, 0, 1), mass=1, inertia=(1, 2, 3)),
+        positions=[(0, 0, 0), (0.1, 0, 0), (0.3, 0, 0), (0, 0.1, 0.2)],
+    )
+    found = cube_on(links, velocity=np.arange(14) / 100).solve()
+    assert broken_laws(found) == []
+    assert found.acceleration[12] == 0 and found.acceleration[13] != 0
+
+
+def test_a_base_without_mass_moves_only_its_joints():
+    links = at_rest(Link(mass=0), Link(mass=0), Link(1, SPHERICAL, pivot=(0.2, 0.1, 0), inertia=(1, 2, 3)))
+    found = cube_on(links, velocity=np.arange(15) / 100).solve()
+    assert broken_laws(found) == []
+    assert not found.acceleration[6:12].any() and found.acceleration[12:].all()
+
+
+def test_a_body_without_moments_of_inertia_does_not_turn():
+    found = cube_on(at_rest(Link(mass=0), Link(inertia=(0, 0, 0))), acceleration=[0] * 6 + [1, 2, 3, 0, 0, 0]).solve()
+    assert found.acceleration[8] > 0 and not found.acceleration[9:].any()
+
+
+def test_held_bodies_are_pressed_and_do_not_move():
+    found = cube_on(at_rest(Link(mass=0), Link(mass=0)), friction=0.5, velocity=np.arange(12) / 10).solve()
+    assert broken_laws(found) == []
+    assert found.force[0, 2] > 0 and not found.acceleration.any() and found.scene.frequency2 == [0]
+    assert np.linalg.norm(found.force[0, :2]) == pytest.approx(
+        0.5 * found.force[0, 2] / np.hypot(1, distance_share(found))
+    )
+
+
+def distance_share(found):
+    """What spin is of what slips, by its mean distance."""
+    (patch,) = found.scene.patches()
+    rows = found.scene.jacobian((1, 0), patch.found.centroid)
+    slip = rows @ found.velocity
+    return patch.found.patch_distance * slip[5] / np.hypot(slip[0], slip[1])
+
+
+def test_frequencies_of_a_cube_that_swings_alike_in_all_ways():
+    """k A / m, if the moments of inertia are m times the squares of the patch's radii of gyration."""
+    square = HALF**2 / 3
+    drawn = cube_on(
+        at_rest(Link(mass=0), Link(mass=2, inertia=[2 * square] * 3), positions=[(0, 0, 0), (0, 0, HALF / 2)])
+    )
+    assert drawn.frequency2 == pytest.approx([drawn.stiffness * 4 * HALF**2 / 2], rel=1e-12)
+
+
+# Shapes of patches
+
+
+def test_pressure_on_a_blade_has_no_torque_about_the_blade():
+    """Its centre stays on a line, which has one radius of gyration alone."""
+    blade = [Placed(FLOOR), Placed(Box([HALF, 1e-8, HALF]), (0, 0, HALF - 1e-3))]
+    links = at_rest(Link(mass=0), Link(inertia=[1e-3] * 3))
+    velocity = np.zeros(12)
+    velocity[9:11] = 3, 30
+    found = Scene(links, blade, [0, 1], [(1, 0)], stiffness=1e12, velocity=velocity, friction=0).solve()
+    force, (about_blade, across, _) = found.force[0, 2], found.torque[0]
+    assert force > 0 and abs(about_blade) < 1e-5 * HALF * force
+    assert 0.1 * HALF * force < abs(across) <= (1 + 1e-9) * HALF * force
+
+
+def test_what_is_inside_another_body_is_pushed_where_it_was_pushed_last():
+    """Nothing says where out is; its force does not depend on how it moves, and has no torque."""
+    inside, leaving = (Placed(Sphere(0.02), (x, 0.01, 0)) for x in (0, 0.1))
+    links = at_rest(Link(mass=0), Link(), Link())
+    velocity = np.arange(18) / 30
+    given = {"on": [1, 2], "pairs": [(0, 1)], "velocity": velocity, "friction": 0.5, "dissipation": 0.0}
+    drawn = Scene(links, [Placed(Box([0.1] * 3)), leaving], **given)
+    before = drawn.solve()
+    assert before.directed.all() and before.normal[0] == pytest.approx([-1, 0, 0], abs=1e-12)
+    deep = replace(drawn, shapes=[Placed(Box([0.1] * 3)), inside])
+    unknown = deep.solve()
+    assert not unknown.directed.any() and unknown.normal[0] == pytest.approx(overlap(*deep.shapes).normal)
+    assert deep.place(drawn.solver) == [0]
+    found = replace(unknown, **told(drawn.solver.solve(1 / 240, velocity, np.zeros(18), np.array([False]), False)))
+    assert not found.directed.any() and found.normal[0] == pytest.approx([-1, 0, 0], abs=1e-12)
+    assert found.force[0] @ found.normal[0] == pytest.approx(1e5 * deep.patches()[0].found.volume, rel=1e-12)
+    assert found.torque[0] == pytest.approx(np.zeros(3), abs=1e-15)
+    assert broken_laws(found) == []
+
+
+def told(solution):
+    names = ("force", "torque", "slip", "normal", "directed", "on_links", "acceleration", "sweeps")
+    return dict(zip(names, solution, strict=True))
+
+
+# What is known of the last step, and how often patches are gone through
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_step_like_the_last_begins_with_the_solution_of_the_last(seed):
+    """Whatever order the pairs come in; a copy knows the same, and what it solves changes nothing."""
+    drawn = scene(seed, stiffness=1e6, friction=0.5)
+    first = drawn.solve()
+    copy = drawn.solver.copy()
+    turned = replace(drawn, pairs=drawn.pairs[::-1])
+    cold = turned.solve().sweeps
+    assert turned.place(copy) == pytest.approx(drawn.frequency2[::-1])
+    again = copy.solve(
+        drawn.duration, drawn.velocity, drawn.acceleration, np.full(len(drawn.pairs), drawn.damped), False
+    )
+    assert again[-1] <= 2 < cold
+    assert again[0][::-1] == pytest.approx(first.force, rel=1e-4, abs=1e-4 * np.abs(first.force).max())
+    empty = replace(drawn, pairs=[])
+    assert empty.solve().sweeps == 0 and not empty.solve().acceleration.any()
+
+
+@pytest.mark.parametrize(("count", "sweeps"), [(4, 2000), (8, 1250), (30, 333), (1200, 10)])
+def test_sweeps_end_after_ten_thousand_visits_but_not_before_ten_sweeps_nor_after_two_thousand(count, sweeps):
+    """In a stack in which each cube is ten times as heavy as that below, sweeps settle slowly."""
+    masses = 10.0 ** np.arange(count).clip(max=8)
+    links = at_rest(Link(mass=0), *(Link(mass=m, inertia=[m / 600] * 3) for m in masses))
+    heights = (2 * HALF - 1e-3) * np.arange(count) + HALF - 1e-3
+    links = replace(links, positions=np.array([(0, 0, 0), *((0, 0, z) for z in heights)]))
+    shapes = [Placed(FLOOR), *(Placed(Box([HALF] * 3), (0, 0, z)) for z in heights)]
+    pairs = [(i + 1, i) for i in range(count)]
+    weight = np.tile([0, 0, -9.81, 0, 0, 0], count + 1)
+    drawn = Scene(links, shapes, range(count + 1), pairs, stiffness=1e9, acceleration=weight)
+    assert drawn.solve().sweeps == sweeps
