@@ -17,7 +17,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from overlapper import HalfSpace
 from overlapper.simulation import Bodies
-from overlapper.viewer.outline import outline
+from overlapper.viewer.tessellation import tessellation
 
 MODELS = {
     "r2d2.urdf": (25, -60),
@@ -56,7 +56,7 @@ def loaded(model: str) -> Bodies:
 
 def draw(axes: plt.Axes, placed) -> np.ndarray:
     """Draws a placed shape; returns its vertices in the world."""
-    drawn = outline(placed.shape)
+    drawn = tessellation(placed.shape)
     rotation = np.array(pybullet.getMatrixFromQuaternion(placed.orientation)).reshape(3, 3)
     vertices = drawn.vertices @ rotation.T + placed.position
     color = COLORS[type(placed.shape).__name__]

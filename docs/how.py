@@ -24,7 +24,7 @@ from scipy.spatial import ConvexHull
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, Placed, Sphere, overlap
 from overlapper.viewer.look import LIGHT, OWNER_COLORS
-from overlapper.viewer.outline import outline
+from overlapper.viewer.tessellation import tessellation
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent / "benchmarks" / "paper"), str(HERE.parent / "tests" / "support")]
@@ -164,7 +164,7 @@ def label(axes: Axes3D, point: np.ndarray, text: str, shift=(6, 5), color=INK) -
 
 def ghost(axes: Axes3D, placed: Placed, color, alpha=0.13, width=0.7) -> np.ndarray:
     """A translucent body and its edges; returns its corners."""
-    drawn = outline(placed.shape)
+    drawn = tessellation(placed.shape)
     corners = in_world(placed, drawn.vertices)
     solid(axes, list(corners[drawn.faces]), color, alpha, edge="none", zorder=1)
     lines(axes, in_world(placed, drawn.wires), color, width, 0.8, zorder=2)
@@ -200,7 +200,7 @@ def draw_steps() -> None:
     planes = np.vstack(bodies)
     owner = np.repeat([0, 1], [len(body) for body in bodies])
     colors = [OWNER_COLORS[k] for k in owner]
-    corners = [in_world(placed, np.asarray(outline(placed.shape).vertices)) for placed in (first, second)]
+    corners = [in_world(placed, np.asarray(tessellation(placed.shape).vertices)) for placed in (first, second)]
     found = common_point(*corners)
     point = analytic_centre(common.halfspaces, common.centroid)
     duals = dual_points(planes, point)
@@ -253,7 +253,7 @@ def draw_steps() -> None:
     axes = stage(figure, (2, 2, 4), "4  The dual of the hull", "Each face of the hull is a vertex of what is common,\n"
                  "each vertex a facet, which knows its owner.")  # fmt: skip
     for placed, color in zip((first, second), OWNER_COLORS):
-        lines(axes, in_world(placed, outline(placed.shape).wires), color, 0.6, 0.45, 1)
+        lines(axes, in_world(placed, tessellation(placed.shape).wires), color, 0.6, 0.45, 1)
     solid(axes, rings(common), [OWNER_COLORS[o] for o in common.owner], 1.0)
     seam(axes, common)
     frame(axes, np.concatenate(seen))

@@ -240,7 +240,7 @@ class _Whole:
 
 def _drawn(found: Clashes) -> _Drawn:
     """The bodies by their parts if they clash, as what is shared is of these, and by their meshes if they do not."""
-    from overlapper.viewer.outline import Mesh
+    from overlapper.viewer.tessellation import Mesh
 
     clashing = list(dict.fromkeys(i for pair in found.pairs if pair.status != "touching" for i in pair.pair))
     colors = {(i, -1): COLORS[k % len(COLORS)] for k, i in enumerate(clashing)}

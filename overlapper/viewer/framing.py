@@ -15,7 +15,7 @@ import numpy as np
 from overlapper import HalfSpace, Overlap, Placed
 from overlapper.viewer.labels import Bodies, Contact
 from overlapper.viewer.look import FIELD_OF_VIEW, Array
-from overlapper.viewer.outline import triangles
+from overlapper.viewer.tessellation import triangles
 
 GROUND = 30.0  # times as large as every other body: a ground. The plane of pybullet is that beside what is under 9 m.
 BACK = np.array([0.60, -0.68, 0.42]) / np.linalg.norm([0.60, -0.68, 0.42])  # the usual way to the camera

@@ -40,7 +40,6 @@ from overlapper.viewer.look import (
     to_draw,
     volume_text,
 )
-from overlapper.viewer.outline import Ground, ground, outline, polytope_edges
 from overlapper.viewer.pressure import (
     FORCE,
     FRICTION,
@@ -54,6 +53,7 @@ from overlapper.viewer.pressure import (
     key_of,
     pressures,
 )
+from overlapper.viewer.tessellation import Ground, ground, polytope_edges, tessellation
 from overlapper.whole_file import beside
 
 try:
@@ -187,7 +187,7 @@ class _Picture:
         if self._is_ground(placed) and (drawn := self._ground(placed)):
             self._add_ground(placed, drawn, look)
             return
-        outlined = outline(placed.shape)
+        outlined = tessellation(placed.shape)
         vertices = _in_world(placed, outlined.vertices)
         if look.faces:
             front = channels(look.front) if look.front else color

@@ -29,8 +29,16 @@ from overlapper.viewer.look import (
     channels,
     to_draw,
 )
-from overlapper.viewer.outline import Ground, cone, ground, outline, polytope_edges, rotation_from_z, triangles
 from overlapper.viewer.pressure import FORCE, FRICTION, Arrow, Press, Scale, colors, pressures
+from overlapper.viewer.tessellation import (
+    Ground,
+    cone,
+    ground,
+    polytope_edges,
+    rotation_from_z,
+    tessellation,
+    triangles,
+)
 
 try:
     from meshcat import geometry
@@ -123,7 +131,7 @@ class Stage:
         """Whether faces are flat; faces, edges and wires, which are the same for the same shape."""
         shape = pickle.dumps(placed.shape)
         if shape not in self._known:
-            drawn = outline(placed.shape)
+            drawn = tessellation(placed.shape)
             mesh = _Mesh(drawn.vertices, drawn.faces, drawn.normals)
             self._known[shape] = drawn.normals is None, mesh, _lines(drawn.edges), _lines(drawn.wires)
         return self._known[shape]

@@ -15,7 +15,7 @@ from overlapper import overlap as common_part
 from overlapper.quaternion import rotated
 from overlapper.viewer.framing import around
 from overlapper.viewer.look import BOTTOM, INK, LIGHT, MANY_FACETS, OWNER_COLORS, TOP, Array
-from overlapper.viewer.outline import outline, rotation_from_z
+from overlapper.viewer.tessellation import rotation_from_z, tessellation
 
 _Seen = Callable[[Array], Array]
 
@@ -83,7 +83,7 @@ def _body(placed: Placed, color: Sequence[float], center: Array, reach: float, s
         edges = np.empty((0, 3))
         rings = seen(_disc(placed.shape, placed, center, 2 * reach))
     else:
-        drawn = outline(placed.shape)
+        drawn = tessellation(placed.shape)
         rings = _outermost(seen(rotated(placed.orientation, drawn.vertices) + placed.position))
         edges = rotated(placed.orientation, drawn.edges.reshape(-1, 3)) + placed.position
     paint = f'stroke="{hexadecimal(color)}" stroke-width="2"'

@@ -30,7 +30,7 @@ from overlapper import (
 from overlapper.polytopes.shape_text import alike, shape_of, text_of
 from overlapper.reference import Fcl, fcl
 from overlapper.simulation.bullet.inventory import _listed
-from overlapper.viewer.outline import outline
+from overlapper.viewer.tessellation import tessellation
 
 EXACT = 1e-12
 DEPTHS = [10.0**-k for k in range(1, 11)]
@@ -190,7 +190,7 @@ def test_an_ellipsoid_is_read_and_written_and_listed():
 
 def test_an_ellipsoid_is_drawn_on_its_surface():
     half_axes = np.array([0.1, 0.2, 0.9])
-    drawn = outline(Ellipsoid(half_axes))
+    drawn = tessellation(Ellipsoid(half_axes))
     assert_allclose(np.linalg.norm(drawn.vertices / half_axes, axis=1), 1, rtol=1e-12)
     assert_allclose(np.linalg.norm(drawn.normals, axis=1), 1, rtol=1e-12)
     assert ((drawn.normals * drawn.vertices / half_axes**2).sum(axis=1) > 0).all()

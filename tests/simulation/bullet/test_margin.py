@@ -24,7 +24,7 @@ from overlapper import (
 from overlapper.polytopes.shape_text import alike, shape_of, text_of
 from overlapper.reference import Fcl
 from overlapper.simulation import Bodies
-from overlapper.viewer.outline import outline
+from overlapper.viewer.tessellation import tessellation
 
 CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 SKEW = np.random.default_rng(3).normal(size=(12, 3)) + [3, -2, 1]
@@ -121,7 +121,7 @@ def test_a_rounded_hull_travels_as_it_is():
 
 
 def test_a_rounded_hull_is_drawn_with_its_facets_where_they_are():
-    drawn = outline(RoundedHull(CUBE, 0.1)).vertices
+    drawn = tessellation(RoundedHull(CUBE, 0.1)).vertices
     assert_allclose([drawn.min(axis=0), drawn.max(axis=0)], [[-0.6] * 3, [0.6] * 3], rtol=1e-12)
 
 

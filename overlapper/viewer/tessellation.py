@@ -17,7 +17,7 @@ Facets = Sequence[NDArray[np.integer[Any]]]
 
 
 @dataclass(frozen=True)
-class Outline:
+class Tessellation:
     """Triangles `faces` (k, 3), counter-clockwise from outside, over `vertices` (n, 3).
 
     `normals` (n, 3) are the directions to shade by, None if the triangles are meant flat. `edges` (m, 2, 3) are lines
@@ -39,35 +39,37 @@ class Mesh:
     triangles: Array
 
 
-def outline(shape: Shape | Mesh) -> Outline:
+def tessellation(shape: Shape | Mesh) -> Tessellation:
     """The surface of a bounded shape; round ones within 0.3 % of the radius, rounded hulls with bevelled edges."""
     assert not isinstance(shape, HalfSpace)
     if isinstance(shape, Mesh):
         vertices, faces = np.unique(shape.triangles.reshape(-1, 3), axis=0, return_inverse=True)
         faces = faces.reshape(-1, 3)
         lines = _mesh_creases(vertices, faces)
-        return Outline(vertices, faces, None, lines, lines)
+        return Tessellation(vertices, faces, None, lines, lines)
     if isinstance(shape, RoundedHull):
         core = shape.core
         outward = [core.vertices[ring] + shape.radius * plane[:3] for ring, plane in zip(core.facets, core.halfspaces)]
         shape = Hull(np.concatenate(outward))
     if isinstance(shape, Box | Hull):
         vertices, facets = _box(shape) if isinstance(shape, Box) else (shape.vertices, shape.facets)
-        return Outline(vertices, triangles(facets), None, _creases(vertices, facets), vertices[polytope_edges(facets)])
+        return Tessellation(
+            vertices, triangles(facets), None, _creases(vertices, facets), vertices[polytope_edges(facets)]
+        )
     if isinstance(shape, Cylinder):
         half = shape.length / 2
         slopes = np.deg2rad([-90, -90, 0, 0, 90, 90])
         radii, rims = shape.radius * np.array([0, 1, 1, 1, 1, 0]), (1, 4)
         return _revolved(radii, np.repeat([-half, half], 3), slopes, rims, rims)
     if isinstance(shape, Ellipsoid):
-        return _stretched(outline(Sphere(1.0)), shape.half_axes)
+        return _stretched(tessellation(Sphere(1.0)), shape.half_axes)
     half = shape.length / 2 if isinstance(shape, Capsule) else 0.0
     slopes = np.concatenate([np.linspace(-np.pi / 2, 0, 13), np.linspace(0, np.pi / 2, 13)])
     heights = shape.radius * np.sin(slopes) + np.repeat([-half, half], 13)
     return _revolved(shape.radius * np.cos(slopes), heights, slopes, circles=(4, 8, 12, 13, 17, 21))
 
 
-def _stretched(ball: Outline, half_axes: Array) -> Outline:
+def _stretched(ball: Tessellation, half_axes: Array) -> Tessellation:
     """What a ball of radius 1 becomes; normals keep to the surface."""
     assert ball.normals is not None
     normals = ball.normals / half_axes
@@ -77,7 +79,7 @@ def _stretched(ball: Outline, half_axes: Array) -> Outline:
 
 
 @dataclass(frozen=True)
-class Ground(Outline):
+class Ground(Tessellation):
     """The part of a plane that is seen of a ground, around `middle`, fading out as far as `reach` metres from there.
 
     The grid, among `edges` and `wires`, is 1, 0.1, ... m wide.
@@ -143,7 +145,7 @@ def _plane(corners: Array) -> tuple[Array, float]:
     return normal, float(corners.mean(axis=0) @ normal)
 
 
-def cone(radius: float, bottom: float, top: float, upper: float = 0.0) -> Outline:
+def cone(radius: float, bottom: float, top: float, upper: float = 0.0) -> Tessellation:
     """A cone about z from height `bottom` to `top`, where it has the radius `upper`: a tip."""
     return _revolved(np.array([0, radius, upper]), np.array([bottom, bottom, top]), np.zeros(3))
 
@@ -202,7 +204,7 @@ def _mesh_creases(vertices: Array, faces: NDArray[np.integer[Any]]) -> Array:
 
 def _revolved(
     radii: Array, heights: Array, slopes: Array, rims: Sequence[int] = (), circles: Sequence[int] = ()
-) -> Outline:
+) -> Tessellation:
     """A profile turned about z: radius, height, and how far its normal points above the horizon.
 
     Of its points, `rims` are turned into edges, and `circles` into wires, which meridians join.
@@ -216,7 +218,7 @@ def _revolved(
     faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
     edges, wires = (_polylines(rings[list(rows)]) for rows in (rims, circles))
     wires = np.concatenate([wires, _polylines(rings[:, :-1:4].swapaxes(0, 1))])
-    return Outline(rings.reshape(-1, 3), faces, normals.reshape(-1, 3), edges, wires)
+    return Tessellation(rings.reshape(-1, 3), faces, normals.reshape(-1, 3), edges, wires)
 
 
 def _polylines(points: Array) -> Array:
