@@ -10,7 +10,7 @@ from overlapper import Overlap, Placed
 
 ROOT = "/overlapper/bodies"
 Pair = tuple[str, str]
-Link = tuple[str, str]  # body and link
+LinkName = tuple[str, str]  # body and link
 
 # meshcat's tree and its panel look names up in objects, where these are found before any is put there; "<object>" is
 # what it calls the drawing at a node.
@@ -76,13 +76,13 @@ def pairs(bodies: Bodies, contacts: Iterable[Contact]) -> dict[Pair, Overlap]:
     return {pair: contact.overlap for pair, _, contact in labelled(bodies, contacts)}
 
 
-def labelled(bodies: Bodies, contacts: Iterable[Contact]) -> Iterator[tuple[Pair, tuple[Link, Link], Contact]]:
+def labelled(bodies: Bodies, contacts: Iterable[Contact]) -> Iterator[tuple[Pair, tuple[LinkName, LinkName], Contact]]:
     """The name of each overlapping pair, its bodies and links, and the pair; "" is the link of a body of one."""
     names = link_names(bodies)
     links = Counter(body for body, _ in names)
     shapes = Counter((body, link) for body, link, _ in bodies.keys)
 
-    def where(body: int, link: int) -> Link:
+    def where(body: int, link: int) -> LinkName:
         first, rest = names[body, link]
         return first, rest if links[body] > 1 else ""
 

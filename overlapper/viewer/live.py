@@ -21,7 +21,7 @@ from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker
 from overlapper.viewer.framing import Framing
 from overlapper.viewer.labels import Bodies, Contact, body_paths, labelled
 from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, volume_text
-from overlapper.viewer.pressure import Forces, Scale, Seen, force_text, key_of
+from overlapper.viewer.pressure import DrawnForces, Forces, Scale, force_text, key_of
 from overlapper.viewer.recording import Recording
 from overlapper.viewer.stage import Stage, matrix
 
@@ -90,11 +90,11 @@ class Viewer:
 
     def _seen(
         self, stage: Stage, framing: Framing, bodies: Bodies, contacts: list[Contact], forces: Forces | None
-    ) -> Seen | None:
+    ) -> DrawnForces | None:
         if forces is None or not self._looks[1].forces:
             return None
         framing.see(bodies, contacts)
-        seen = Seen.of(bodies, contacts, forces, 0.15 * stage.size, framing, self._scale)
+        seen = DrawnForces.of(bodies, contacts, forces, 0.15 * stage.size, framing, self._scale)
         self._scale = seen.scale
         return seen
 
@@ -113,7 +113,7 @@ class Viewer:
                 self.visualizer[path].set_transform(pose)
                 self._poses[path] = pose
 
-    def _show_overlaps(self, stage: Stage, bodies: Bodies, contacts: list[Contact], seen: Seen | None) -> None:
+    def _show_overlaps(self, stage: Stage, bodies: Bodies, contacts: list[Contact], seen: DrawnForces | None) -> None:
         for pair in self._pairs:
             self.visualizer[_path(pair)].delete()
         self._pairs = set()
@@ -123,7 +123,7 @@ class Viewer:
             self.visualizer[f"{_path(pair)}/{volume_text(contact.overlap.volume)}"].set_object(drawn)
             self._pairs.add(pair)
 
-    def _show_forces(self, stage: Stage, seen: Seen | None) -> None:
+    def _show_forces(self, stage: Stage, seen: DrawnForces | None) -> None:
         if self._pushing:
             self.visualizer[FORCES].delete()
         self._pushing = seen is not None and bool(seen.arrows)

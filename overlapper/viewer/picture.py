@@ -44,10 +44,10 @@ from overlapper.viewer.pressure import (
     FORCE,
     FRICTION,
     Arrow,
+    DrawnForces,
     Forces,
     Press,
     Scale,
-    Seen,
     colors,
     force_text,
     key_of,
@@ -98,7 +98,7 @@ def save(
     picture = _Picture(framing or here, here.side(), near)
     seen = None
     if forces is not None and looks[1].forces:
-        seen = Seen.of(bodies, contacts, forces, picture.height / 4, framing or here)
+        seen = DrawnForces.of(bodies, contacts, forces, picture.height / 4, framing or here)
     for key, placed in zip(bodies.keys, bodies.placed, strict=True):
         picture.add_body(placed, np.array(bodies.colors[key[:2]][:3]), looks[0])
     table = []

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from overlapper import Overlap
 from overlapper.viewer.framing import Framing
-from overlapper.viewer.labels import Bodies, Contact, Link, labelled
+from overlapper.viewer.labels import Bodies, Contact, LinkName, labelled
 from overlapper.viewer.look import Array, channels, to_draw
 from overlapper.viewer.tessellation import polytope_edges, triangles
 
@@ -188,7 +188,7 @@ def usual_force(some: Sequence[Arrow]) -> float:
 
 
 @dataclass(frozen=True)
-class Seen:
+class DrawnForces:
     """What is seen of the forces of one frame: by pair of shapes, by pair of links, and the scale of both."""
 
     pressed: Mapping[Key, Press]
@@ -204,7 +204,7 @@ class Seen:
         length: float,
         framing: Framing,
         before: Scale | None = None,
-    ) -> Seen:
+    ) -> DrawnForces:
         """With arrows of what is usual about as long as that, m; by the scale of `before` as long as that does."""
         pressed = presses(forces)
         found = arrows(bodies, contacts, pressed, framing.pushed_second) if pressed else []
@@ -238,7 +238,7 @@ def force_text(force: float) -> str:
 class Arrow:
     """The sum of the forces of a pair of links on one of them, in N, and of their friction; `start` (3,) in m."""
 
-    links: tuple[Link, Link]
+    links: tuple[LinkName, LinkName]
     start: Array
     force: Array
     friction: Array
@@ -251,8 +251,8 @@ def arrows(
     on_second: Callable[[Contact], bool] = lambda contact: False,
 ) -> list[Arrow]:
     """For each pair of links, where its overlaps are in the mean, weighted by force; on the first unless it is said."""
-    sums: dict[tuple[Link, Link], Arrow] = {}
-    weights: dict[tuple[Link, Link], float] = {}
+    sums: dict[tuple[LinkName, LinkName], Arrow] = {}
+    weights: dict[tuple[LinkName, LinkName], float] = {}
     for _, links, contact in labelled(bodies, contacts):
         press = pressed.get(key_of(contact))
         weight = float(np.linalg.norm(press.force)) if press else 0.0

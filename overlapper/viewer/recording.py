@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from overlapper import Overlap, Placed, Sphere
 from overlapper.viewer.framing import Framing, View
-from overlapper.viewer.labels import ROOT, Bodies, Contact, Link, Pair, body_paths, labelled
+from overlapper.viewer.labels import ROOT, Bodies, Contact, LinkName, Pair, body_paths, labelled
 from overlapper.viewer.look import (
     BODIES,
     INK,
@@ -96,7 +96,7 @@ class Recording:
         self._poses: dict[str, tuple[float, ...]] = {}  # the last of each node
         self._keys: list[tuple[int, int, tuple[float, ...]]] = []  # frame, node, pose
         self._pairs: dict[Pair, int] = {}
-        self._links: dict[Pair, tuple[Link, Link]] = {}
+        self._links: dict[Pair, tuple[LinkName, LinkName]] = {}
         self._drawn: dict[Pair, tuple[Overlap, int]] = {}  # the last of each pair, and its place among the polytopes
         self._polytopes = _Polytopes()
         self._sightings: list[tuple[int, int, int]] = []  # frame, pair, polytope
