@@ -7,7 +7,7 @@ from importlib import import_module
 
 
 def lazily(package: str, offers: Mapping[str, tuple[str, ...]], needs: str | None = None) -> Callable[[str], object]:
-    """The `__getattr__` of a package (PEP 562) that offers names of its modules, or of others: ".other" is beside it.
+    """The `__getattr__` of a package (PEP 562) that offers names of its modules.
 
     `needs` is what an ImportError says of a library that is not installed; without it, the module's own words are kept.
     """

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
     from overlapper.simulation.model import Concave, Decomposed, Skipped, Surface
     from overlapper.simulation.report import Report
-    from overlapper.tables.log import Log
 
 __all__ = [
     "Among",
@@ -33,7 +32,6 @@ __all__ = [
     "Forces",
     "LinkContact",
     "LinkContacts",
-    "Log",
     "NoDirectionWarning",
     "Recorder",
     "Report",
@@ -59,7 +57,6 @@ __getattr__ = lazily(
         "forces.forces": ("Forces",),
         "links": ("LinkContact", "LinkContacts", "link_contacts"),
         "bullet.recorder": ("Recorder",),
-        ".tables.log": ("Log",),  # a table, which is above what it is of
         "report": ("Report",),
     },
     needs=simulator_hint(),

@@ -12,8 +12,9 @@ import pytest
 from simulated import box
 
 import overlapper
+from overlapper import Log
 from overlapper.scenes import watching
-from overlapper.simulation import Bodies, Log, Recorder, VolumetricContact
+from overlapper.simulation import Bodies, Recorder, VolumetricContact
 from overlapper.tables.table import rows
 from overlapper.tables.table_file import read_metadata, read_table
 

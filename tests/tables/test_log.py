@@ -11,9 +11,10 @@ import pybullet as p
 import pytest
 from simulated import body, box
 
+from overlapper import Log
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import load_scene
-from overlapper.simulation import Bodies, Log, VolumetricContact, link_contacts
+from overlapper.simulation import Bodies, VolumetricContact, link_contacts
 from overlapper.tables.table import link_rows, rows
 from overlapper.tables.table_file import read_metadata, read_table
 
@@ -143,7 +144,8 @@ def test_what_ends_the_loop_without_an_error_puts_the_table_in_its_place(two_box
 KILLED = """
 import os, signal, sys
 import pybullet as p
-from overlapper.simulation import Bodies, Log
+from overlapper import Log
+from overlapper.simulation import Bodies
 client = p.connect(p.DIRECT)
 cube = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.5] * 3)
 for x in (0, 0.9):
