@@ -6,7 +6,6 @@ named by its task and takes its place whole. `sweep.json` says what all of them 
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 from collections.abc import Mapping
@@ -15,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from overlapper.install import hint
 from overlapper.sweep.part import FAILURES, STEPS, TASKS, arrow
 from overlapper.whole_file import beside
 
@@ -36,12 +36,8 @@ class Store:
         # Beside the tables, whose every file readers take for a part.
         self._begun = f"{folder}/.begun.parquet"
         self._there: set[str] = set()  # tables whose folders were made
-        self._lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
+        self._lock = _locked(folder)
         try:
-            try:
-                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise ValueError(f"another sweep is at work in {folder}") from error
             self._belong(identity)
             self.done, self.failed = (self._names(table) for table in (TASKS, FAILURES))
             if self.path(STEPS).is_dir():
@@ -49,7 +45,7 @@ class Store:
             for task in self.done & self.failed:  # a kill came between the two
                 self._recovered(task)
         except BaseException:
-            os.close(self._lock)
+            self._lock.release()
             raise
 
     def _belong(self, identity: Mapping[str, str]) -> None:
@@ -120,7 +116,7 @@ class Store:
         """Let another sweep at it."""
         with suppress(FileNotFoundError):
             os.unlink(self._begun)
-        os.close(self._lock)
+        self._lock.release()
 
     def __enter__(self) -> Store:
         return self
@@ -129,6 +125,20 @@ class Store:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _locked(folder: Path) -> Any:
+    """The lock of the folder, acquired. It ends with this process at the latest. ValueError if another sweep has it."""
+    try:
+        from filelock import FileLock, Timeout
+    except ImportError as error:
+        raise ImportError(f"a sweep needs {hint('filelock')}") from error
+    lock = FileLock(folder / ".lock", timeout=0, mode=0o666, thread_local=False)
+    try:
+        lock.acquire()
+    except Timeout as error:
+        raise ValueError(f"another sweep is at work in {folder}") from error
+    return lock
 
 
 def rows_in(folder: Path, table: str) -> list[dict[str, Any]]:

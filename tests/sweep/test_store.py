@@ -3,6 +3,8 @@
 import errno
 import json
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -155,7 +157,16 @@ def test_a_parameter_that_is_called_like_a_column_is_refused(name, table):
     must_be_no_columns({"mass": 1})
 
 
-def test_a_sweep_names_what_is_to_be_installed(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+def test_a_sweep_names_what_is_to_be_installed(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(ImportError, match=r"^a sweep needs pyarrow: pip install pyarrow$"):
         parts.arrow()
+    monkeypatch.setitem(sys.modules, "filelock", None)
+    with pytest.raises(ImportError, match=r"^a sweep needs filelock: pip install filelock$"):
+        Store(tmp_path, IDENTITY)
+
+
+@pytest.mark.parametrize("module", ["sweep.sweep", "sweep.page", "cli.sweep"])
+def test_sweeps_are_imported_where_there_is_no_fcntl_as_on_windows(module):
+    program = f"import sys; sys.modules['fcntl'] = sys.modules['resource'] = None; import overlapper.{module}"
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
