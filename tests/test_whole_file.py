@@ -48,7 +48,7 @@ def write_page(path):
 
 
 def write_expected(path):
-    Expected([1], 1e-3, ROUNDING | DRIFT, TWO.rows(1, 1e-3), {1: dict(zip(KEYS, TWO.shapes))}).write(path, {})
+    Expected([1], 1e-3, ROUNDING | DRIFT, TWO.rows(1, 1e-3), {1: TWO}).write(path, {})
 
 
 WRITERS = {

@@ -145,13 +145,13 @@ def diff(
 
     [bold]overlapper diff monday.csv tuesday.csv[/bold]
     """
-    from overlapper.tables.table_file import read_table
+    from overlapper.tables.table_file import read_content, read_table
     from overlapper.verdicts.comparison import compare_forces, compare_measures, compare_poses
-    from overlapper.verdicts.expected import DRIFT, FORCES, ROUNDING, read_budgets
+    from overlapper.verdicts.expected import DRIFT, FORCES, ROUNDING, budgets_in
 
     with input_refusals():
-        recorded, found = read_table(before), read_table(after)
-        budgets = ROUNDING | DRIFT | FORCES | read_budgets(before)
+        first, found = read_content(before), read_table(after)
+        recorded, budgets = first.rows, ROUNDING | DRIFT | FORCES | budgets_in(first.metadata, before)
     compared = {
         "poses": compare_poses(recorded, found, budgets),
         "overlaps": compare_measures(recorded, found, budgets),

@@ -7,10 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from overlapper.scenes.record import record
-from overlapper.scenes.scene import SceneError, load_scene
-from overlapper.scenes.verdict import Verdict, examine
-from overlapper.verdicts.expected import read_expected
+from overlapper.scenes.parameters import heading_of
+from overlapper.scenes.run import stills
+from overlapper.scenes.scene import Scene, SceneError, load_scene
+from overlapper.tables.table_file import origin
+from overlapper.verdicts import replay
+from overlapper.verdicts.expected import Expected, read_expected
+from overlapper.verdicts.verdict import Verdict, examine
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +51,7 @@ def hold(path: Path, pages: Path, anew: bool = False) -> Outcome:
             if anew:
                 return Outcome(scene.name, "recorded", [written])
             return Outcome(scene.name, "new", [written, "look at it, commit it, and the scene is guarded from now on"])
-        verdict = examine(scene, read_expected(scene.expected))
+        verdict = examined(scene, read_expected(scene.expected))
     except ValueError as error:
         raise SceneError(str(error)) from error
     causes = {cause: "moved" if moves else "as recorded" for cause, moves in verdict.causes.items()}
@@ -59,11 +62,33 @@ def hold(path: Path, pages: Path, anew: bool = False) -> Outcome:
     return Outcome(scene.name, "moved", [*verdict.lines(), remark], causes, verdict.notes, shown)
 
 
+def record(scene: Scene) -> None:
+    """Run the scene and write its expected file anew.
+
+    The steps, the tolerance and the budgets of an old file stay in force. A new file has four steps and budgets of five
+    times what rounding does to its measures when all is moved by less than a metre.
+    """
+    try:
+        made = _observed(scene, read_expected(scene.expected))
+    except FileNotFoundError:
+        made = replay.fitted(_observed(scene, replay.wanted(scene.steps, scene.contact == "volumetric")))
+    made.write(scene.expected, origin() | heading_of(scene.parameters))
+
+
+def _observed(scene: Scene, wanted: Expected) -> Expected:
+    return replay.observed(wanted, stills(scene, wanted.steps))
+
+
+def examined(scene: Scene, expected: Expected) -> Verdict:
+    """Run the scene and compare it with what was recorded. SceneError if it fails."""
+    return examine(expected, stills(scene, expected.steps), scene.steps)
+
+
 def _page(verdict: Verdict, name: str, path: Path) -> tuple[Path | None, str]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # of meshcat's imports, and no business of the user's
-            from overlapper.scenes import before_after
+            from overlapper.verdicts import before_after
     except ImportError as error:
         return None, f"no page of before and after: {error}"
     return before_after.save(verdict, name, path), f"before and after: {path}"

@@ -6,7 +6,6 @@ alone: its scene is run again with the table's settings, and held against the ta
 
 from __future__ import annotations
 
-import re
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,9 +20,9 @@ from overlapper.simulation.links import link_contacts
 from overlapper.tables.frame import Frame
 from overlapper.tables.still import Still
 from overlapper.tables.table import Row, link_rows, rows
-from overlapper.tables.table_file import TABLES, csv_text, read_metadata, read_table
+from overlapper.tables.table_file import TABLES, read_content
 from overlapper.verdicts.comparison import compare_measures
-from overlapper.verdicts.expected import HUNDREDTHS, read_expected
+from overlapper.verdicts.expected import HUNDREDTHS, Expected, expected_in, has_shapes
 
 STEP = 1 / 240  # s, what pybullet takes for a step; an expected file says nothing of time
 
@@ -69,22 +68,21 @@ def play(
         raise ValueError(f"--set is for scenes, and {source} is a table, which says its own parameters")
     if contact:
         raise ValueError(f"--contact is for scenes, and {source} is a table, which says its own")
-    metadata = read_metadata(path)
-    if path.suffix == ".csv" and re.search(r"^# shapes ", csv_text(path), re.MULTILINE):
-        expected = read_expected(path)
-        stills = {step: Still.recorded(recorded, expected.shapes[step]) for step, recorded in expected.rows_by_step()}
-        return Playback(path.stem, len(stills), _stills(stills, expected.tolerance), sparse=True)
+    table = read_content(path)
+    if has_shapes(table):
+        expected = expected_in(table, path)
+        return Playback(path.stem, len(expected.stills), _views(expected), sparse=True)
     if scene is None:
-        said = metadata.get("scene")
+        said = table.metadata.get("scene")
         named = f" (it says {printable(said)!r})" if said else ""
         raise ValueError(f"{path} has no shapes to show: give the scene that it is of with --scene{named}")
-    recorded, chosen = read_table(path), load_scene(scene, read_heading(metadata))
+    recorded, chosen = table.rows, load_scene(scene, read_heading(table.metadata))
     last = max((int(row["step"] or 0) for row in recorded), default=1)
     playback = Playback(path.stem, min(last, steps or chosen.steps), _nothing())
     if playback.total < last:
         playback.remarks.append(f"{path} goes on to step {last:,}: --steps {last} shows all of it")
         recorded = [row for row in recorded if int(row["step"] or 0) <= playback.total]
-    playback.views = _held_against(path, chosen, metadata, recorded, playback)
+    playback.views = _held_against(path, chosen, table.metadata, recorded, playback)
     return playback
 
 
@@ -92,9 +90,9 @@ def _nothing() -> Generator[View, None, None]:
     yield from ()
 
 
-def _stills(stills: dict[int, Still], tolerance: float) -> Generator[View, None, None]:
-    for step, still in stills.items():
-        yield Frame(step, step * STEP, still, still.contacts(tolerance))
+def _views(expected: Expected) -> Generator[View, None, None]:
+    for step, still in expected.stills.items():
+        yield Frame(step, step * STEP, still, still.contacts(expected.tolerance))
 
 
 def _settings(path: Path, metadata: dict[str, str]) -> dict[str, Any]:

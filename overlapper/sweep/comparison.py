@@ -17,8 +17,9 @@ from overlapper.scenes.parameters import Parameter, described
 from overlapper.sweep.part import FAILURES, OF, TASK, TASKS
 from overlapper.sweep.store import Store, rows_in
 from overlapper.sweep.sweep import Sweep
+from overlapper.tables.table_file import read_metadata
 from overlapper.verdicts.comparison import off_by
-from overlapper.verdicts.expected import FORCES, ROUNDING, Budget, read_budgets
+from overlapper.verdicts.expected import FORCES, ROUNDING, Budget, budgets_in
 
 Row = Mapping[str, Any]
 Key = tuple[Parameter, ...]
@@ -116,7 +117,9 @@ class Recorded:
 
     def __init__(self, folder: Path, expected: Path, sweep: Sweep) -> None:
         self._folder, self._sweep = folder, sweep
-        self._budgets = ROUNDING | FORCES | (read_budgets(expected) if expected.is_file() else {})
+        self._budgets = (
+            ROUNDING | FORCES | (budgets_in(read_metadata(expected), expected) if expected.is_file() else {})
+        )
         rows = _rows(folder)
         if not rows:
             raise ValueError(f"--check {folder}: there is no sweep in it")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -47,8 +47,11 @@ class Still:
         )
 
     @classmethod
-    def recorded(cls, recorded: Sequence[Row], shapes: dict[Key, Shape]) -> Still:
-        """The shapes of a step of an expected file where its rows say; names are numbers and all is grey."""
+    def recorded(cls, recorded: Sequence[Row], shapes: Mapping[Key, Shape]) -> Still:
+        """The shapes of a step where its rows place them; names are numbers and all is grey.
+
+        KeyError of a (body, link, shape) that `shapes` does not have.
+        """
         where = {each: pose for (_, each), pose in poses(recorded).items()}
         keys = sorted(where)
         ordered = np.array([where[each] for each in keys]).reshape(-1, 7)

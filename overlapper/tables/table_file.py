@@ -17,6 +17,7 @@ import shutil
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol
@@ -26,8 +27,6 @@ from overlapper.install import hint
 from overlapper.printable import first_line, printable
 from overlapper.tables.table import COLUMNS, FORCES, POSE, Row, Value
 from overlapper.whole_file import claim, settle
-
-__all__ = ["TABLES", "CsvTable", "ParquetTable", "SqliteTable", "Table", "read_csv", "read_metadata", "read_table"]
 
 KNOWN = COLUMNS | FORCES
 
@@ -49,6 +48,18 @@ def origin() -> dict[str, str]:
     except PackageNotFoundError:
         simulator = {}
     return {"overlapper": __version__, **simulator}
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What is in a table: its metadata by name, its rows, and the comments of a CSV file.
+
+    A comment is the text of a line behind its #, with the number of rows above that line.
+    """
+
+    metadata: dict[str, str]
+    rows: list[Row] = field(default_factory=list)
+    comments: list[tuple[int, str]] = field(default_factory=list)
 
 
 class Table(Protocol):
@@ -146,7 +157,7 @@ def _cell(value: Value) -> str:
     return '"' + value.replace('"', '""') + '"' if re.search(r'[#,"]', value) else value
 
 
-def csv_text(path: Path) -> str:
+def _csv_text(path: Path) -> str:
     """The text of a CSV table, which is whole: a last line without an end, which a kill may leave, is left out.
 
     ValueError if rows are missing, or are not as they were written; a table without a line `# rows` is taken as it is.
@@ -168,19 +179,36 @@ def csv_text(path: Path) -> str:
     return text
 
 
-def read_csv(path: Path) -> list[Row]:
-    """The rows of a CSV table; empty cells are None. ValueError if the file is no such table, or not all of it."""
-    lines = csv_text(path).splitlines(keepends=True)
-    reader = csv.reader(line for line in lines if not line.startswith("#"))
+def _csv_content(path: Path) -> Content:
+    """A CSV table; empty cells are None."""
+    lines = _csv_text(path).splitlines(keepends=True)
+    content = Content(_heading(lines))
+
+    def uncommented() -> Iterator[str]:
+        for line in lines:
+            if line.startswith("#"):
+                content.comments.append((len(content.rows), line[1:].strip()))
+            else:
+                yield line
+
+    reader = csv.reader(uncommented())
     try:
         columns = next(reader, [])
         _check_columns(path, columns)
-        return [_row(columns, cells) for cells in reader if cells]
+        for cells in filter(None, reader):
+            content.rows.append(_row(columns, cells))
     except (ValueError, csv.Error) as error:
         if str(error).startswith(str(path)):
             raise
         where = f"{path} cannot be read at line {reader.line_num} below its heading"
         raise ValueError(f"{where}: {first_line(error)}") from error
+    return content
+
+
+def _heading(lines: Iterable[str]) -> dict[str, str]:
+    """The metadata in the first lines of a CSV table, by name."""
+    heading = itertools.takewhile(lambda line: line.startswith("# "), lines)
+    return {name: value.strip() for name, colon, value in (line[2:].partition(": ") for line in heading) if colon}
 
 
 def _row(columns: Sequence[str], cells: Sequence[str]) -> Row:
@@ -388,7 +416,7 @@ def _arrow() -> Any:
 
 
 def read_metadata(path: Path) -> dict[str, str]:
-    """What a table says of itself, by name: what wrote it and with which settings. ValueError if it is none."""
+    """The metadata of a table: the versions and the settings that wrote it, by name. ValueError if it is no table."""
     if path.suffix == ".parquet":
         with _opened_parquet(path) as dataset:
             found = (dataset.schema.metadata or {}).items()
@@ -396,12 +424,11 @@ def read_metadata(path: Path) -> dict[str, str]:
     if path.suffix == ".sqlite":
         with _opened_sqlite(path) as connection:
             return {str(name): str(value) for name, value in connection.execute("SELECT name, value FROM metadata")}
-    heading = itertools.takewhile(lambda line: line.startswith("# "), csv_text(path).splitlines())
-    return {name: value.strip() for name, colon, value in (line[2:].partition(": ") for line in heading) if colon}
+    return _heading(_csv_text(path).splitlines())
 
 
 def read_table(path: Path) -> list[Row]:
-    """The rows of a table of any kind, finished or not. OSError if there is no such file, ValueError if it is none."""
+    """The rows of a table of any kind, finished or not. OSError if there is no file, ValueError if it is no table."""
     if path.suffix == ".parquet":
         with _opened_parquet(path) as dataset:
             _check_columns(path, dataset.schema.names)
@@ -416,7 +443,12 @@ def read_table(path: Path) -> list[Row]:
             if said is not None and str(said) != str(len(rows)):
                 raise ValueError(f"{path} is not as it was written: {len(rows):,} of its {said!s:.20} rows are there")
             return rows
-    return read_csv(path)
+    return _csv_content(path).rows
+
+
+def read_content(path: Path) -> Content:
+    """A table of any kind, finished or not, with all that is in it. Raises as `read_table` does."""
+    return _csv_content(path) if path.suffix == ".csv" else Content(read_metadata(path), read_table(path))
 
 
 @contextmanager

@@ -8,16 +8,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 
 from overlapper import Shape
 from overlapper.polytopes.shape_text import shape_of, text_of
-from overlapper.tables.table import COLUMNS, Key, Row, key
+from overlapper.tables.still import Still
+from overlapper.tables.table import COLUMNS, Key, Row
 from overlapper.tables.table import FORCES as FORCE_COLUMNS
-from overlapper.tables.table_file import CsvTable, csv_text, read_csv
+from overlapper.tables.table_file import Content, CsvTable, read_content
+
+# How a comment begins that has shapes: the (body, link, shape) that have it, and the shape as text.
+SHAPES = "shapes "
 
 # A shape that meets no other has a row with the status "alone", of which the columns of B and the measures are empty,
 # so that every shape of a step is placed, and a pair out of nothing is noticed.
@@ -84,23 +89,19 @@ HUNDREDTHS = {"volume": Budget(0.01, 0.0), "depth": Budget(0.01, 0.0)}
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What was recorded of a scene: some of its `steps`, at `tolerance`, and the budget of each quantity.
+    """What was recorded of a scene in some of its `steps`, at `tolerance`, and the budget of each quantity.
 
-    `shapes` are those of every step, by step and (body, link, shape).
+    `rows` are the overlaps of those steps. `stills` are the shapes and poses, by step.
     """
 
     steps: list[int]
     tolerance: float
     budgets: dict[str, Budget]
     rows: list[Row] = field(default_factory=list)
-    shapes: dict[int, dict[Key, Shape]] = field(default_factory=dict)
-
-    def rows_by_step(self) -> Iterator[tuple[int, list[Row]]]:
-        for step, rows in groupby(self.rows, lambda row: int(row["step"] or 0)):
-            yield step, list(rows)
+    stills: dict[int, Still] = field(default_factory=dict)
 
     def write(self, path: Path, origin: dict[str, str]) -> None:
-        """Write the file; its first lines are for people to change where the budgets do not do."""
+        """Write the file. Its first lines are for people to edit where the budgets do not fit."""
         heading = {"steps": " ".join(map(str, self.steps)), "tolerance": repr(self.tolerance)}
         heading |= {
             f"budget {name}": f"relative {each.relative!r} absolute {each.absolute!r}"
@@ -120,77 +121,86 @@ class Expected:
 
     def _write_steps(self, table: CsvTable) -> None:
         known: dict[Key, str] = {}
-        for step, rows in self.rows_by_step():
-            texts = {shape_key: text_of(shape) for shape_key, shape in self.shapes[step].items()}
+        for step, rows in _by_step(self.rows):
+            still = self.stills[step]
+            texts = {shape_key: text_of(shape) for shape_key, shape in zip(still.keys, still.shapes)}
             new = {shape_key: text for shape_key, text in texts.items() if known.get(shape_key) != text}
             for text in dict.fromkeys(new.values()):
                 users = " ".join("/".join(map(str, each)) for each, its in new.items() if its == text)
-                table.comment(f"shapes {users}: {text}")
+                table.comment(f"{SHAPES}{users}: {text}")
             known |= new
             table.write(rows)
 
 
 def read_expected(path: Path) -> Expected:
     """An expected file. FileNotFoundError if there is none, ValueError if it is not one, or not all of it is there."""
-    text = csv_text(path)
-    steps = re.search(r"^# steps: ([\d ]*\d)$", text, re.MULTILINE | re.ASCII)
-    tolerance = re.search(r"^# tolerance: ([-+.e\d]+)$", text, re.MULTILINE | re.ASCII)
-    if steps is None or tolerance is None:
+    return expected_in(read_content(path), path)
+
+
+def expected_in(content: Content, path: Path) -> Expected:
+    """What the file at `path` has, once it has been read. ValueError if it is no expected file."""
+    steps, tolerance = (content.metadata.get(name, "") for name in ("steps", "tolerance"))
+    if not (re.fullmatch(r"[\d ]*\d", steps, re.ASCII) and re.fullmatch(r"[-+.e\d]+", tolerance, re.ASCII)):
         raise ValueError(f"{path} must say `# steps: <numbers>` and `# tolerance: <number>` in its first lines")
-    rows = read_csv(path)
+    budgets = budgets_in(content.metadata, path)
     try:
-        expected = Expected([int(step) for step in steps[1].split()], float(tolerance[1]), read_budgets(path), rows)
+        expected = Expected([*map(int, steps.split())], float(tolerance), budgets, content.rows, _stills(content))
         if not 0 < expected.tolerance < 1:
             raise ValueError(f"its tolerance must lie between 0 and 1, not {expected.tolerance}")
-        expected.shapes.update(_shapes(text, rows))
     except ValueError as error:
-        raise ValueError(str(error) if str(error).startswith(str(path)) else f"{path}: {error}") from error
+        raise ValueError(f"{path}: {error}") from error
     return expected
 
 
-def read_budgets(path: Path) -> dict[str, Budget]:
-    """The budgets in the heading of a table; only a CSV table has any. ValueError if one is of no quantity."""
-    if path.suffix != ".csv":
-        return {}
-    pattern = r"^# budget (\w+): relative (\S+) absolute (\S+)$"
+def has_shapes(content: Content) -> bool:
+    """Whether a table has the shapes of its steps, as an expected file has."""
+    return any(comment.startswith(SHAPES) for _, comment in content.comments)
+
+
+def budgets_in(metadata: Mapping[str, str], path: Path) -> dict[str, Budget]:
+    """The budgets in the metadata of the table at `path`. ValueError if one is of no quantity."""
     budgets: dict[str, Budget] = {}
-    for name, *parts in re.findall(pattern, csv_text(path), re.MULTILINE):
+    for heading, text in metadata.items():
+        parts = re.fullmatch(r"relative (\S+) absolute (\S+)", text)
+        if not heading.startswith("budget ") or parts is None:
+            continue
+        name = heading.removeprefix("budget ")
         if name not in (known := ROUNDING | DRIFT | FORCES):
             raise ValueError(f"{path} has a budget of {name!r}, which is none of {', '.join(known)}")
         try:
-            relative, absolute = map(float, parts)
+            relative, absolute = map(float, parts.groups())
         except ValueError:
             relative = math.nan
         if not (relative >= 0 and absolute >= 0):
-            raise ValueError(f"{path} has a budget of {name} that is not two numbers from 0: {' and '.join(parts)}")
+            told = " and ".join(parts.groups())
+            raise ValueError(f"{path} has a budget of {name} that is not two numbers from 0: {told}")
         budgets[name] = Budget(relative, absolute)
     return budgets
 
 
-def _shapes(text: str, rows: list[Row]) -> dict[int, dict[Key, Shape]]:
-    """The shapes of every step: a line `# shapes` holds for the rows that follow, until another says otherwise."""
-    present: dict[int, set[Key]] = {}
-    for row in rows:
-        keys = (key(row)[:3], key(row)[3:])
-        # A row of a shape alone has no B.
-        numbers = [tuple(int(part or 0) for part in each) for each in keys if each != (None, None, None)]
-        present.setdefault(int(row["step"] or 0), set()).update((a, b, c) for a, b, c in numbers)
+def _by_step(rows: Iterable[Row]) -> Iterator[tuple[int, list[Row]]]:
+    for step, group in groupby(rows, lambda row: int(row["step"] or 0)):
+        yield step, list(group)
+
+
+def _stills(content: Content) -> dict[int, Still]:
+    """The shapes and poses of every step: a comment `shapes` holds for the rows below it, until another replaces it."""
+    said = deque((above, text) for above, text in content.comments if text.startswith(SHAPES))
     known: dict[Key, Shape] = {}
-    shapes: dict[int, dict[Key, Shape]] = {}
-    for line in text.splitlines():
-        if line.startswith("# shapes "):
-            users, _, words = line.removeprefix("# shapes ").partition(": ")
+    stills: dict[int, Still] = {}
+    above = 0
+    for step, rows in _by_step(content.rows):
+        while said and said[0][0] <= above:
+            users, _, words = said.popleft()[1].removeprefix(SHAPES).partition(": ")
             shape = shape_of(words)
             known |= {_key(user): shape for user in users.split()}
-        elif re.match(r"\d+,", line, re.ASCII):
-            step = int(line.partition(",")[0])
-            if step not in shapes:
-                shapes[step] = {each: known[each] for each in present.get(step, ()) if each in known}
-    for step, needed in present.items():
-        missing = needed - shapes.get(step, {}).keys()
-        if missing:
-            raise ValueError(f"the shape {'/'.join(map(str, min(missing)))} of step {step} is in no line `# shapes`")
-    return shapes
+        try:
+            stills[step] = Still.recorded(rows, known)
+        except KeyError as error:
+            lacking = "/".join(map(str, error.args[0]))
+            raise ValueError(f"the shape {lacking} of step {step} is in no line `# shapes`") from None
+        above += len(rows)
+    return stills
 
 
 def _key(text: str) -> Key:

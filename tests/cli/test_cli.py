@@ -14,7 +14,7 @@ import pytest
 
 from overlapper.cli.check import check
 from overlapper.cli.refusals import Refused
-from overlapper.tables.table_file import read_csv, read_table
+from overlapper.tables.table_file import read_table
 
 TWO_CUBES = '''
 """A cube rests 2 cm deep in another."""
@@ -168,7 +168,7 @@ def test_links_as_a_whole_are_measured_where_their_shapes_overlap_each_other(tmp
     assert pair["largest_volume_m3"] == pytest.approx(2 * 0.2**3, rel=1e-6)
     assert pair["volume_error_m3"] < 1e-12
     overlapper("run", "crosses.py", "--per", "link", "--out", "links.csv")
-    shapes, links = (read_csv(tmp_path / name) for name in ("shapes.csv", "links.csv"))
+    shapes, links = (read_table(tmp_path / name) for name in ("shapes.csv", "links.csv"))
     assert [row["step"] for row in links] == [1, 2]
     for row in links:
         assert row["shapeA"] is row["shapeB"] is row["area_m2"] is None
@@ -266,7 +266,7 @@ def test_json_is_all_there_is_on_stdout():
 def test_a_run_writes_its_table_and_its_recording():
     done = overlapper("run", "two_cubes.py", "--out", "made/two.csv", "--html", "made/two.html", "--check", "fcl")
     assert done.returncode == 0
-    rows = read_csv(Path("made/two.csv"))
+    rows = read_table(Path("made/two.csv"))
     assert [row["step"] for row in rows] == list(range(1, 9))
     assert all(row["volume_m3"] == pytest.approx(2e-4) and row["fcl"] == "agree" for row in rows)
     with open("made/two.html", encoding="utf-8") as page:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow.parquet
 import pytest
 
-from overlapper.tables.table_file import read_csv
+from overlapper.tables.table_file import read_table
 
 CUBE = '''"""A cube on a plane."""
 import pybullet as p
@@ -50,7 +50,7 @@ def test_a_run_has_forces_in_its_table_and_in_its_files():
     said = overlapper("run", "cube.py", "--contact", "volumetric", "--out", "cube.csv", "--html", "cube.html").stdout
     assert re.search(r"force *\n.* N *\n", said) and re.search(r" 9\.81 *\n", said)
     assert "Force: the largest between" in " ".join(said.split())
-    assert read_csv(Path("cube.csv"))[-1]["force_z_n"] == pytest.approx(-9.81)
+    assert read_table(Path("cube.csv"))[-1]["force_z_n"] == pytest.approx(-9.81)
     assert "\n# contact: volumetric\n" in Path("cube.csv").read_text()
     told = json.loads(overlapper("run", "cube.py", "--contact", "volumetric", "--json").stdout)
     assert told["settings"]["contact"] == "volumetric"

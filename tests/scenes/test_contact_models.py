@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from overlapper.scenes.record import record
+from overlapper.scenes.check import examined, record
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import SceneError, load_scene
-from overlapper.scenes.verdict import examine
 from overlapper.simulation import link_contacts
 from overlapper.tables.outputs import outputs
 from overlapper.tables.summary import Summary
@@ -166,7 +165,7 @@ def test_an_expected_file_has_forces_with_their_budgets(recorded):
     expected = read_expected(recorded.expected)
     assert {name: expected.budgets[name] for name in FORCE_BUDGETS} == FORCE_BUDGETS
     assert lying(expected.rows) == pytest.approx(LYING, abs=1e-6)
-    verdict = examine(recorded, expected)
+    verdict = examined(recorded, expected)
     assert verdict.moves == [] and "where today's simulation puts and pushes them" in verdict.lines()[2]
 
 
@@ -176,7 +175,7 @@ def test_a_force_that_is_another_has_moved(recorded):
     heavier = re.sub(r"-9\.8[01]\d*", "-9.5", text)
     assert heavier != text
     recorded.expected.write_text(heavier, encoding="utf-8")
-    verdict = examine(recorded, read_expected(recorded.expected))
+    verdict = examined(recorded, read_expected(recorded.expected))
     assert {move.quantity for move in verdict.moves} == {"force_n"} and len(verdict.dynamics) == 4
     assert "force_n is (" in str(verdict.moves[0]) and verdict.moves[0].difference == pytest.approx(0.31, abs=1e-3)
     assert "energy" in {*compare_forces(verdict.expected.rows, [], verdict.expected.budgets).spent}

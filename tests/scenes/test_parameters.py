@@ -8,9 +8,9 @@ import pytest
 
 from overlapper.cli.options import given_parameters
 from overlapper.cli.refusals import Refused
+from overlapper.scenes.check import record
 from overlapper.scenes.parameters import parameters_of, value_of, values_of
 from overlapper.scenes.playback import play
-from overlapper.scenes.record import record
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import SceneError, load_scene
 from overlapper.tables.table_file import read_metadata, read_table

@@ -8,7 +8,8 @@ from xml.etree import ElementTree
 import pytest
 
 # Loaded here, as pytester unloads what was loaded during its runs, and extension modules cannot be loaded twice.
-from overlapper.scenes import before_after, check
+from overlapper.scenes import check
+from overlapper.verdicts import before_after
 
 pytest_plugins = ["pytester"]
 

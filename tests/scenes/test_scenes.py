@@ -8,11 +8,11 @@ import pybullet as p
 import pytest
 
 from overlapper.reference import Fcl
-from overlapper.scenes.record import replay
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import load_scene
 from overlapper.verdicts.comparison import compare_measures
 from overlapper.verdicts.expected import read_expected
+from overlapper.verdicts.replay import replay
 
 SCENES = Path(__file__).parents[2] / "scenes"
 NAMES = sorted(path.stem for path in SCENES.glob("*.py"))

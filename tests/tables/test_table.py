@@ -17,7 +17,7 @@ import pytest
 from overlapper import Box, Placed, overlap
 from overlapper.simulation.contacts import Contact
 from overlapper.tables.table import COLUMNS, rows
-from overlapper.tables.table_file import NEEDED, TABLES, CsvTable, ParquetTable, read_csv, read_metadata, read_table
+from overlapper.tables.table_file import NEEDED, TABLES, CsvTable, ParquetTable, read_metadata, read_table
 from overlapper.whole_file import must_be_writable
 
 ENDINGS = sorted(TABLES)
@@ -141,7 +141,7 @@ def test_a_line_that_a_kill_has_cut_is_not_read(tmp_path):
     table.write(Cubes().rows(1))
     left = table.leave()
     left.write_text(left.read_text()[:-7])
-    assert read_csv(left) == Cubes().rows(1)[:2]
+    assert read_table(left) == Cubes().rows(1)[:2]
 
 
 def test_a_line_that_a_signal_has_cut_is_not_in_the_table(tmp_path):
@@ -149,7 +149,7 @@ def test_a_line_that_a_signal_has_cut_is_not_in_the_table(tmp_path):
     table.write(Cubes().rows(1))
     table._file.write(b"2,0.00833")
     table.close()
-    assert read_csv(tmp_path / "run.csv") == Cubes().rows(1)
+    assert read_table(tmp_path / "run.csv") == Cubes().rows(1)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -196,7 +196,7 @@ def test_a_link_to_a_table_stays_one(tmp_path):
     (tmp_path / "run.csv").symlink_to(tmp_path / "kept" / "run.csv")
     CsvTable(tmp_path / "run.csv").close()
     assert (tmp_path / "run.csv").is_symlink()
-    assert read_csv(tmp_path / "kept" / "run.csv") == []
+    assert read_table(tmp_path / "kept" / "run.csv") == []
     assert (tmp_path / "kept" / "run.csv").stat().st_mode & 0o777 == 0o640
 
 
@@ -250,7 +250,7 @@ def test_what_is_no_table_is_refused_by_name(tmp_path, text):
     path: Path = tmp_path / "other.csv"
     path.write_text(text)
     with pytest.raises(ValueError, match=r"other\.csv"):
-        read_csv(path)
+        read_table(path)
 
 
 @pytest.mark.parametrize(
@@ -274,7 +274,7 @@ def test_a_file_that_is_no_table_is_refused_in_a_sentence(tmp_path, text, senten
     path = tmp_path / "t.csv"
     path.write_text(text)
     with pytest.raises(ValueError, match=sentence):
-        read_csv(path)
+        read_table(path)
 
 
 def database(path, *statements):

@@ -14,11 +14,11 @@ import pytest
 from browser import Browser
 from tornado.websocket import websocket_connect
 
-from overlapper import scenes
-from overlapper.scenes import before_after, check
-from overlapper.scenes.record import record
+from overlapper import verdicts
+from overlapper.scenes import check
+from overlapper.scenes.check import examined, record
 from overlapper.scenes.scene import load_scene
-from overlapper.scenes.verdict import examine
+from overlapper.verdicts import before_after
 from overlapper.verdicts.comparison import Move
 from overlapper.verdicts.expected import read_expected
 
@@ -46,7 +46,7 @@ def verdict(tmp_path):
     record(load_scene(path))
     path.write_text(CUBES.replace("0.15]", "0.17]"))
     scene = load_scene(path)
-    return examine(scene, read_expected(scene.expected))
+    return examined(scene, read_expected(scene.expected))
 
 
 def test_the_page_tells_the_verdicts_and_holds_both_frames(verdict, tmp_path):
@@ -81,11 +81,12 @@ def test_without_meshcat_there_is_no_page_and_the_verdict_says_why(tmp_path, mon
     path.write_text(CUBES)
     record(load_scene(path))
     path.write_text(CUBES.replace("0.15]", "0.17]"))
-    monkeypatch.delattr(scenes, "before_after")
-    monkeypatch.setitem(sys.modules, "overlapper.scenes.before_after", None)
+    monkeypatch.delattr(verdicts, "before_after")
+    monkeypatch.setitem(sys.modules, "overlapper.verdicts.before_after", None)
     outcome = check.hold(path, tmp_path / "pages")
     assert (outcome.word, outcome.page) == ("moved", None)
-    assert outcome.lines[-1].startswith("no page of before and after: import of overlapper.scenes.before_after halted")
+    cause = "import of overlapper.verdicts.before_after halted"
+    assert outcome.lines[-1].startswith(f"no page of before and after: {cause}")
 
 
 def test_a_scene_that_ends_before_a_recorded_step_has_no_second_frame(tmp_path):

@@ -8,13 +8,13 @@ import pytest
 
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Sphere
 from overlapper.polytopes.shape_text import alike, shape_of, text_of
-from overlapper.scenes.record import record, replay
+from overlapper.scenes.check import examined, record
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import SceneError, load_scene
-from overlapper.scenes.verdict import examine
 from overlapper.tables.table import COLUMNS, POSE
 from overlapper.verdicts.comparison import compare_measures, compare_poses, loose_budgets
 from overlapper.verdicts.expected import DRIFT, Budget, read_expected
+from overlapper.verdicts.replay import replay
 
 TWO_CUBES = '''
 """Two unit cubes, the second of which slides over the first by a centimetre a step."""
@@ -116,14 +116,14 @@ def edited(scene_file, old, new):
     assert old in text
     scene_file.write_text(text.replace(old, new))
     scene = load_scene(scene_file)
-    return examine(scene, read_expected(scene.expected))
+    return examined(scene, read_expected(scene.expected))
 
 
 def test_what_was_recorded_is_found_again(recorded):
     expected = read_expected(recorded.expected)
     assert [row["step"] for row in expected.rows if row["status"] == "overlapping"] == [1, 3, 4, 6]
     assert [row["bodyA"] for row in expected.rows if row["status"] == "alone"] == [2] * 4
-    verdict = examine(recorded, expected)
+    verdict = examined(recorded, expected)
     assert verdict.moves == []
     assert verdict.notes == []
     assert [line.split("(")[0].split() for line in verdict.lines()] == [
@@ -141,13 +141,13 @@ def test_a_scene_that_is_moved_is_the_same_to_rounding(recorded):
 def test_a_first_recording_has_budgets_of_five_times_what_rounding_needs(recorded):
     text = recorded.expected.read_text()
     assert "# budget volume: relative " in text
-    assert examine(recorded, read_expected(recorded.expected)).notes == []
+    assert examined(recorded, read_expected(recorded.expected)).notes == []
     recorded.expected.write_text(text.replace("# budget volume: relative ", "# budget volume: relative 1"))
-    (note,) = examine(recorded, read_expected(recorded.expected)).notes
+    (note,) = examined(recorded, read_expected(recorded.expected)).notes
     assert "the budget of volume is " in note and "times what is needed" in note
     expected = read_expected(recorded.expected)
     expected.budgets["volume"] = Budget(1e-20, 0.0)
-    verdict = examine(recorded, expected)
+    verdict = examined(recorded, expected)
     assert verdict.moves == []
     assert any("budget of volume is too narrow" in note for note in verdict.notes)
 
@@ -174,7 +174,7 @@ def test_an_empty_scene_is_as_recorded(scene_file):
     scene_file.write_text("STEPS = 2\ndef build(client): pass")
     scene = load_scene(scene_file)
     record(scene)
-    assert examine(scene, read_expected(scene.expected)).moves == []
+    assert examined(scene, read_expected(scene.expected)).moves == []
 
 
 def test_a_failing_recording_leaves_what_was_expected(recorded, scene_file):
@@ -251,7 +251,7 @@ def test_bodies_that_came_or_went_are_named(recorded, scene_file):
 def test_another_geometry_is_told_from_shapes_and_dynamics(recorded):
     expected = read_expected(recorded.expected)
     expected.rows[0]["volume_m3"] *= 1.01
-    verdict = examine(recorded, expected)
+    verdict = examined(recorded, expected)
     assert [bool(moves) for moves in verdict.causes.values()] == [True, False, False]
     assert [(move.step, move.quantity) for move in verdict.geometry] == [(1, "volume_m3")]
 

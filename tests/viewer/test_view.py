@@ -13,8 +13,8 @@ from PIL import Image
 
 from overlapper import Box, HalfSpace, Placed, RoundedHull, Sphere, overlap
 from overlapper.cli import view as cli
+from overlapper.scenes.check import record
 from overlapper.scenes.playback import largest, play
-from overlapper.scenes.record import record
 from overlapper.scenes.scene import load_scene
 from overlapper.tables.table_file import NEEDED
 from overlapper.viewer import picture

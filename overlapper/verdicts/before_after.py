@@ -10,9 +10,9 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 
-from overlapper.scenes.verdict import Verdict
 from overlapper.tables.still import Still
 from overlapper.verdicts.comparison import Move
+from overlapper.verdicts.verdict import Verdict
 from overlapper.viewer import Recording
 from overlapper.viewer.page_text import filled
 from overlapper.whole_file import beside
@@ -23,7 +23,7 @@ LIMIT = 3  # moves of a cause; what more there is, the terminal counts
 def save(verdict: Verdict, name: str, path: Path) -> Path:
     """Write the page of a verdict with moves to one self-contained HTML file, and return its path."""
     step = verdict.worst_step
-    before, after = (stills.get(step) for stills in (verdict.before, verdict.after))
+    before, after = (stills.get(step) for stills in (verdict.expected.stills, verdict.today))
     frames = (_dressed(before, after), f"step {step} as recorded"), (after, f"step {step} today")
     stills = [(still, name) for still, name in frames if still is not None and still.keys]
     sections = verdict.causes | ({"overlaps": verdict.overlaps} if verdict.overlaps else {})

@@ -11,9 +11,6 @@ from dataclasses import dataclass, field, replace
 
 from overlapper import Hull, Shape
 from overlapper.polytopes.shape_text import alike
-from overlapper.scenes.record import replay, rounding
-from overlapper.scenes.run import stills
-from overlapper.scenes.scene import Scene
 from overlapper.tables.still import Still
 from overlapper.verdicts.comparison import (
     Differences,
@@ -25,6 +22,7 @@ from overlapper.verdicts.comparison import (
     shape_label,
 )
 from overlapper.verdicts.expected import HUNDREDTHS, Expected
+from overlapper.verdicts.replay import measured, replay, rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +32,7 @@ class Verdict:
     `geometry`: overlaps of the shapes and poses recorded, measured by today's package. `shapes`: shapes as today's
     simulation has them. `dynamics`: poses of today's simulation, and forces of volumetric contact. `overlaps`: what has
     become of the overlaps because of the last two, and empty if both are as recorded. `notes`: sentences about budgets
-    that do not fit. `before` and `after` are the steps as recorded and as they are today.
+    that do not fit. `today` has the steps as they are today, `expected.stills` as they were recorded.
     """
 
     expected: Expected
@@ -43,8 +41,7 @@ class Verdict:
     dynamics: list[Move]
     overlaps: list[Move]
     notes: list[str]
-    before: dict[int, Still] = field(repr=False)
-    after: dict[int, Still] = field(repr=False)
+    today: dict[int, Still] = field(repr=False)
 
     @property
     def causes(self) -> dict[str, list[Move]]:
@@ -80,46 +77,34 @@ class Verdict:
         return lines + [f"note      {note}" for note in self.notes]
 
 
-def examine(scene: Scene, expected: Expected) -> Verdict:
-    """Run the scene and compare it with what was recorded. SceneError if it fails."""
-    after = stills(scene, expected.steps)
-    names = {link: name for still in after.values() for link, name in still.names.items()}
-    before = {step: Still.recorded(recorded, expected.shapes[step]) for step, recorded in expected.rows_by_step()}
+def examine(expected: Expected, today: dict[int, Still], last_step: int) -> Verdict:
+    """Compare a scene as it is `today`, by step, with what was recorded; it ends with `last_step`."""
+    names = {link: name for still in today.values() for link, name in still.names.items()}
     geometry = compare_measures(expected.rows, replay(expected), expected.budgets, names)
-    today = [row for step, still in after.items() for row in still.placements(step)]
-    dynamics = compare_poses(expected.rows, today, expected.budgets, names)
-    if any(still.forces is not None for still in after.values()):
-        today = [row for step, still in after.items() for row in still.rows(step, expected.tolerance)]
-        forces = compare_forces(expected.rows, today, expected.budgets, names)
+    placed = [row for step, still in today.items() for row in still.placements(step)]
+    dynamics = compare_poses(expected.rows, placed, expected.budgets, names)
+    if any(still.forces is not None for still in today.values()):
+        forces = compare_forces(expected.rows, measured(today, expected.tolerance), expected.budgets, names)
         dynamics = Differences(dynamics.moves + forces.moves, dynamics.spent | forces.spent)
-    shapes = _shape_moves(scene, before, after, names)
+    shapes = _shape_moves(expected.stills, today, last_step, names)
     overlaps: list[Move] = []
     if shapes or dynamics.moves:
-        today = [row for step, still in after.items() for row in still.rows(step, expected.tolerance)]
-        changes = compare_measures(expected.rows, today, HUNDREDTHS, names).moves
+        changes = compare_measures(expected.rows, measured(today, expected.tolerance), HUNDREDTHS, names).moves
         overlaps = [replace(move, allowed=math.nan) for move in changes if move.quantity != "volume_error_m3"]
-    return Verdict(
-        expected,
-        geometry.moves,
-        shapes,
-        dynamics.moves,
-        overlaps,
-        _notes(geometry, rounding(expected), dynamics),
-        before,
-        after,
-    )
+    notes = _notes(geometry, rounding(expected), dynamics)
+    return Verdict(expected, geometry.moves, shapes, dynamics.moves, overlaps, notes, today)
 
 
 def _shape_moves(
-    scene: Scene, before: dict[int, Still], after: dict[int, Still], names: dict[tuple[int, int], str]
+    before: dict[int, Still], today: dict[int, Still], last_step: int, names: dict[tuple[int, int], str]
 ) -> list[Move]:
     """The shapes that are not those recorded, each in the first step where it is so."""
     moves: dict[str, Move] = {}
     for step, recorded in before.items():
-        if step not in after:
-            moves.setdefault("", Move(step, "the scene", "last step", str(step), str(scene.steps)))
+        if step not in today:
+            moves.setdefault("", Move(step, "the scene", "last step", str(step), str(last_step)))
             continue
-        was, now = (dict(zip(still.keys, still.shapes)) for still in (recorded, after[step]))
+        was, now = (dict(zip(still.keys, still.shapes)) for still in (recorded, today[step]))
         for k in sorted(was.keys() | now.keys()):
             if k not in was or k not in now or not alike(was[k], now[k]):
                 who = shape_label(k, names)

@@ -1,0 +1,62 @@
+"""An expected file as today's simulation would write it, and as today's geometry measures it without a simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from overlapper.tables.still import Still
+from overlapper.tables.table import Row
+from overlapper.verdicts.comparison import compare_measures
+from overlapper.verdicts.expected import DRIFT, FORCES, MEASURES, ROUNDING, Budget, Expected
+
+# Where a scene is put to see how far rounding alone changes its measures, in m.
+ASIDES = ((0.3, 0.7, 0.1), (-0.2, 0.4, 0.9), (0.6, -0.5, -0.3))
+
+
+def wanted(last_step: int, forces: bool) -> Expected:
+    """What is recorded of a scene that has no expected file: four steps, with the budgets of any scene."""
+    steps = sorted({max(last_step * quarter // 4, 1) for quarter in (1, 2, 3, 4)})
+    return Expected(steps, 1e-3, ROUNDING | DRIFT | (FORCES if forces else {}))
+
+
+def observed(wanted: Expected, today: dict[int, Still]) -> Expected:
+    """The scene as it is `today`, with the steps, the tolerance and the budgets that are wanted."""
+    return replace(wanted, rows=measured(today, wanted.tolerance), stills=today)
+
+
+def fitted(made: Expected) -> Expected:
+    """With budgets of five times what rounding needs, to one digit; the others stay."""
+    needed = {
+        name: Budget(*(float(f"{5 * part * each:.0e}") for each in (budget.relative, budget.absolute)))
+        for name, part in rounding(made).items()
+        for budget in [made.budgets[name]]
+        if part
+    }
+    return replace(made, budgets=made.budgets | needed)
+
+
+def measured(stills: Mapping[int, Still], tolerance: float) -> list[Row]:
+    """The rows of all steps, measured by today's geometry."""
+    return [row for step, still in stills.items() for row in still.rows(step, tolerance)]
+
+
+def rounding(expected: Expected) -> dict[str, float]:
+    """The largest part of each budget of a measure that rounding takes when all is moved by less than a metre."""
+    spent = [compare_measures(expected.rows, replay(expected, aside), expected.budgets).spent for aside in ASIDES]
+    return {name: max(each[name] for each in spent) for name in spent[0]}
+
+
+def replay(expected: Expected, moved_by: Sequence[float] = (0.0, 0.0, 0.0)) -> list[Row]:
+    """The rows that today's geometry makes of the shapes and poses of an expected file, without a simulator.
+
+    With `moved_by`, in m, the bodies are moved before they are measured, and the rows are moved back. The differences
+    are rounding.
+    """
+    moved = {step: still.moved(moved_by) for step, still in expected.stills.items()}
+    table = measured(moved, expected.tolerance)
+    for row in table:
+        for column, distance in zip(MEASURES["centroid"], moved_by):
+            if row.get(column) is not None:
+                row[column] = float(row[column] or 0.0) - distance
+    return table
