@@ -344,7 +344,8 @@ def broken_laws(found: Solution, tolerance: float = 1e-8) -> list[str]:
             speeds = np.linalg.norm(there, axis=1)
             ask("power of friction", power, -limit * shares @ speeds, scale * speed)
             ask("friction within its limit", max(0.0, float(np.linalg.norm(drag)) - limit), 0, scale)
-            if speeds.min() > 1e-2 * fastest:
+            round_patch = np.ptp(patch.radii[0]) < 1e-6 * patch.radii[0].sum()  # whose points may be turned at will
+            if speeds.min() > 1e-2 * fastest and not round_patch:
                 each = -limit * (shares / speeds)[:, None] * there
                 ask("friction that slides", drag, each.sum(0), scale)
                 ask("spin that slides", twist, np.cross(arms, each).sum(0) @ normal, scale)

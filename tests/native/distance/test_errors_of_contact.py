@@ -306,3 +306,14 @@ def test_the_depth_of_prisms_on_each_other_is_as_right_as_stated(sides, seed):
     way = root(exact.depth_squared(exact.hull(a), exact.hull(b)))
     assert abs(Fraction(found.depth) - way) <= Fraction(found.errors.depth)
     assert found.errors.depth <= max(1e-9 * found.depth, 1e-16)
+
+
+@pytest.mark.parametrize("sides", [200, 600])
+def test_the_depth_of_lids_of_very_many_sides_has_an_error_bound_that_holds(sides):
+    """200 sides have too many corners to ask along all products of ridges; 600 sides have too many ridges."""
+    lower, upper = prism(sides), prism(sides) + [0, 0, 1 - 1e-9]
+    truth = Fraction(lower[:, 2].max()) - Fraction(upper[:, 2].min())
+    found = overlap(Hull(lower), Hull(upper))
+    assert_allclose(found.normal, (0, 0, -1), atol=1e-15)
+    assert abs(Fraction(found.depth) - truth) <= Fraction(found.errors.depth)
+    assert 1e-16 < found.errors.depth <= 1e-13

@@ -7,6 +7,7 @@ import exact
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import quad
 from strategies import directions, overlapping_points, quaternion, rotation
 
 from overlapper import Batch, Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
@@ -174,6 +175,27 @@ def test_mean_distances_are_those_of_points_of_the_floor_inside_the_body(body):
             swapped = overlap(FLOOR, Placed(shape, (1, 2, height), turned))
             assert_allclose(swapped.patch_moments, answer.patch_moments, atol=1e-14)
             assert swapped.patch_distance == pytest.approx(answer.patch_distance, abs=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_mean_distance_in_the_patch_of_a_tilted_ellipsoid_is_that_in_an_ellipse(seed):
+    """The patch is an ellipse, and the centroid is not over its centre. In polar coordinates about the centroid, the
+    integral of the distance is a third of that of the cube of the border's distance."""
+    rng = np.random.default_rng(seed)
+    shape, turned = Ellipsoid(rng.uniform(0.2, 0.8, 3)), quaternion(rng)
+    height = overlap(Placed(shape, (0, 0, 0), turned), FLOOR).depth * rng.uniform(-0.6, 0.8)
+    answer = overlap(Placed(shape, (1, 2, height), turned), FLOOR)
+    area, centre = answer.patch_area[2], (answer.patch_centre - answer.centroid)[:2]
+    inverse = np.linalg.inv(4 * answer.patch_moments[:2, :2] / area)
+    assert np.linalg.norm(centre) > 0.01 * np.sqrt(area)
+
+    def cube_of_border(angle):
+        to = np.array([np.cos(angle), np.sin(angle)])
+        a, b, c = to @ inverse @ to, to @ inverse @ centre, centre @ inverse @ centre - 1
+        return ((b + np.sqrt(b * b - a * c)) / a) ** 3
+
+    truth = quad(cube_of_border, 0, 2 * np.pi, epsrel=1e-10, limit=200)[0] / 3 / area
+    assert answer.patch_distance == pytest.approx(truth, rel=1e-5)
 
 
 @pytest.mark.parametrize("depth", [1e-2, 1e-5, 1e-8])
