@@ -164,7 +164,8 @@ const Overlaps::Patches& Overlaps::patches() const {
         patch = clipped_patch(placed(pairs[row][0]), placed(pairs[row][1]));
       if (by == Way::kClosedForm) {
         const std::array<double, 6>& pull = gradient[row][1];
-        patch = section_patch(placed(pairs[row][0]), placed(pairs[row][1]), centroid[row], {pull[0], pull[1], pull[2]});
+        patch = closed_forms::section_patch(placed(pairs[row][0]), placed(pairs[row][1]), centroid[row],
+                                            {pull[0], pull[1], pull[2]});
       }
       return patch ? *patch : overlap(row)->patch();
     };

@@ -11,7 +11,6 @@
 #include "geometry/predicates.h"
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
-#include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/round.h"
 #include "methods/tracing/trace.h"
 #include "shapes/canonical_order.h"
@@ -324,7 +323,7 @@ std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping) {
   if (!choose(traits(overlapping.bodies)).tries(Way::kSlicing)) return std::nullopt;
   const Arrangement& at = overlapping.at;
   const WideVector inside = point_inside(overlapping);
-  const auto round = measure_round(at.relative[0], at.relative[1], at.reference, inside);
+  const auto round = measure_by_slices({at.relative[0], at.relative[1], at.reference, inside});
   if (!round) return std::nullopt;
   MeasuresAndInertia answer;
   Measures& m = answer.measures;
@@ -348,7 +347,7 @@ std::optional<Spread> spread(const OverlappingBodies& overlapping, const Measure
   const Arrangement& at = overlapping.at;
   const WideVector inside = point_inside(overlapping);
   const auto with_moved = [&](double outwards) {
-    return measure_round(at.relative[0], at.relative[1], at.reference, inside, outwards);
+    return measure_by_slices({at.relative[0], at.relative[1], at.reference, inside, outwards});
   };
   const double moved = sliced.rounding + std::max(sliced.volume_error, stated.volume_error) / sliced.area;
   const auto large = with_moved(moved), small = with_moved(-moved);
@@ -365,7 +364,7 @@ std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, const Me
   const WideVector inside = point_inside(overlapping);
   const bool swapped = at.order[0] == 1;
   PatchSums sums(measures.centroid - at.reference - rounded(inside), measures.pulls[1].force);
-  if (!measure_round_patch(at.relative[0], at.relative[1], at.reference, inside, swapped ? 0 : 1, sums))
+  if (!measure_by_slices({at.relative[0], at.relative[1], at.reference, inside, 0, swapped ? 0 : 1, &sums}))
     return std::nullopt;
   Patch patch = sums.patch();
   patch.centre += rounded(inside) + at.reference;

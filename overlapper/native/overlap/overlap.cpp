@@ -117,7 +117,7 @@ Patch Overlap::patch_of_overlap() const {
   std::optional<Patch> exact;
   if (way() == Way::kClipping || way() == Way::kWideClipping) exact = clipped_patch(two_[0], two_[1]);
   const Vec3 area = Vec3{} + measures().pulls[1].force;
-  if (way() == Way::kClosedForm) exact = section_patch(two_[0], two_[1], centroid(), area);
+  if (way() == Way::kClosedForm) exact = closed_forms::section_patch(two_[0], two_[1], centroid(), area);
   if (!exact && (way() == Way::kClosedForm || way() == Way::kSlicing))
     exact = sliced_patch(overlapping_bodies(), measures());
   Patch patch = exact ? *exact : patch_of(drawn(), centroid());

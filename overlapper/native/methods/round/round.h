@@ -3,44 +3,77 @@
 #include <array>
 #include <optional>
 
-#include "geometry/measures.h"
-#include "geometry/patch.h"
-#include "geometry/wide.h"
-#include "shapes/shape.h"
+#include "methods/round/closed_forms/closed_forms.h"
+#include "methods/round/pieces/measure.h"
 
 namespace overlapper {
 
-/// The measures of the common set of two bodies of which at least one is round, of the round shapes themselves.
-struct RoundMeasures {
-  double volume = 0, volume_error = 0, area = 0;
-  double first_area = 0;     ///< m²: of the surface, what is the first body's
-  double area_error = 0;     ///< what rules leave open of the area
-  double rounding = 0;       ///< m: how far it may have moved surfaces
-  Vec3 centroid;             ///< about the reference
-  Mat3 inertia;              ///< about the centroid, unit density
-  double inertia_error = 0;  ///< m⁵: what rounding leaves of an ellipsoid's, of each entry
-  Pull pull;                 ///< on the first body, about the reference; that on the second is the opposite
-  int facets_touched = 0;    ///< planes of the bodies that took part
+/// How many of two bodies are of which kind.
+struct RoundTraits {
+  int balls = 0, capsules = 0, cylinders = 0;
+  int stretched = 0;  ///< ellipsoids whose axes differ
+  int rounded_hulls = 0;
+  int flat = 0;          ///< boxes, hulls and half-spaces
+  bool outside = false;  ///< the centre of the round body is outside the flat body
 };
 
-/// Measures a pair that overlaps: pairs of spheres, capsules, cylinders and rounded hulls with each other and with
-/// boxes, hulls and half-spaces, and of ellipsoids with the last three. `inside` is a point of the common set, as deep
-/// inside as can be told; bodies and it are about the reference. Nothing if the error would be larger than 1e-8 of the
-/// volume, not counting by how much facets are not flat, or if the pair is none of these.
-///
-/// Every body is cut into pieces that planes leave of a ball or a cylinder, or of nothing round. Slices orthogonal to
-/// the axes of cylinders are convex polygons cut by one disc at most, and what they hold is integrated between the
-/// values at which their outline changes. No term is negative, so that nothing cancels, and all numbers are distances
-/// from the point inside, found in double-double, so that a contact of any depth is measured to the same digits.
-/// Compare Strobl, Formella and Pöschel (2016), who integrate a ball over a tetrahedron in closed form.
-///
-/// `outwards` moves the surface of one of the bodies; nothing where that leaves nothing of something round.
-std::optional<RoundMeasures> measure_round(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside,
-                                           double outwards = 0);
+/// A line of the table: which two bodies, the closed forms that are tried in turn, and how the pair is sliced.
+struct RoundChoice {
+  const char* bodies;
+  bool (*fits)(const RoundTraits&);
+  /// The answer with the least error counts. No form is tried after one that is right to kEnoughOfRound.
+  std::array<closed_forms::ClosedForm, 3> forms;
+  pieces::Slicing slicing;
+};
 
-/// Adds to `patch`, which counts from `inside`, what of the surface is `owner`'s of a pair that measure_round()
-/// measures, to the same digits. False if that does not.
-bool measure_round_patch(const Placed& a, const Placed& b, Vec3 reference, const WideVector& inside, int owner,
-                         PatchSums& patch);
+/// How pairs with a round body are measured by Way::kClosedForm and Way::kSlicing. The first line that fits counts.
+/// Forms after the last one are null.
+inline constexpr std::array<RoundChoice, 11> kRoundChoices{{
+    {"two balls", [](const RoundTraits& t) { return t.balls == 2; }, {closed_forms::lens}, pieces::measure_pieces},
+    {"two, each a ball or a capsule",
+     [](const RoundTraits& t) { return t.balls + t.capsules == 2; },
+     {closed_forms::sides, closed_forms::lens},
+     pieces::measure_pieces},
+    {"a cylinder, and a ball, a capsule or a cylinder",
+     [](const RoundTraits& t) { return t.balls + t.capsules + t.cylinders == 2; },
+     {closed_forms::sides},
+     pieces::measure_pieces},
+    {"a ball, its centre outside a box, a hull or a half-space",
+     [](const RoundTraits& t) { return t.balls == 1 && t.flat == 1 && t.outside; },
+     {closed_forms::shallow_ball_in_polyhedron, closed_forms::cut_by_one_plane, closed_forms::ball_in_polyhedron},
+     pieces::measure_pieces},
+    {"a ball, its centre inside a box, a hull or a half-space",
+     [](const RoundTraits& t) { return t.balls == 1 && t.flat == 1; },
+     {closed_forms::ball_in_polyhedron, closed_forms::cut_by_one_plane},
+     pieces::measure_pieces},
+    {"a capsule, its centre outside a box, a hull or a half-space",
+     [](const RoundTraits& t) { return t.capsules == 1 && t.flat == 1 && t.outside; },
+     {closed_forms::shallow_end_in_polyhedron, closed_forms::cut_by_one_plane, closed_forms::long_body_in_polyhedron},
+     pieces::measure_pieces},
+    {"a cylinder, its centre outside a box, a hull or a half-space",
+     [](const RoundTraits& t) { return t.cylinders == 1 && t.flat == 1 && t.outside; },
+     {closed_forms::cut_by_one_plane, closed_forms::long_body_in_polyhedron},
+     pieces::measure_pieces},
+    {"a capsule or a cylinder, its centre inside a box, a hull or a half-space",
+     [](const RoundTraits& t) { return t.capsules + t.cylinders == 1 && t.flat == 1; },
+     {closed_forms::long_body_in_polyhedron, closed_forms::cut_by_one_plane},
+     pieces::measure_pieces},
+    {"an ellipsoid, and a box, a hull or a half-space",
+     [](const RoundTraits& t) { return t.stretched == 1 && t.flat == 1; },
+     {closed_forms::ellipsoid_cut_by_one_plane},
+     pieces::measure_stretched},
+    {"a rounded hull, and no ellipsoid",
+     [](const RoundTraits& t) { return t.rounded_hulls > 0 && t.stretched == 0; },
+     {},
+     pieces::measure_culled_pieces},
+    {"all others", [](const RoundTraits&) { return true; }, {}, nullptr},
+}};
+
+/// The measures of an overlapping pair by a formula. `rounding` is how far a surface may be off, in m. Bodies are about
+/// `reference`, in any order.
+std::optional<MeasuresAndInertia> closed_form(const Placed& a, const Placed& b, double rounding, Vec3 reference);
+
+/// The measures of an overlapping pair by slices.
+std::optional<pieces::RoundMeasures> measure_by_slices(const pieces::SlicedPair& pair);
 
 }  // namespace overlapper

@@ -4,7 +4,7 @@
 
 #include "geometry/cancellation.h"
 
-namespace overlapper::slicing {
+namespace overlapper::pieces {
 namespace {
 
 /// Walls that a piece is cut with in the order in which they come. Every cut looks at all corners, so that of more,
@@ -29,7 +29,7 @@ Vec3 Culling::Solid::outward(Vec3 point) const {
   return length > 0 ? from / length : Vec3{};
 }
 
-void Culling::look_at(const Pieces& a, const Pieces& b, const Enclosure& common) {
+void Culling::look_at(const Pieces& a, const Pieces& b, const EnclosingPolytope& common) {
   margin_ = 1e-13 * common.extent();
   enclose(a, common, a_);
   enclose(b, common, b_);
@@ -60,7 +60,7 @@ bool Culling::cut_around(const Pieces& pieces, const Piece& piece) {
   return true;
 }
 
-void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side) {
+void Culling::enclose(const Pieces& pieces, const EnclosingPolytope& common, Side& side) {
   side.pieces = &pieces;
   if (side.parts.size() < pieces.pieces.size()) side.parts.resize(pieces.pieces.size());
   for (size_t i = 0; i < pieces.pieces.size(); ++i) {
@@ -84,7 +84,7 @@ void Culling::enclose(const Pieces& pieces, const Enclosure& common, Side& side)
     for (const Cut& cut : uncut_) part.uncut.push_back(cut.face.wall);
     std::ranges::sort(part.uncut);
     part.walls = part.uncut;
-    for (const Enclosure::Face& face : around_.faces)
+    for (const EnclosingPolytope::Face& face : around_.faces)
       if (face.wall != kNoWall) part.walls.push_back(face.wall);
     std::ranges::sort(part.walls);
     for (const int w : part.walls) part.planes.push_back({rounded(pieces.walls[w].normal), pieces.walls[w].slack.head});
@@ -139,7 +139,7 @@ bool Culling::keep_walls(const Side& side, int piece, const Part& other, std::ve
   return true;
 }
 
-bool Culling::beyond(const Solid& round, const Enclosure& other, Vec3 middle) const {
+bool Culling::beyond(const Solid& round, const EnclosingPolytope& other, Vec3 middle) const {
   if (!(round.radius > 0)) return false;
   const Vec3 normal = round.outward(middle);
   return normal != Vec3{} && other.least(normal) > round.reach(normal) + margin_;
@@ -153,7 +153,7 @@ bool Culling::meet(int p, int q, Meeting& meeting) const {
   return !beyond(one.round, two.around, two.middle) && !beyond(two.round, one.around, one.middle);
 }
 
-bool Culling::share(const Meeting& meeting, Enclosure& polytope) const {
+bool Culling::share(const Meeting& meeting, EnclosingPolytope& polytope) const {
   // Every cut looks at all corners.
   const auto work = [](const Part& part, const std::vector<int>& of_other) {
     return part.around.corners.size() * (of_other.size() + part.uncut.size() + 1);
@@ -162,7 +162,7 @@ bool Culling::share(const Meeting& meeting, Enclosure& polytope) const {
   polytope = (from_p ? a_.parts[meeting.p] : b_.parts[meeting.q]).around;
   const std::vector<int>& known = from_p ? meeting.of_p : meeting.of_q;
   const int size = static_cast<int>(meeting.walls.size()), of_p = static_cast<int>(meeting.of_p.size());
-  for (Enclosure::Face& face : polytope.faces) {
+  for (EnclosingPolytope::Face& face : polytope.faces) {
     const auto at = std::ranges::find(known, face.wall);
     face.wall = at == known.end() ? kNoWall : static_cast<int>(at - known.begin()) + (from_p ? 0 : of_p);
   }
@@ -178,9 +178,9 @@ bool Culling::share(const Meeting& meeting, Enclosure& polytope) const {
   return true;
 }
 
-bool Culling::outside(const Enclosure& polytope, const Meeting& meeting) const {
+bool Culling::outside(const EnclosingPolytope& polytope, const Meeting& meeting) const {
   const Vec3 middle = polytope.middle();
   return beyond(a_.parts[meeting.p].round, polytope, middle) || beyond(b_.parts[meeting.q].round, polytope, middle);
 }
 
-}  // namespace overlapper::slicing
+}  // namespace overlapper::pieces

@@ -3,16 +3,16 @@
 #include <array>
 #include <vector>
 
-#include "methods/round/pieces/enclosure.h"
+#include "methods/round/pieces/enclosing_polytope.h"
 #include "methods/round/pieces/pieces.h"
 
-namespace overlapper::slicing {
+namespace overlapper::pieces {
 
 /// Tells which pieces of two bodies may share something, and which of their walls matter there: by what encloses them
 /// within a polytope around the common set.
 class Culling {
  public:
-  void look_at(const Pieces& a, const Pieces& b, const Enclosure& common);
+  void look_at(const Pieces& a, const Pieces& b, const EnclosingPolytope& common);
 
   /// Adds the pairs of pieces whose boxes meet, in the order of their numbers.
   void near(std::vector<std::array<int, 2>>& pairs);
@@ -29,10 +29,10 @@ class Culling {
 
   /// The polytope that the walls leave of what encloses the common set, every face with the number of its wall among
   /// `meeting.walls`, or kNoWall; false if that is nothing.
-  bool share(const Meeting& meeting, Enclosure& polytope) const;
+  bool share(const Meeting& meeting, EnclosingPolytope& polytope) const;
 
   /// Whether such a polytope lies outside of a round.
-  bool outside(const Enclosure& polytope, const Meeting& meeting) const;
+  bool outside(const EnclosingPolytope& polytope, const Meeting& meeting) const;
 
  private:
   /// A ball, or a cylinder by the point of its axis that is nearest to the origin; nothing without a radius.
@@ -47,7 +47,7 @@ class Culling {
     double reach(Vec3 outward_normal) const { return dot(outward_normal, centre) + radius; }
   };
   struct Part {
-    Enclosure around;
+    EnclosingPolytope around;
     Solid round;
     Vec3 middle;
     double reach = 0;  ///< no corner is farther from the middle
@@ -63,16 +63,16 @@ class Culling {
   };
   /// A wall that a piece may be cut with, and by how much it would be.
   struct Cut {
-    Enclosure::Face face;
+    EnclosingPolytope::Face face;
     double depth;
   };
-  void enclose(const Pieces& pieces, const Enclosure& common, Side& side);
+  void enclose(const Pieces& pieces, const EnclosingPolytope& common, Side& side);
   /// Cuts around_ with the walls of a piece; false if that leaves nothing. Those that it was not cut with, and that may
   /// matter, are left in uncut_.
   bool cut_around(const Pieces& pieces, const Piece& piece);
   bool keep_walls(const Side& side, int piece, const Part& other, std::vector<int>& kept,
                   std::vector<Wall>& walls) const;
-  bool beyond(const Solid& round, const Enclosure& other, Vec3 middle) const;
+  bool beyond(const Solid& round, const EnclosingPolytope& other, Vec3 middle) const;
 
   /// A piece along the axis along which all are swept.
   struct Swept {
@@ -83,9 +83,9 @@ class Culling {
 
   Side a_, b_;
   std::vector<Swept> swept_a_, swept_b_;
-  Enclosure around_;  ///< what a piece leaves of the polytope around the common set
+  EnclosingPolytope around_;  ///< what a piece leaves of the polytope around the common set
   std::vector<Cut> uncut_;
   double margin_ = 0;  ///< m: of rounding
 };
 
-}  // namespace overlapper::slicing
+}  // namespace overlapper::pieces

@@ -4,8 +4,9 @@
 #include <limits>
 
 #include "geometry/cancellation.h"
+#include "methods/round/slicing/slice.h"
 
-namespace overlapper::slicing {
+namespace overlapper::pieces {
 namespace {
 
 /// Planes that are cut with, the six of the box included, to enclose the common set: what does so need not be tight,
@@ -15,7 +16,7 @@ constexpr size_t kMostFaces = 64;
 /// Of a hull whose facets hold their corners but for rounding, the triangles whose planes are looked at instead, and
 /// how many of these may matter: slices have lines for as many, and as many again for the other body.
 constexpr size_t kMostTriangles = 256;
-constexpr size_t kMostOfTriangles = kMostLines / 2;
+constexpr size_t kMostOfTriangles = slicing::kMostLines / 2;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -37,7 +38,7 @@ double reach(const Shape& shape) {
 /// A body in double-double, and the cutter of it.
 class Cutter {
  public:
-  Cutter(const Placed& body, const Placed& other, const Enclosure* common, int owner, Vec3 reference,
+  Cutter(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
          const WideVector& inside, Pieces& result)
       : other_(other),
         common_(common),
@@ -94,13 +95,13 @@ class Cutter {
     if (half > 0) {
       begin();
       cylinder({}, {{}, {}, {1}}, c.radius, half);
-      for (const double sign : {-1.0, 1.0}) wall({{}, {}, {sign}}, {half}, kCut);
+      for (const double sign : {-1.0, 1.0}) wall({{}, {}, {sign}}, {half}, slicing::kCut);
       end();
     }
     for (const double sign : {-1.0, 1.0}) {
       begin();
       ball({{}, {}, {sign * half}}, c.radius);
-      if (half > 0) wall({{}, {}, {-sign}}, {-half}, kCut);
+      if (half > 0) wall({{}, {}, {-sign}}, {-half}, slicing::kCut);
       end();
       if (half == 0) break;
     }
@@ -121,7 +122,7 @@ class Cutter {
     const HullData& core = *hull.core.data;
     result_.flatness = std::max(result_.flatness, unexact(core));
     begin();
-    for (int f = 0; f < facets(core); ++f) facet_wall(core, f, 0, kCut);
+    for (int f = 0; f < facets(core); ++f) facet_wall(core, f, 0, slicing::kCut);
     end();
     const Bounds near = local_bounds(hull.radius);
     for (int f = 0; f < facets(core); ++f)
@@ -148,7 +149,7 @@ class Cutter {
     if (!common_) return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
     Bounds box{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
     const Vec3 wider = (more + margin_) * Vec3{1, 1, 1};
-    for (const Enclosure::Corner& corner : common_->corners) {
+    for (const EnclosingPolytope::Corner& corner : common_->corners) {
       const Vec3 at = apply_transposed(plain_rotation_, corner.at - plain_origin_);
       box = {min(box.lower, at), max(box.upper, at)};
     }
@@ -273,14 +274,14 @@ class Cutter {
   }
   static Vec3 rounded(const WideVector& v) { return overlapper::rounded(v); }
 
-  void wall_through(const WideVector& normal, Vec3 point) { wall(normal, dot(normal, wide(point)), kCut); }
+  void wall_through(const WideVector& normal, Vec3 point) { wall(normal, dot(normal, wide(point)), slicing::kCut); }
 
   void prism(const HullData& hull, int f, double radius) {
     const Plane& plane = hull.planes[f];
     if (beyond(plane.normal, plane.offset + radius) || beyond(-plane.normal, -plane.offset)) return;
     begin();
     const auto [normal, offset] = plane_of(hull, f);
-    wall(-normal, -offset, kCut);
+    wall(-normal, -offset, slicing::kCut);
     wall(normal, offset + DoubleDouble{radius}, owner_);
     const auto ring = hull.facet(f);
     for (size_t i = 0; i < ring.size() && !empty_; ++i) {
@@ -319,7 +320,7 @@ class Cutter {
   }
 
   const Placed& other_;
-  const Enclosure* common_;
+  const EnclosingPolytope* common_;
   int owner_;
   Vec3 inside_;
   WideMatrix rotation_;
@@ -339,14 +340,14 @@ double extent(const Placed& body, Vec3 point) {
   return norm(body.pose.translation - point) + reach(body.shape);
 }
 
-void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result) {
+void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& result) {
   const Bounds p = bounds(a), q = bounds(b);
   const Vec3 lower = max(p.lower, q.lower) - inside, upper = min(p.upper, q.upper) - inside;
   const Vec3 size = max(abs(lower), abs(upper));
   const double margin = 1e-12 * (norm(size) + norm(inside) + norm(a.pose.translation) + norm(b.pose.translation));
   const Vec3 wider = margin * Vec3{1, 1, 1};
   result.become({lower - wider, upper + wider});
-  thread_local std::vector<Enclosure::Face> planes;
+  thread_local std::vector<EnclosingPolytope::Face> planes;
   planes.clear();
   for (const Placed* body : {&a, &b}) {
     const Vec3 origin = body->pose.translation - inside;
@@ -364,8 +365,8 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result) {
       add(half->plane, 0);
     }
   }
-  std::ranges::sort(planes, {}, &Enclosure::Face::slack);
-  for (const Enclosure::Face& plane : planes) {
+  std::ranges::sort(planes, {}, &EnclosingPolytope::Face::slack);
+  for (const EnclosingPolytope::Face& plane : planes) {
     if (result.faces.size() >= kMostFaces) break;
     cancellation_point(result.corners.size());
     result.cut(plane);
@@ -373,10 +374,10 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result) {
   result.drop_faces();
 }
 
-void cut(const Placed& body, const Placed& other, const Enclosure* common, int owner, Vec3 reference,
+void cut(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
          const WideVector& inside, Pieces& result) {
   Cutter cutter(body, other, common, owner, reference, inside, result);
   std::visit([&](const auto& shape) { cutter(shape); }, body.shape);
 }
 
-}  // namespace overlapper::slicing
+}  // namespace overlapper::pieces

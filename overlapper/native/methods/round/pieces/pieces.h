@@ -3,33 +3,14 @@
 #include <vector>
 
 #include "geometry/wide_pose.h"
-#include "methods/round/pieces/enclosure.h"
-#include "methods/round/slicing/slice.h"
+#include "methods/round/pieces/enclosing_polytope.h"
+#include "methods/round/slicing/wall.h"
 #include "shapes/shape.h"
 
-namespace overlapper::slicing {
+namespace overlapper::pieces {
 
-/// A ball, or a cylinder without ends, about a point of the common set.
-struct Round {
-  bool ball;
-  WideVector centre;  ///< any point of a cylinder's axis
-  WideVector axis;    ///< unit
-  double radius;
-  double half_length;  ///< of a cylinder: how far from its centre the piece reaches along the axis
-  int owner;
-};
-
-/// The point of a cylinder's axis that is nearest to the origin.
-inline WideVector foot(const Round& cylinder) {
-  return cylinder.centre - dot(cylinder.centre, cylinder.axis) * cylinder.axis;
-}
-
-/// { X : dot(normal, X) <= slack }, about the same point.
-struct Wall {
-  WideVector normal;  ///< unit
-  DoubleDouble slack;
-  int owner;  ///< the body that it is a face of; kCut of a cut between two pieces of one body
-};
+using slicing::Round;
+using slicing::Wall;
 
 /// What planes leave of at most one round.
 struct Piece {
@@ -52,7 +33,7 @@ double extent(const Placed& body, Vec3 point);
 
 /// A polytope around the common set of two bodies of which one is bounded, about the point `inside`: what those planes
 /// of both that are nearest to that point leave of a box, and a little more.
-void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result);
+void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& result);
 
 /// Cuts a body; pieces and walls that `other` does not reach are left out, and so are pieces outside of what encloses
 /// the common set, if that is known. Bodies about a reference, which lies at `reference` in the world; what is cut is
@@ -60,7 +41,7 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, Enclosure& result);
 ///
 /// A capsule is a cylinder and two half balls; a rounded hull is its core, a prism on every facet, a wedge of a
 /// cylinder along every edge, and a wedge of a ball at every vertex.
-void cut(const Placed& body, const Placed& other, const Enclosure* common, int owner, Vec3 reference,
+void cut(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
          const WideVector& inside, Pieces& result);
 
-}  // namespace overlapper::slicing
+}  // namespace overlapper::pieces

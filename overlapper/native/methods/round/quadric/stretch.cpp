@@ -3,7 +3,7 @@
 #include <cfloat>
 #include <numbers>
 
-namespace overlapper::slicing {
+namespace overlapper::quadric {
 namespace {
 
 /// The rule of Gauss and Kronrod with fifteen nodes on [-1, 1], and the weights that the seven of Gauss have in it.
@@ -78,4 +78,4 @@ Stretch::Cap Stretch::cap(Vec3 normal, double height) const {
   return {area.value, area.error};
 }
 
-}  // namespace overlapper::slicing
+}  // namespace overlapper::quadric

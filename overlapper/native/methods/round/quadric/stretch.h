@@ -4,7 +4,7 @@
 
 #include "geometry/vec.h"
 
-namespace overlapper::slicing {
+namespace overlapper::quadric {
 
 /// An ellipsoid, as what makes it of the unit ball about its centre: x, y and z times a half axis each. An area vector
 /// of the ball, or of a plane, becomes one of the ellipsoid by the cofactors, and the size of the element of its
@@ -47,4 +47,4 @@ struct Stretch {
   Cap cap(Vec3 normal, double height) const;
 };
 
-}  // namespace overlapper::slicing
+}  // namespace overlapper::quadric

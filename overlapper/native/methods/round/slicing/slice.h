@@ -7,6 +7,7 @@
 
 #include "geometry/moments.h"
 #include "methods/round/quadric/stretch.h"
+#include "methods/round/slicing/wall.h"
 
 namespace overlapper::slicing {
 
@@ -23,9 +24,6 @@ inline double cross(Point a, Point b) { return a.x * b.y - a.y * b.x; }
 
 /// How many lines may bound a slice; bodies with more planes than that where no cut leaves fewer have another way.
 inline constexpr int kMostLines = 72;
-
-/// The owner of planes that cut a body in two.
-inline constexpr int kCut = 2;
 
 /// A quadric in coordinates (x, y, t) about a point of the common set, X = x l + y m + t T, where T · n = 1, so that
 /// slices are t apart, and T may be oblique: a ball, or a cylinder whose axis lies in the slices. Seen along
@@ -126,7 +124,7 @@ struct Stack {
   Vec3 l, m, n, t;                            ///< the axes, in the world
   Point shear;                                ///< what t has along l and m
   const View* view = nullptr;                 ///< if anything is looked at
-  const Stretch* stretch = nullptr;           ///< of an ellipsoid: what makes the ball and all else out of the world
+  const quadric::Stretch* stretch = nullptr;  ///< of an ellipsoid: what makes the ball and all else out of the world
 
   /// Of a part of a plane whose normal times its area that is, along l, m and n.
   double area(Vec3 normal) const { return stretch->area(normal.x * l + normal.y * m + normal.z * n); }

@@ -4,7 +4,6 @@
 #include <span>
 #include <vector>
 
-#include "methods/round/pieces/pieces.h"
 #include "methods/round/slicing/slice.h"
 
 namespace overlapper::slicing {

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace overlapper {
+namespace overlapper::closed_forms {
 
 /// The depth, over the smaller radius, up to which a contact at sides is shallow.
 inline constexpr double kShallowSides = 0.25;
@@ -25,4 +25,4 @@ SideContact sides_crossing(double r, double s, double depth, double sine);
 /// How far that reaches along the first axis, to either side.
 double reach_of_crossing(double r, double s, double depth, double sine, double cosine);
 
-}  // namespace overlapper
+}  // namespace overlapper::closed_forms

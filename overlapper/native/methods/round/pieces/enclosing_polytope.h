@@ -7,11 +7,11 @@
 
 #include "shapes/shape.h"
 
-namespace overlapper::slicing {
+namespace overlapper::pieces {
 
 /// A convex polytope in doubles, by its corners, each with three edges and three faces. Planes cut it after Powell and
 /// Abel (2015), who place every new corner on an edge, so that none is farther out than rounding.
-struct Enclosure {
+struct EnclosingPolytope {
   /// { X : dot(normal, X) <= slack }, and the number of the wall that it stands for, or none.
   struct Face {
     Vec3 normal;
@@ -61,7 +61,7 @@ struct Enclosure {
 inline constexpr int kNoWall = -1;
 
 template <class Use>
-void Enclosure::for_faces(Use use) const {
+void EnclosingPolytope::for_faces(Use use) const {
   thread_local std::pair<std::vector<int>, std::vector<std::array<bool, 3>>> of_thread;
   of_thread.first.resize(corners.size()), of_thread.second.assign(corners.size(), {});
   // By pointers: every use of what is a thread's own looks for it.
@@ -80,7 +80,7 @@ void Enclosure::for_faces(Use use) const {
 }
 
 template <class Use>
-void Enclosure::for_ring(int first, int edge, Use use) const {
+void EnclosingPolytope::for_ring(int first, int edge, Use use) const {
   int from = first, along = edge;
   do {
     use(from, along);
@@ -90,4 +90,4 @@ void Enclosure::for_ring(int first, int edge, Use use) const {
   } while (from != first || along != edge);
 }
 
-}  // namespace overlapper::slicing
+}  // namespace overlapper::pieces

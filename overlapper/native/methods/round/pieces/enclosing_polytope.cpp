@@ -1,12 +1,12 @@
-#include "methods/round/pieces/enclosure.h"
+#include "methods/round/pieces/enclosing_polytope.h"
 
 #include <algorithm>
 #include <limits>
 #include <utility>
 
-namespace overlapper::slicing {
+namespace overlapper::pieces {
 
-void Enclosure::become(const Bounds& box) {
+void EnclosingPolytope::become(const Bounds& box) {
   const auto& [lower, upper] = box;
   faces = {{{-1, 0, 0}, -lower.x, kNoWall}, {{1, 0, 0}, upper.x, kNoWall},   {{0, -1, 0}, -lower.y, kNoWall},
            {{0, 1, 0}, upper.y, kNoWall},   {{0, 0, -1}, -lower.z, kNoWall}, {{0, 0, 1}, upper.z, kNoWall}};
@@ -23,7 +23,7 @@ void Enclosure::become(const Bounds& box) {
   }
 }
 
-bool Enclosure::cut(const Face& face) {
+bool EnclosingPolytope::cut(const Face& face) {
   thread_local std::pair<std::vector<double>, std::vector<int>> of_thread;
   const int before = static_cast<int>(corners.size());
   of_thread.first.resize(before), of_thread.second.resize(before);
@@ -76,7 +76,7 @@ bool Enclosure::cut(const Face& face) {
   return true;
 }
 
-void Enclosure::drop_faces() {
+void EnclosingPolytope::drop_faces() {
   thread_local std::vector<int> of_thread;
   std::vector<int>& place = of_thread;  // every use of what is a thread's own looks for it
   place.assign(faces.size(), -1);
@@ -90,7 +90,7 @@ void Enclosure::drop_faces() {
     for (int& face : corner.face) face = place[face];
 }
 
-void Enclosure::number_faces(std::vector<std::array<int, 3>>& number, std::vector<int>& left) const {
+void EnclosingPolytope::number_faces(std::vector<std::array<int, 3>>& number, std::vector<int>& left) const {
   number.assign(corners.size(), {kNoWall, kNoWall, kNoWall});
   left.clear();
   for (size_t first = 0; first < corners.size(); ++first)
@@ -102,17 +102,17 @@ void Enclosure::number_faces(std::vector<std::array<int, 3>>& number, std::vecto
     }
 }
 
-bool Enclosure::excludes(Vec3 point) const {
+bool EnclosingPolytope::excludes(Vec3 point) const {
   return std::ranges::any_of(faces, [&](const Face& face) { return dot(face.normal, point) > face.slack; });
 }
 
-Bounds Enclosure::bounds() const {
+Bounds EnclosingPolytope::bounds() const {
   Bounds box{corners[0].at, corners[0].at};
   for (const Corner& corner : corners) box = {min(box.lower, corner.at), max(box.upper, corner.at)};
   return box;
 }
 
-std::pair<double, double> Enclosure::range(Vec3 direction) const {
+std::pair<double, double> EnclosingPolytope::range(Vec3 direction) const {
   double least = std::numeric_limits<double>::infinity(), most = -least;
   for (const Corner& corner : corners) {
     const double at = dot(direction, corner.at);
@@ -121,19 +121,19 @@ std::pair<double, double> Enclosure::range(Vec3 direction) const {
   return {least, most};
 }
 
-Vec3 Enclosure::middle() const {
+Vec3 EnclosingPolytope::middle() const {
   Vec3 sum;
   for (const Corner& corner : corners) sum += corner.at;
   return sum / static_cast<double>(corners.size());
 }
 
-double Enclosure::reach(Vec3 point) const {
+double EnclosingPolytope::reach(Vec3 point) const {
   double reach2 = 0;
   for (const Corner& corner : corners) reach2 = std::max(reach2, norm2(corner.at - point));
   return std::sqrt(reach2);
 }
 
-double Enclosure::surface() const {
+double EnclosingPolytope::surface() const {
   double twice = 0;
   for_faces([&](const Face& face, std::span<const int> ring) {
     Vec3 sum;
@@ -144,4 +144,4 @@ double Enclosure::surface() const {
   return twice / 2;
 }
 
-}  // namespace overlapper::slicing
+}  // namespace overlapper::pieces

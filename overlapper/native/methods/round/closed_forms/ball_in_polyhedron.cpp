@@ -1,0 +1,121 @@
+#include <algorithm>
+#include <limits>
+
+#include "methods/round/closed_forms/answer.h"
+#include "methods/round/quadric/shallow_ball.h"
+#include "shapes/solid.h"
+
+namespace overlapper::closed_forms {
+namespace {
+
+/// The corners, planes and edges of a box or a hull, in coordinates of its own.
+class OwnPolyhedron {
+ public:
+  explicit OwnPolyhedron(const Shape& shape) {
+    if (const Box* box = std::get_if<Box>(&shape)) {
+      for (int i = 0; i < 8; ++i) corners_[i] = corner(*box, i);
+      for (int f = 0; f < 6; ++f) planes_[f] = side(*box, f);
+      polyhedron_ = {corners_, planes_, edges(shape), 6};
+    } else if (const Hull* hull = std::get_if<Hull>(&shape)) {
+      polyhedron_ = {hull->data->vertices, hull->data->planes, edges(shape), hull->data->planes.size()};
+    }
+  }
+  /// Without edges if there is none.
+  const quadric::Polyhedron& operator*() const { return polyhedron_; }
+
+ private:
+  std::array<Vec3, 8> corners_;
+  std::array<Plane, 6> planes_;
+  quadric::Polyhedron polyhedron_;
+};
+
+/// Measures of part of a ball, whose curved surface is the round body's and whose faces are the polyhedron's. `moments`
+/// are the second moments of the part about any point. Planes may be off by `rounding`.
+MeasuresAndInertia measures_of(const quadric::BallPart& part, const Moments& moments, const RoundPair& pair,
+                               Vec3 centre, double rounding) {
+  const Mat3& rotation = pair.flat_body().pose.rotation;
+  Measures q = measures_in_closed_form();
+  q.facets_touched = part.faces;
+  q.volume = part.volume, q.area = part.area;
+  q.volume_error = part.error + rounding * part.area;
+  q.centroid = pair.reference + (centre + rotation * (part.first / part.volume));
+  // The forces on the ball act towards its centre.
+  q.pulls = pulls_of_flat(pair, rotation * part.flat, centre);
+  return {std::move(q), rotation * moments.inertia_about_centroid() * transposed(rotation)};
+}
+
+/// What a ball about that point, in the polyhedron's own coordinates, shares with it in a shallow contact.
+std::optional<quadric::ShallowPart> shallow_part(const OwnPolyhedron& polyhedron, const Placed& other,
+                                                 const WideVector& centre, double radius) {
+  const auto plane = [&](int f) { return own_plane(other.shape, f); };
+  auto part = quadric::measure_shallow_ball(*polyhedron, plane, centre, radius);
+  if (part && !(part->volume > 0)) part.reset();
+  return part;
+}
+
+/// A point of the pair's coordinates in the flat body's own.
+Vec3 in_flat(const RoundPair& pair, Vec3 point) {
+  const Pose& pose = pair.flat_body().pose;
+  return apply_transposed(pose.rotation, point - pose.translation);
+}
+
+/// 1 or -1 for the end of a capsule that is nearer to a polyhedron, measured by the farthest plane. 0 if neither end is
+/// nearer than the radius. Centre and axis are in the polyhedron's coordinates.
+double nearer_end(const quadric::Polyhedron& polyhedron, const Revolved& capsule, Vec3 centre, Vec3 axis) {
+  double side = 0, nearest = capsule.radius;
+  for (const double each : {1.0, -1.0}) {
+    const Vec3 end = centre + each * capsule.half_length * axis;
+    double over = -std::numeric_limits<double>::infinity();
+    for (const Plane& plane : polyhedron.planes) over = std::max(over, signed_distance(plane, end));
+    if (over < nearest) nearest = over, side = each;
+  }
+  return side;
+}
+
+}  // namespace
+
+std::optional<MeasuresAndInertia> shallow_ball_in_polyhedron(const RoundPair& pair) {
+  const Revolved& ball = *pair.revolved[pair.self];
+  const OwnPolyhedron polyhedron(pair.flat_body().shape);
+  if ((*polyhedron).edges.empty()) return std::nullopt;
+  const auto part = shallow_part(polyhedron, pair.flat_body(), seen_from(pair.flat_body(), ball).centre, ball.radius);
+  if (!part) return std::nullopt;
+  return measures_of(*part, part->about_apex, pair, ball.centre, 0);
+}
+
+/// If at most one plane reaches the ball, a cap has fewer terms.
+std::optional<MeasuresAndInertia> ball_in_polyhedron(const RoundPair& pair) {
+  const Revolved& ball = *pair.revolved[pair.self];
+  const OwnPolyhedron polyhedron(pair.flat_body().shape);
+  if ((*polyhedron).edges.empty()) return std::nullopt;
+  const Vec3 centre = in_flat(pair, ball.centre);
+  const auto reaches = [&](const Plane& plane) {
+    return -signed_distance(plane, centre) < ball.radius + pair.rounding;
+  };
+  if (std::ranges::count_if((*polyhedron).planes, reaches) < 2) return std::nullopt;
+  const auto part = quadric::measure_ball(*polyhedron, centre, ball.radius);
+  if (!part || !(part->volume > 0)) return std::nullopt;
+  auto found = measures_of(*part, *part, pair, ball.centre, pair.rounding);
+  if (!std::isfinite(found.measures.volume_error)) return std::nullopt;
+  return found;
+}
+
+std::optional<MeasuresAndInertia> shallow_end_in_polyhedron(const RoundPair& pair) {
+  const Revolved& capsule = *pair.revolved[pair.self];
+  const Placed& flat = pair.flat_body();
+  const OwnPolyhedron polyhedron(flat.shape);
+  if ((*polyhedron).edges.empty()) return std::nullopt;
+  const Vec3 centre = in_flat(pair, capsule.centre), axis = apply_transposed(flat.pose.rotation, capsule.axis);
+  const double side = nearer_end(*polyhedron, capsule, centre, axis), r = capsule.radius;
+  if (side == 0) return std::nullopt;
+  const WideAxis seen = seen_from(flat, capsule);
+  const auto part = shallow_part(polyhedron, flat, seen.centre + side * capsule.half_length * seen.axis, r);
+  if (!part) return std::nullopt;
+  // The whole part is farther along the way to the apex than `distance`. Doubles know the apex to kApex.
+  constexpr double kApex = 1e-7;
+  const double distance = norm(part->apex);
+  if (!(reach_of_cap(r, part->apex / -distance, -distance, -side * axis, kApex * r) < 0)) return std::nullopt;
+  return measures_of(*part, part->about_apex, pair, capsule.centre + side * capsule.half_length * capsule.axis, 0);
+}
+
+}  // namespace overlapper::closed_forms

@@ -1,0 +1,101 @@
+#include <cmath>
+
+#include "methods/round/closed_forms/answer.h"
+#include "methods/round/quadric/ball.h"
+#include "methods/round/quadric/cylinder.h"
+
+namespace overlapper::closed_forms {
+namespace {
+
+/// From parts more remote than that, slices know second moments better.
+constexpr double kRemote = 100;
+/// The fraction of a body's reach from a plane of its ends within which a corner leaves the pair to slices.
+constexpr double kFlush = 1e-9;
+
+/// Sums over the parts of a long body, about its centre, along its axes.
+struct LongBodySums {
+  Moments moments;
+  double error = 0, area = 0;
+  int faces = 0;
+  Pull on_body{};
+};
+
+/// Adds what a cylinder without ends shares with a polyhedron that the planes of its ends have cut. False if that
+/// cannot be told.
+bool add_middle(const quadric::Rings& part, const Revolved& body, LongBodySums& sums) {
+  if (part.empty()) return true;
+  const auto middle = quadric::measure_cylinder(part, body.radius);
+  if (!middle) return false;
+  sums.error = middle->error, sums.faces = middle->faces;
+  // The cuts are faces of a cylinder; they are inside a capsule.
+  sums.area = body.round ? middle->area : middle->whole_area;
+  sums.on_body = body.round ? middle->curved : Pull{-middle->flat.force, -middle->flat.moment};
+  sums.moments += *middle;
+  return true;
+}
+
+/// Adds what the half ball about the height `end` shares with the rest of the polyhedron there. False if that cannot be
+/// told.
+bool add_end(quadric::Rings& part, double end, const Revolved& body, LongBodySums& sums) {
+  if (!part.cut(end, end < 0)) return false;
+  if (part.empty()) return true;
+  const quadric::Polyhedron rest = part.polyhedron();
+  if (rest.edges.empty()) return false;
+  const Vec3 centre{0, 0, end};
+  const auto ball = quadric::measure_ball(rest, centre, body.radius);
+  if (!ball) return true;
+  sums.error += ball->error, sums.area += ball->area, sums.faces += ball->faces;
+  sums.moments += ball->seen_from(centre);
+  sums.on_body.force += -ball->flat, sums.on_body.moment += cross(centre, -ball->flat);
+  return true;
+}
+
+/// Whether a corner is in the plane of an end, but for rounding: a cut there would leave slivers, or faces twice.
+bool flush(const quadric::Rings& polyhedron, const Revolved& body) {
+  const double r = body.radius, h = body.half_length;
+  for (const Vec3 corner : polyhedron.corners())
+    if (std::abs(std::abs(corner.z) - h) <= kFlush * (r + h)) return true;
+  return false;
+}
+
+/// What a capsule, as a cylinder and two half balls, or a cylinder shares with a polyhedron in its coordinates.
+std::optional<LongBodySums> sums_of(const quadric::Rings& polyhedron, const Revolved& body) {
+  thread_local quadric::Rings part;
+  if (flush(polyhedron, body)) return std::nullopt;
+  LongBodySums sums;
+  const double h = body.half_length;
+  part = polyhedron;
+  if (!part.cut(h, true) || !part.cut(-h, false) || !add_middle(part, body, sums)) return std::nullopt;
+  for (const double end : {h, -h}) {
+    if (!body.round) break;
+    part = polyhedron;
+    if (!add_end(part, end, body, sums)) return std::nullopt;
+  }
+  return sums;
+}
+
+}  // namespace
+
+std::optional<MeasuresAndInertia> long_body_in_polyhedron(const RoundPair& pair) {
+  thread_local quadric::Rings polyhedron;
+  const Pose &pose = pair.round_body().pose, &flat = pair.flat_body().pose;
+  if (!polyhedron.become(pair.flat_body().shape, relative_pose(pose, flat))) return std::nullopt;
+  const auto sums = sums_of(polyhedron, *pair.revolved[pair.self]);
+  if (!sums || !(sums->moments.volume > 0)) return std::nullopt;
+  Measures q = measures_in_closed_form();
+  q.volume = sums->moments.volume, q.area = sums->area, q.facets_touched = sums->faces;
+  q.volume_error = sums->error + pair.rounding * q.area;
+  if (!std::isfinite(q.volume_error)) return std::nullopt;
+  q.centroid = pair.reference + pose * (sums->moments.first / q.volume);
+  const Pull turned{pose.rotation * sums->on_body.force, pose.rotation * sums->on_body.moment};
+  for (const int i : {0, 1}) {
+    const double side = i == pair.self ? 1 : -1;
+    q.pulls[i] = about({side * turned.force, side * turned.moment}, pose.translation, pair.positions[i]);
+  }
+  std::optional<Mat3> inertia;
+  if (sums->moments.remoteness() < kRemote)
+    inertia = pose.rotation * sums->moments.inertia_about_centroid() * transposed(pose.rotation);
+  return MeasuresAndInertia{std::move(q), inertia};
+}
+
+}  // namespace overlapper::closed_forms

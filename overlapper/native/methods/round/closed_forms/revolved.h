@@ -1,0 +1,46 @@
+#pragma once
+
+#include <optional>
+
+#include "geometry/wide.h"
+#include "shapes/shape.h"
+#include "shapes/wide_body.h"
+
+namespace overlapper::closed_forms {
+
+/// A ball, a capsule or a cylinder.
+struct Revolved {
+  Vec3 centre, axis;
+  double radius, half_length;
+  bool round;                      ///< it ends in half balls
+  const Placed* placed = nullptr;  ///< the body
+
+  bool ball() const { return round && half_length == 0; }
+  /// The offset of the supporting plane along `direction`, about the centre.
+  double reach(Vec3 direction) const {
+    const double along = dot(axis, direction);
+    return half_length * std::abs(along) + radius * norm(round ? direction : direction - along * axis);
+  }
+};
+
+/// Nothing for bodies of other kinds. An ellipsoid with equal axes is a ball.
+std::optional<Revolved> revolved(const Placed& body);
+
+/// The largest dot(direction, x) over the part of a ball about the origin below a plane, for unit vectors. Where planes
+/// may be off by `rounding`, the answer is no less than that maximum. `offset` is between -r and r.
+double reach_of_cap(double r, Vec3 normal, double offset, Vec3 direction, double rounding);
+
+/// A plane of a half-space, a box or a hull, in coordinates of its own. Nothing if corners of a hull's facet miss it.
+std::optional<WidePlane> own_plane(const Shape& shape, int f);
+
+/// The direction of a body's z axis in the world.
+WideVector axis_of(const Placed& body);
+
+/// The centre of a round body and the direction of its axis.
+struct WideAxis {
+  WideVector centre, axis;
+};
+/// Those of a body, in the own coordinates of another. A ball has no axis.
+WideAxis seen_from(const Placed& other, const Revolved& body);
+
+}  // namespace overlapper::closed_forms
