@@ -28,7 +28,7 @@ from scene_steps import machine, on_one_processor, results_path
 
 from overlapper import _core
 from overlapper.simulation import Bodies, VolumetricContact
-from overlapper.simulation.bullet.dynamics import Dynamics
+from overlapper.simulation.bullet.dynamics import BulletDynamics
 
 G = 9.81
 COLUMNS = ("scene", "part", "us")
@@ -39,13 +39,13 @@ STEPS = 120
 CALLS: dict[tuple[Any, str], str] = {
     (Bodies, "update"): "poses",
     (Bodies, "follow"): "poses",
-    (Dynamics, "frames"): "poses",
+    (BulletDynamics, "frames"): "poses",
     (VolumetricContact, "_coming"): "what comes",
     (Bodies, "overlaps"): "overlaps",
     (_core.ContactSolver, "place"): "patches",
-    (Dynamics, "velocity"): "velocities",
+    (BulletDynamics, "velocity"): "velocities",
     (_core.ContactSolver, "solve"): "solve",
-    (Dynamics, "apply"): "apply",
+    (BulletDynamics, "apply"): "apply",
     (p, "stepSimulation"): "stepSimulation",
 }
 PARTS = dict.fromkeys(CALLS.values())

@@ -15,9 +15,9 @@ from overlapper.audit.robot import read_robot
 from overlapper.audit.verdicts import audit
 from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, Surface, decompose
 from overlapper.printable import first_line
+from overlapper.simulation.bullet.joints import ENDINGS
 from overlapper.simulation.bullet.model_file import NotRead
 from overlapper.simulation.contacts import Contacts
-from overlapper.simulation.kinematic_tree import ENDINGS
 from overlapper.simulation.links import link_contacts
 
 MESHES = (".obj", ".off", ".ply", ".stl", ".3mf", ".glb", ".gltf", ".step", ".stp")

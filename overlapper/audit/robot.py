@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.printable import first_line
+from overlapper.simulation.bullet.joints import kinematic_tree
 from overlapper.simulation.bullet.model_file import NotRead
-from overlapper.simulation.kinematic_tree import KinematicTree, kinematic_tree
+from overlapper.simulation.kinematic_tree import KinematicTree
 
 TURN = ("x", "y", "z", "w")  # of a spherical joint
 

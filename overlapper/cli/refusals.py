@@ -14,7 +14,7 @@ from typing import BinaryIO, NoReturn, TextIO
 from overlapper.jobs.worker import NotStarted
 from overlapper.printable import first_line, printable
 from overlapper.scenes.scene import SceneError
-from overlapper.simulation.forces.cautions import NoDirectionWarning, SubstepsWarning
+from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning
 
 LIBC = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
 

@@ -140,7 +140,7 @@ def sweep(
         stack.enter_context(scene_refusals(noise))
         stack.enter_context(input_refusals())
         with without_banner():
-            import overlapper.simulation.bodies  # noqa: F401  # which says now what to install
+            import overlapper.simulation.bullet.bodies  # noqa: F401  # which says now what to install
         from overlapper.scenes.scene import find_scene, load_scene
         from overlapper.sweep import charts, page
         from overlapper.sweep.comparison import Recorded

@@ -12,10 +12,15 @@ from overlapper.install import simulator_hint
 
 if TYPE_CHECKING:
     from overlapper.simulation.asked_pairs import Among
-    from overlapper.simulation.bodies import Bodies, SelfCollisionWarning, SkippedShapeWarning
+    from overlapper.simulation.bullet.bodies import Bodies
     from overlapper.simulation.bullet.recorder import Recorder
+    from overlapper.simulation.cautions import (
+        NoDirectionWarning,
+        SelfCollisionWarning,
+        SkippedShapeWarning,
+        SubstepsWarning,
+    )
     from overlapper.simulation.contacts import Contact, Contacts
-    from overlapper.simulation.forces.cautions import NoDirectionWarning, SubstepsWarning
     from overlapper.simulation.forces.contact import VolumetricContact
     from overlapper.simulation.forces.forces import Forces
     from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
@@ -49,10 +54,10 @@ __getattr__ = lazily(
     __name__,
     {
         "asked_pairs": ("Among",),
-        "bodies": ("Bodies", "SelfCollisionWarning", "SkippedShapeWarning"),
+        "bullet.bodies": ("Bodies",),
         "contacts": ("Contact", "Contacts"),
         "model": ("Concave", "Decomposed", "Skipped", "Surface"),
-        "forces.cautions": ("NoDirectionWarning", "SubstepsWarning"),
+        "cautions": ("NoDirectionWarning", "SelfCollisionWarning", "SkippedShapeWarning", "SubstepsWarning"),
         "forces.contact": ("VolumetricContact",),
         "forces.forces": ("Forces",),
         "links": ("LinkContact", "LinkContacts", "link_contacts"),

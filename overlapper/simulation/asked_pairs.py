@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.simulation.collision_rules import CollisionRules, Mask
+from overlapper.simulation.collision_rules import Mask, Rules
 from overlapper.simulation.layout import Layout
 
 Key = tuple[int, int, int]  # body, link, shape
@@ -36,7 +36,7 @@ class AskedPairs:
         self.layout, self._links = layout, links
         self._listed: tuple[list[tuple[Who, Who]], Codes] | None = None
 
-    def chosen(self, pairs: NDArray[np.int32], among: Numbered, rules: CollisionRules) -> Mask:
+    def chosen(self, pairs: NDArray[np.int32], among: Numbered, rules: Rules) -> Mask:
         """Which of these pairs of shapes are asked for."""
         first, second = pairs.T
         if among == "all":
@@ -46,7 +46,7 @@ class AskedPairs:
         a, b = self.layout.colliders[first], self.layout.colliders[second]
         return np.asarray((a != b) & rules.allow(a, b))
 
-    def possible(self, among: Numbered, rules: CollisionRules) -> int:
+    def possible(self, among: Numbered, rules: Rules) -> int:
         """How many pairs of shapes are asked for, wherever they are."""
         if among == "simulated":
             layout = self.layout
@@ -56,7 +56,7 @@ class AskedPairs:
         of_each = np.unique(self.layout.owners, return_counts=True)[1]
         return int(len(self.layout.owners) ** 2 - (of_each**2).sum()) // 2
 
-    def colliders(self, among: Numbered, rules: CollisionRules) -> NDArray[np.intp]:
+    def colliders(self, among: Numbered, rules: Rules) -> NDArray[np.intp]:
         """(n, 2) the pairs of links that are asked for, wherever they are, as values of `layout.collider_rows`."""
         layout = self.layout
         if among != "simulated" and among != "all":

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import pybullet
 
 from overlapper import Shape
 from overlapper.quaternion import composed, rotated
-from overlapper.simulation.collision_rules import CollisionRules, Mask
+from overlapper.simulation.collision_rules import Mask, Rules
 from overlapper.simulation.height_field import Numbers
 from overlapper.simulation.layout import Layout
-from overlapper.simulation.model import BASE, Array, Body, Ground
+from overlapper.simulation.model import BASE, Array, Ground, ModelledBody
 
 
 class GroundBelow:
@@ -50,16 +49,15 @@ class GroundBelow:
 
 
 class Grounds:
-    """The height fields among the bodies of a client, and the shapes that may meet them: those of all other bodies."""
+    """The height fields among the bodies, and the shapes that may meet them: those of all other bodies."""
 
-    def __init__(self, client: int) -> None:
-        self._client = client
+    def __init__(self) -> None:
         self._below: dict[int, GroundBelow] = {}
         self._rows = np.empty(0, dtype=np.intp)
         self._keys = np.empty((0, 3), dtype=np.int64)
         self._shapes: list[Shape] = []
 
-    def follow(self, layout: Layout, bodies: Mapping[int, Body]) -> None:
+    def follow(self, layout: Layout, bodies: Mapping[int, ModelledBody]) -> None:
         """Bodies have come or gone, and have these places now."""
         grounds = {id: body.ground for id, body in bodies.items() if body.ground and (id, BASE) in layout.collider_rows}
         self._rows = np.flatnonzero(~np.isin(layout.owners, [*grounds]))
@@ -72,22 +70,21 @@ class Grounds:
         reach = layout.reach(self._rows) if len(same) < len(grounds) else np.empty(0)
         self._below = {id: same.get(id) or GroundBelow(ground, reach) for id, ground in grounds.items()}
 
-    def changed(self, layout: Layout, rules: CollisionRules, bodies: Mapping[int, Body]) -> dict[int, Body]:
-        """The bodies of which more ground has to be modelled, or of which most is not needed any more.
+    def changed(self, layout: Layout, rules: Rules, bodies: Mapping[int, ModelledBody]) -> dict[int, ModelledBody]:
+        """The height fields that need more prisms, or that need less than half of theirs.
 
-        They have what the simulator lets shapes meet, and a little around it.
+        They come with the prisms that the simulator lets shapes meet, and a little around these.
         """
-        found: dict[int, Body] = {}
+        found: dict[int, ModelledBody] = {}
         colliders = layout.colliders[self._rows]
         for id, below in self._below.items():
             own = np.full(len(colliders), layout.collider_rows[id, BASE])
             meets = rules.allow(np.minimum(own, colliders), np.maximum(own, colliders))
-            position, orientation = map(np.array, pybullet.getBasePositionAndOrientation(id, self._client))
-            if not below.moved(position, orientation, layout.positions[self._rows], meets):
+            if not below.moved(*layout.frame(id), layout.positions[self._rows], meets):
                 continue
-            modelled, needed = {part.index: part for part in bodies[id].parts}, below.numbers()
+            modelled, needed = {each.index: each for each in bodies[id].shapes}, below.numbers()
             if needed - modelled.keys() or 2 * len(needed) < len(modelled):
                 ground = below.ground
-                parts = (modelled.get(number) or ground.part(number) for number in sorted(needed))
-                found[id] = replace(bodies[id], parts=tuple(parts))
+                prisms = (modelled.get(number) or ground.prism(number) for number in sorted(needed))
+                found[id] = replace(bodies[id], shapes=tuple(prisms))
         return found

@@ -1,4 +1,4 @@
-"""Height fields as Bullet has them: a grid of heights, two triangles to a cell, the ground below them solid."""
+"""Height fields: a grid of heights, two triangles to a cell, and the ground below them solid."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from overlapper import Hull
 
@@ -27,21 +27,7 @@ class HeightField:
     heights: Array
     spacing: tuple[float, float]
     middle: float = 0.0
-    """m: what Bullet has taken off the heights it was given."""
-
-    @classmethod
-    def of_pybullet(
-        cls, data: ArrayLike, rows: int, columns: int, scale: ArrayLike, before: HeightField | None = None
-    ) -> HeightField:
-        """As createCollisionShape takes it, `rows` of them along x; Bullet puts the middle height at z = 0.
-
-        A field that takes the place of another `before` keeps the middle of that.
-        """
-        x, y, z = np.asarray(scale, dtype=float)
-        # Bullet keeps the heights in single precision.
-        plain = z * np.asarray(data, dtype=np.float32).astype(float).reshape(columns, rows)
-        middle = before.middle if before else float(plain.min() + plain.max()) / 2
-        return cls(plain - middle, (float(x), float(y)), middle)
+    """m: what the simulator has taken off the heights that it was given."""
 
     @property
     def count(self) -> int:

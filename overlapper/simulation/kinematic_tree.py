@@ -1,34 +1,17 @@
-"""The links of a file that pybullet loads, with their shapes, and the joints that move them.
+"""The links of a robot's file with their shapes, and the joints that move them.
 
-What pybullet tells of a joint is enough to place its link without pybullet (`Joint`). It is read in a process of its
-own (`overlapper.simulation.bullet.model_file`).
+A `Joint` is enough to place its link without a simulator.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
+from typing import Literal
 
 from overlapper import Shape
-from overlapper.printable import printable
-from overlapper.quaternion import composed, rotated
-from overlapper.simulation.bullet.model_file import NotRead, load, read_apart
-from overlapper.simulation.model import BASE, Array, Concave, Settings, Surface
-
-ENDINGS = (".urdf", ".sdf", ".xml")
+from overlapper.simulation.model import Array
 
 Kind = Literal["revolute", "prismatic", "spherical", "planar", "held"]
-
-KINDS: dict[int, Kind] = {
-    0: "revolute",
-    1: "prismatic",
-    2: "spherical",
-    3: "planar",
-}  # by pybullet's numbers of joint types
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +38,7 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class TreeLink:
     """A link of the body of that number, named as in the file; `parent` is its place among the links, -1 of a base.
 
     `skipped` says what of its shapes is not modelled and why, "" if all are. `concave` is of how many convex parts its
@@ -90,99 +73,5 @@ class KinematicTree:
     """
 
     bodies: tuple[str, ...]
-    links: tuple[Link, ...]
+    links: tuple[TreeLink, ...]
     shapes: tuple[LinkShape, ...]
-
-
-def kinematic_tree(
-    path: Path, concave: Concave = "decompose", concave_threshold: float = 0.05, surface: Surface = "nominal"
-) -> KinematicTree:
-    """The links of a URDF, SDF or MJCF file; the settings are those of `simulation.Bodies`.
-
-    NotRead if the file is not there, or pybullet refuses it or dies of it.
-    """
-    request = path, Settings(concave, concave_threshold, surface)
-    found: KinematicTree = read_apart(path, _answers, request, ENDINGS)
-    return found
-
-
-def _answers(request: tuple[Path, Settings]) -> Iterator[KinematicTree | str]:
-    """In the process in which pybullet reads the file: what is in it, or the reason why it cannot be read."""
-    try:
-        yield _read(*request)
-    except (NotRead, ValueError) as error:
-        yield str(error)
-
-
-def _read(path: Path, settings: Settings) -> KinematicTree:
-    import pybullet
-
-    from overlapper.simulation.bullet.known_bodies import KnownBodies
-    from overlapper.simulation.bullet.recorder import Recorder
-
-    client = pybullet.connect(pybullet.DIRECT)
-    with Recorder(client) as recorder:
-        # What is only seen takes most of the time of loading a URDF.
-        load(path, client, pybullet.URDF_IGNORE_VISUAL_SHAPES if path.suffix.lower() == ".urdf" else 0)
-        known = KnownBodies(client, settings, recorder, {})
-        known.refresh([])
-    links: list[Link] = []
-    shapes: list[LinkShape] = []
-    for number, (id, body) in enumerate(known.by_id.items()):
-        base = len(links)
-        skipped = {each.link: each.reason for each in body.skipped}
-        concave = {link: [each for each in body.decomposed if each.link == link] for link in body.link_names}
-        joints = _joints(client, id, known.labels[id])
-        for link, joint in enumerate(joints, BASE):
-            parent = base + 1 + body.parents[link] if link > BASE else -1
-            gains = [each.volume / each.mesh_volume - 1 for each in concave[link] if each.mesh_volume]
-            parts_of_it = sum(len(each.shapes) for each in concave[link])
-            about = skipped.get(link, ""), parts_of_it, max(gains, default=None)
-            links.append(Link(number, body.link_names[link], parent, joint, *about))
-        parts = sorted(body.parts, key=lambda part: (part.link, part.index))
-        shapes += [LinkShape(base + 1 + part.link, part.shape, part.position, part.orientation) for part in parts]
-    return KinematicTree(tuple(known.labels.values()), tuple(links), tuple(shapes))
-
-
-def _joints(client: int, id: int, name: str) -> list[Joint]:
-    """What ties the base to the world where it was loaded, and the joints of a body.
-
-    NotRead if pybullet does not tell where its links are.
-    """
-    import pybullet
-
-    told = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
-    try:
-        base = pybullet.getBasePositionAndOrientation(id, client)
-        states = pybullet.getLinkStates(id, range(len(told)), computeForwardKinematics=1, physicsClientId=client)
-    except pybullet.error as error:
-        raise NotRead(f"pybullet tells no poses of the {len(told)} links of {name}") from error
-    frames = [tuple(map(np.array, each[:2])) for each in (base, *(states or ()))]
-    root = Joint("", "held", frames[0][0], frames[0][1], np.zeros(3), np.zeros(3), 0.0, -1.0)
-    return [root, *(joint_between(client, id, each, frames[1 + each[16]], frames[1 + each[0]]) for each in told)]
-
-
-def joint_between(client: int, id: int, told: Any, parent: Any, link: Any) -> Joint:
-    """A joint by what pybullet tells of it, and by the inertial frames of its two links as they are now."""
-    import pybullet
-
-    number, name, type_ = told[:3]
-    kind = KINDS.get(type_, "held")
-    axis, position = np.array(told[13]), np.array(told[14])
-    # What pybullet tells is the rotation from the axes of the parent to those of the joint.
-    orientation = np.array(told[15]) * [-1, -1, -1, 1]
-    if kind == "revolute":
-        axis = axis / np.linalg.norm(axis)
-    state = np.array(pybullet.getJointStateMultiDof(id, number, client)[0] if kind not in ("planar", "held") else [])
-    turn, shift = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
-    if kind == "revolute":
-        turn = np.append(axis * np.sin(state[0] / 2), np.cos(state[0] / 2))
-    elif kind == "prismatic":
-        shift = axis * state[0]
-    elif kind == "spherical":
-        turn = state
-    # MJCF joints are where they say, and not at the origin of the link: how far that is, only the poses tell.
-    axes = composed(parent[1], orientation)
-    pivot = parent[0] + rotated(parent[1], position) + rotated(axes, shift)
-    offset = rotated(composed(axes, turn) * [-1, -1, -1, 1], link[0] - pivot)
-    return Joint(printable(name.decode(errors="replace")), kind, position, orientation, axis, offset, *told[8:10])

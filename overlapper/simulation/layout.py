@@ -3,14 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Batch, Shape, Sphere, _core
-from overlapper.simulation.bullet.collider_poses import ColliderPoses
-from overlapper.simulation.model import BASE, Array, Body
+from overlapper.simulation.model import BASE, Array, Link, ModelledBody
+
+Frame = Sequence[Sequence[float]]
+"""Begins with a position in m and a quaternion xyzw."""
+
+
+class Poses(Protocol):
+    """The frames of some bases and links, which shapes are fixed to."""
+
+    @property
+    def colliders(self) -> Sequence[Link]:
+        """(body, link) of each frame, in the order of `read`."""
+        ...
+
+    def read(self) -> Sequence[Frame]:
+        """Where they are now."""
+        ...
 
 
 class Layout:
@@ -21,26 +37,34 @@ class Layout:
     shapes on more than their base. `positions` (k, 3) and `orientations` (k, 4) are where `pose` found them.
     """
 
-    def __init__(self, client: int, bodies: Mapping[int, Body], hidden: Mapping[int, int]) -> None:
-        """`hidden` are the places in a .bullet file of those whose poses have no other source."""
-        shaped = {id: body.parts for id, body in bodies.items() if body.parts or body.ground}
-        parts = [part for each in shaped.values() for part in each]
-        self.keys = [(id, part.link, part.index) for id, each in shaped.items() for part in each]
+    def __init__(
+        self, bodies: Mapping[int, ModelledBody], poses: Callable[[Mapping[int, Sequence[int]]], Poses]
+    ) -> None:
+        """`poses` makes what reads the frames of bodies and their links."""
+        shaped = {id: body.shapes for id, body in bodies.items() if body.shapes or body.ground}
+        modelled = [each for shapes in shaped.values() for each in shapes]
+        self.keys = [(id, each.link, each.index) for id, shapes in shaped.items() for each in shapes]
         self.key_rows = np.array(self.keys, dtype=np.int64).reshape(-1, 3)
-        self.shapes = [part.shape for part in parts]
+        self.shapes = [each.shape for each in modelled]
         self.batch = Batch(self.shapes)
-        self._local_positions = np.array([part.position for part in parts]).reshape(-1, 3)
-        self._local_orientations = np.array([part.orientation for part in parts]).reshape(-1, 4)
+        self._local_positions = np.array([each.position for each in modelled]).reshape(-1, 3)
+        self._local_orientations = np.array([each.orientation for each in modelled]).reshape(-1, 4)
         self.positions: Array = np.full_like(self._local_positions, np.nan)
         self.orientations: Array = np.full_like(self._local_orientations, np.nan)
-        links = {id: sorted({part.link for part in each} - {BASE}) for id, each in shaped.items()}
-        self.poses = ColliderPoses(client, links, hidden)
+        links = {id: sorted({each.link for each in shapes} - {BASE}) for id, shapes in shaped.items()}
+        self.poses = poses(links)
+        self._read: Sequence[Frame] = ()
         self.collider_rows = {each: row for row, each in enumerate(sorted(self.poses.colliders))}
         self.colliders = np.array([self.collider_rows[id, link] for id, link, _ in self.keys], dtype=int)
-        frames = {each: row for row, each in enumerate(self.poses.colliders)}
-        self._frames = np.array([frames[id, link] for id, link, _ in self.keys], dtype=np.int64)
+        self._place = {each: row for row, each in enumerate(self.poses.colliders)}
+        self._places = np.array([self._place[id, link] for id, link, _ in self.keys], dtype=np.int64)
         self.owners = np.array([id for id, _, _ in self.keys], dtype=int)
         self.of_several_colliders = [id for id, each in links.items() if each]
+
+    def frame(self, body: int) -> tuple[Array, Array]:
+        """Position (3,) and quaternion (4,) of a base, where `pose` found it."""
+        position, orientation = self._read[self._place[body, BASE]][:2]
+        return np.array(position), np.array(orientation)
 
     def reach(self, rows: NDArray[np.intp]) -> Array:
         """(n,) m: how far the shapes in these rows reach from their own origins; planes reach everywhere."""
@@ -48,9 +72,9 @@ class Layout:
 
     def pose(self) -> set[int]:
         """Place the shapes where their colliders are now; the bodies of which one is nowhere."""
-        self.poses.read()
+        self._read = self.poses.read()
         self.positions, self.orientations = _core.world_poses(
-            self.poses.frames, self._frames, self._local_positions, self._local_orientations
+            self._read, self._places, self._local_positions, self._local_orientations
         )
         if math.isfinite(self.positions.sum() + self.orientations.sum()):
             return set()

@@ -1,7 +1,8 @@
-"""What is made of the bodies of a pybullet client: convex parts in the frames of their links, and what is left out."""
+"""What is modelled of a simulator's bodies: convex shapes in the frames of their links, and what is left out."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -17,6 +18,9 @@ Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]
 Concave = Literal["decompose", "enclose", "skip"]
 Surface = Literal["nominal", "margin"]
+
+Link = tuple[int, int]
+"""Body and link, -1 for the base."""
 
 BASE = -1
 
@@ -53,8 +57,33 @@ class Decomposed:
     path: Path | None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Leaf:
+    """One shape of a collider as a simulator has it, compounds resolved; lengths in metres.
+
+    `position` (3,) and `orientation` (4,) xyzw place it in the collider's frame, the inertial frame of its link.
+    What `figures` holds depends on `kind`:
+        box          (3,) half extents
+        sphere       (1,) radius
+        capsule      (2,) radius, length between the cap centres along local z
+        cylinder     (2,) radius, length along local z
+        plane        (4,) unit normal n and constant c of the solid n·x <= c
+        hull         (n, 3) points
+        concave mesh (t, 3, 3) corners of the triangles
+        multisphere  (n, 4) centres and radii of the spheres whose convex hull it is
+    and is empty for every other kind ("height field", "capsule along x", ...). `margin` is the collision margin that
+    the simulator lays around a hull.
+    """
+
+    kind: str
+    position: Array
+    orientation: Array
+    figures: Array
+    margin: float = 0.0
+
+
 @dataclass(frozen=True, slots=True)
-class Part:
+class ModelledShape:
     """A modelled shape, placed in the frame of its collider: the inertial frame of the base or link."""
 
     link: int
@@ -72,8 +101,8 @@ class Ground:
     position: Array
     orientation: Array
 
-    def part(self, number: int) -> Part:
-        return Part(BASE, number, self.field.prism(number), self.position, self.orientation)
+    def prism(self, number: int) -> ModelledShape:
+        return ModelledShape(BASE, number, self.field.prism(number), self.position, self.orientation)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,14 +121,18 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class ModelledBody:
+    """A body: `link_names`, `colors` and `parents` by link, and how many shapes it has, modelled or not.
+
+    If it is a height field, its `ground`, `shapes` are the prisms of it that are modelled so far.
+    """
+
     name: str
-    link_names: dict[int, str]
-    colors: dict[int, Color]
-    parents: dict[int, int]  # of each link
-    margin: float  # of the base's outermost shape
+    link_names: Mapping[int, str]
+    colors: Mapping[int, Color]
+    parents: Mapping[int, int]
     shape_count: int
-    parts: tuple[Part, ...]
-    skipped: tuple[Skipped, ...]
-    decomposed: tuple[Decomposed, ...]
-    ground: Ground | None = None  # of which `parts` are the prisms modelled so far
+    shapes: tuple[ModelledShape, ...]
+    skipped: tuple[Skipped, ...] = ()
+    decomposed: tuple[Decomposed, ...] = ()
+    ground: Ground | None = None

@@ -11,20 +11,19 @@ import numpy as np
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Shape, Sphere
 from overlapper.polytopes.decomposition import Decomposition, NotDecomposed, decompose
 from overlapper.quaternion import composed, rotated
-from overlapper.simulation.bullet.bullet_file import Leaf
-from overlapper.simulation.model import Part, Settings
+from overlapper.simulation.model import Leaf, ModelledShape, Settings
 
 
 def modelled(
     link: int, leaves: tuple[Leaf, ...], settings: Settings
-) -> tuple[list[Part], list[str], list[tuple[range, Decomposition]]]:
+) -> tuple[list[ModelledShape], list[str], list[tuple[range, Decomposition]]]:
     """The leaves of a link as shapes, a reason for each that has none, and which shapes are parts of a concave mesh."""
-    parts: list[Part] = []
+    made: list[ModelledShape] = []
     reasons: list[str] = []
     meshes: list[tuple[range, Decomposition]] = []
     for saved in leaves:
         leaf = _capsule(saved) if saved.kind == "multisphere" else saved
-        first = len(parts) + len(reasons)
+        first = len(made) + len(reasons)
         try:
             shapes: Sequence[Shape]
             if leaf.kind == "concave mesh":
@@ -37,10 +36,11 @@ def modelled(
         except ValueError as error:
             reasons.append(str(error))
         else:
-            parts += [
-                Part(link, index, shape, leaf.position, leaf.orientation) for index, shape in enumerate(shapes, first)
+            made += [
+                ModelledShape(link, index, shape, leaf.position, leaf.orientation)
+                for index, shape in enumerate(shapes, first)
             ]
-    return parts, reasons, meshes
+    return made, reasons, meshes
 
 
 def _solid(data: bytes, settings: Settings) -> Decomposition:

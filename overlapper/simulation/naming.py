@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 
 import numpy as np
 
 from overlapper.printable import printable
+from overlapper.simulation.model import Link, ModelledBody
 
 ENDINGS = (".urdf", ".sdf", ".xml", ".obj", ".stl", ".dae")
 
@@ -23,8 +25,8 @@ OF_TOOLS = {"coacd", "description", "textured", "urdf", "vhacd"}
 def body_name(own: str, file: str | None, alone: bool, meshes: Sequence[str], kind: str | None) -> str:
     """The name that says most, or an empty one.
 
-    `own` is what pybullet calls it, `file` what it was loaded from, `alone` or with others, `meshes` are the files of a
-    body of one link, and `kind` is what its only shape is.
+    `own` is what the simulator calls it, `file` what it was loaded from, `alone` or with others. `meshes` are the files
+    of a body of one link, and `kind` is what its only shape is.
     """
     stem, folder = (PurePath(file).stem, PurePath(file).parent.name) if file else ("", "")
     named_after_a_file = own.lower().endswith(ENDINGS)
@@ -64,3 +66,22 @@ def named(names: Mapping[int, str] | None) -> dict[int, str]:
         if not (isinstance(body, int | np.integer) and isinstance(name, str) and name.strip()):
             raise ValueError(f"{wanted}{body!r}: {name!r}")
     return {int(body): printable(name) for body, name in (names or {}).items()}
+
+
+def labels(bodies: Mapping[int, ModelledBody]) -> dict[int, str]:
+    """The names of bodies; those that several would share end in "#" and the number of the body."""
+    return _distinct({id: body.name for id, body in bodies.items()})
+
+
+def link_names(bodies: Mapping[int, ModelledBody]) -> dict[Link, str]:
+    """Label and name of each link; those that several links would share end in "#" and the number of the link."""
+    return {
+        (id, link): f"{label}/{name}"
+        for id, label in labels(bodies).items()
+        for link, name in _distinct(bodies[id].link_names).items()
+    }
+
+
+def _distinct(names: Mapping[int, str]) -> dict[int, str]:
+    number = Counter(names.values())
+    return {id: name if number[name] == 1 else f"{name}#{id}" for id, name in names.items()}

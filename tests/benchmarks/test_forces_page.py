@@ -18,7 +18,7 @@ def test_the_page_is_what_was_measured(tmp_path):
         assert (tmp_path / f"forces_{name}.png").stat().st_size > 10_000
 
 
-@pytest.mark.filterwarnings("ignore::overlapper.simulation.forces.cautions.SubstepsWarning")
+@pytest.mark.filterwarnings("ignore::overlapper.simulation.cautions.SubstepsWarning")
 def test_experiments_are_measured_by_both_laws():
     rows = [*forces_physics.slides()]
     assert [(row.law, row.at) for row in rows] == [(law, n) for law in forces_page.LAWS for n in (1, 4, 20)]

@@ -118,7 +118,7 @@ def test_what_nothing_moves_slips_without_an_answer(client):
     assert contact.slip[0] == pytest.approx([-0.1, 0, 0], abs=1e-12) and np.isfinite(contact.torque).all()
 
 
-@pytest.mark.filterwarnings("ignore::overlapper.simulation.forces.cautions.SubstepsWarning")
+@pytest.mark.filterwarnings("ignore::overlapper.simulation.cautions.SubstepsWarning")
 @pytest.mark.parametrize("seed", range(8))
 def test_what_turns_fast_is_pushed_wherever_its_pressures_are_more_than_none(client, seed):
     """Torques that the patch cannot give take no force away. Without a force, velocities stay as they are."""

@@ -12,7 +12,7 @@ from simulated import body, box
 
 from overlapper import Box, Placed, overlap
 from overlapper.simulation import Bodies, NoDirectionWarning, Recorder, VolumetricContact
-from overlapper.simulation.bullet.dynamics import Dynamics
+from overlapper.simulation.bullet.dynamics import BulletDynamics
 
 
 def heap(world, count=12):
@@ -285,7 +285,7 @@ def test_a_robot_answers_to_forces_as_the_solver_says(client, file, fixed, link)
     bodies.update()
     for each in range(-1, p.getNumJoints(robot, client)):
         p.setCollisionFilterPair(block, robot, -1, each, 0, client)
-    dynamics = Dynamics(client, [robot, block])
+    dynamics = BulletDynamics(client, [robot, block])
     found = bodies.overlaps(pairs=[(block, robot)]).overlaps
     links = np.array([dynamics.place[key[:2]] for key in bodies.keys], dtype=np.int64)
     count, frames = len(found), dynamics.frames()

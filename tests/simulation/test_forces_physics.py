@@ -8,7 +8,7 @@ from contact_experiments import FRICTION, STEP, G
 from scipy.optimize import brentq
 
 # One substep is asked where more would be needed, to see what is left of the law.
-pytestmark = pytest.mark.filterwarnings("ignore::overlapper.simulation.forces.cautions.SubstepsWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::overlapper.simulation.cautions.SubstepsWarning")
 
 
 @pytest.mark.parametrize("stiffness", [1e7, 1e8])

@@ -8,6 +8,7 @@ import pytest
 
 from overlapper import Placed, Sphere, distance, penetration_depth
 from overlapper.simulation import Bodies, SkippedShapeWarning, link_contacts
+from overlapper.simulation.bullet.recorder import height_field
 from overlapper.simulation.height_field import HeightField
 
 PROBE = 1e-6
@@ -202,7 +203,7 @@ def test_another_body_with_the_id_of_a_field_is_no_field(client, recorder):
 
 def test_triangles_under_a_box_are_those_that_it_may_meet():
     heights = np.arange(20.0).reshape(4, 5)
-    field = HeightField.of_pybullet(heights.ravel(), 5, 4, [1, 1, 1])
+    field = height_field(heights.ravel(), 5, 4, [1, 1, 1])
     assert field.count == 24 and field.heights.max() == 9.5 and field.base == -9.5 - 4
     everything = field.under(np.array([-9, -9, -99]), np.array([9, 9, 99]))
     assert sorted(everything) == list(range(24))

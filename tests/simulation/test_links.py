@@ -3,10 +3,9 @@
 import pybullet as p
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from overlapper.simulation.extraction import modelling
 
 from overlapper.polytopes import decomposition
-from overlapper.simulation import Bodies, SkippedShapeWarning, link_contacts
+from overlapper.simulation import Bodies, SkippedShapeWarning, link_contacts, modelling
 
 PROFILE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]
 CORNERS = [[x, y, z] for z in (0, 1) for x, y in PROFILE]

@@ -2,7 +2,7 @@
 
 import sys
 import warnings
-from types import SimpleNamespace
+from itertools import combinations
 
 import numpy as np
 import pybullet as p
@@ -434,22 +434,18 @@ def test_rules_count_the_pairs_that_they_allow(seed):
     group, mask = random.choice([1, 2, 3], len(links)), random.choice([0, 1, -1, -3], len(links))
 
     drawn = [(links[i], links[j]) for i, j in random.integers(0, len(links), (30, 2)) if i != j]
-    told = SimpleNamespace(
-        both_masks_must_agree=bool(seed % 2),
-        self_collision={1: SELF, 4: SELF | p.URDF_USE_SELF_COLLISION_INCLUDE_PARENT},
-        pair_filters={tuple(sorted(pair)): bool(random.integers(2)) for pair in drawn} | {((77, -1), (88, -1)): True},
-    )
-    rules = CollisionRules(Colliders(rows, owners, group, mask, {4: {0: -1, 1: 0, 2: 1}}), told)
+    both = bool(seed % 2)
+    filters = {tuple(sorted(pair)): bool(random.integers(2)) for pair in drawn} | {((77, -1), (88, -1)): True}
+    within = [(a, b) for a, b in combinations(links, 2) if a[0] == b[0] in (1, 4)]
+    rules = CollisionRules(Colliders(rows, owners, group, mask), both, filters, within)
     weights, expected = random.integers(1, 4, len(links)), 0
     first, second = np.triu_indices(len(links), 1)
     for i, j, allowed in zip(first, second, rules.allow(first, second)):
         admitted, admitting = group[i] & mask[j] != 0, group[j] & mask[i] != 0
-        should = (admitted and admitting) if told.both_masks_must_agree else (admitted or admitting)
-        should = told.pair_filters.get((links[i], links[j]), should)
-        same = owners[i] == owners[j]
-        if same:
-            # Body 1 has no parents that are known, body 4 lets all its links collide.
-            should = should and owners[i] in told.self_collision
+        should = (admitted and admitting) if both else (admitted or admitting)
+        should = filters.get((links[i], links[j]), should)
+        if owners[i] == owners[j]:
+            should = should and owners[i] in (1, 4)
         assert bool(allowed) == bool(should), (links[i], links[j])
         expected += int(weights[i] * weights[j]) * bool(allowed)
     assert rules.count(weights) == expected

@@ -13,10 +13,21 @@ import numpy as np
 import pybullet
 
 from overlapper.printable import printable
-from overlapper.simulation.bullet.bullet_file import BulletFile, Leaf, SavedBody
+from overlapper.simulation.bullet.bullet_file import BulletFile, SavedBody
+from overlapper.simulation.bullet.recorder import Loaded
 from overlapper.simulation.bullet.saved_scene import MULTIBODY, SOFT_BODY, body_type
 from overlapper.simulation.height_field import HeightField
-from overlapper.simulation.model import BASE, Body, Color, Decomposed, Ground, Part, Settings, Skipped
+from overlapper.simulation.model import (
+    BASE,
+    Color,
+    Decomposed,
+    Ground,
+    Leaf,
+    ModelledBody,
+    ModelledShape,
+    Settings,
+    Skipped,
+)
 from overlapper.simulation.modelling import in_one_sentence, modelled
 from overlapper.simulation.naming import body_name
 
@@ -38,20 +49,20 @@ def read_body(
     saved: SavedBody | None,
     settings: Settings,
     field: HeightField | None = None,
-    source: tuple[str, bool] | None = None,
+    loaded: Loaded | None = None,
     given: str | None = None,
-) -> Body:
+) -> ModelledBody:
     """A body as it is in a .bullet file, and in pybullet; `field` is the height field that it is known to be.
 
-    `source` is the file that it was loaded from and whether alone, `given` the name that it has been given.
+    `loaded` says what file it comes from, `given` is the name that it has been given.
     """
     base, own = (printable(text.decode(errors="replace")) for text in pybullet.getBodyInfo(id, client))
     joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
     link_names = {BASE: base or "base"} | {joint[0]: printable(joint[12].decode(errors="replace")) for joint in joints}
     parents = {joint[0]: joint[16] for joint in joints}
     leaves = _leaves(client, id, file, saved) if saved else {}
-    name = given or _name(client, id, own, source, leaves) or f"body {id}"
-    parts: list[Part] = []
+    name = given or _name(client, id, own, loaded, leaves) or f"body {id}"
+    shapes: list[ModelledShape] = []
     skipped: list[Skipped] = []
     decomposed: list[Decomposed] = []
     shape_count = 0 if saved else 1
@@ -61,9 +72,9 @@ def read_body(
         ground = Ground(field, leaf.position, leaf.orientation)
         shape_count += field.count
     for link, each in leaves.items():
-        shapes, reasons, meshes = modelled(link, each, settings)
-        parts += shapes
-        count = len(shapes) + len(reasons)
+        made, reasons, meshes = modelled(link, each, settings)
+        shapes += made
+        count = len(made) + len(reasons)
         shape_count += count
         label = f"{name}/{link_names[link]}"
         if reasons:
@@ -75,24 +86,20 @@ def read_body(
         soft = body_type(client, id) == SOFT_BODY
         skipped.append(Skipped(id, BASE, name, "a soft body is not modelled" if soft else "saveBullet leaves it out"))
     colors = _colors(client, id, link_names)
-    margin = pybullet.getDynamicsInfo(id, BASE, client)[11]
-    return Body(
+    return ModelledBody(
         name,
         link_names,
         colors,
         parents,
-        margin,
         shape_count,
-        tuple(parts),
+        tuple(shapes),
         tuple(skipped),
         tuple(decomposed),
         ground,
     )
 
 
-def _name(
-    client: int, id: int, own: str, source: tuple[str, bool] | None, leaves: Mapping[int, tuple[Leaf, ...]]
-) -> str:
+def _name(client: int, id: int, own: str, loaded: Loaded | None, leaves: Mapping[int, tuple[Leaf, ...]]) -> str:
     """What a body is called that has been given no name; empty if nothing says anything."""
     meshes: list[str] = []
     only = leaves.get(BASE, ()) if pybullet.getNumJoints(id, client) == 0 else ()
@@ -100,7 +107,7 @@ def _name(
         seen = pybullet.getVisualShapeData(id, physicsClientId=client)
         meshes = [each[4].decode(errors="replace") for each in seen if each[4] != b"unknown_file"]
     kind = only[0].kind.removeprefix("concave ") if len(only) == 1 else None
-    file, alone = source or (None, True)
+    file, alone = loaded or (None, True)
     return body_name(own, file, alone, meshes, kind)
 
 

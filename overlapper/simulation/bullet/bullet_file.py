@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.printable import first_line
+from overlapper.simulation.model import Leaf
 
 # Bullet's BroadphaseNativeTypes, as far as pybullet creates them.
 KINDS = {
@@ -49,31 +50,6 @@ NAMES = {
 MOST_READ = 64
 
 NUMBERS = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "float": "<f4", "double": "<f8"}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Leaf:
-    """One shape of a collider, compounds resolved; lengths in metres, single precision but for the points of a mesh.
-
-    `position` (3,) and `orientation` (4,) xyzw place it in the collider's frame, the inertial frame of its link.
-    What `figures` holds depends on `kind`:
-        box          (3,) half extents
-        sphere       (1,) radius
-        capsule      (2,) radius, length between the cap centres along local z
-        cylinder     (2,) radius, length along local z
-        plane        (4,) unit normal n and constant c of the solid n·x <= c
-        hull         (n, 3) points
-        concave mesh (t, 3, 3) corners of the triangles
-        multisphere  (n, 4) centres and radii of the spheres whose convex hull it is
-    and is empty for every other kind ("height field", "capsule along x", ...). `margin` is the collision margin that
-    Bullet lays around a hull.
-    """
-
-    kind: str
-    position: NDArray[np.float64]
-    orientation: NDArray[np.float64]
-    figures: NDArray[np.float64]
-    margin: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,15 +10,14 @@ import pybullet
 
 from overlapper.simulation.bullet.bullet_file import orientations
 from overlapper.simulation.bullet.saved_scene import save
+from overlapper.simulation.layout import Frame
 from overlapper.simulation.model import BASE
-
-ReportedPose = Sequence[Sequence[float]]  # begins with position and quaternion xyzw
 
 
 class ColliderPoses:
     """The inertial frames of bases and links, which shapes are fixed to, and which bases are static.
 
-    `frames` are in the order of `colliders`, (body, link) each; `static` in that of `bodies`.
+    `colliders` are (body, link) of each frame; `static` is in the order of `bodies`.
     """
 
     def __init__(self, client: int, links: Mapping[int, Sequence[int]], hidden: Mapping[int, int]) -> None:
@@ -30,27 +29,28 @@ class ColliderPoses:
         self.bodies = [*self._seen, *(id for id in links if id in hidden)]
         self.colliders = [(id, BASE) for id in self.bodies]
         self.colliders += [(id, link) for id in self.bodies for link in links[id]]
-        self.frames: list[ReportedPose] = []
+        self._latest: list[Frame] = []
         self.static = [True] * len(self.bodies)
 
-    def read(self) -> None:
-        """Read the frames anew, and which bases are static."""
-        client, before = self._client, self.frames or [()] * len(self.bodies)
+    def read(self) -> list[Frame]:
+        """Read the frames again, and which bases are static."""
+        client, before = self._client, self._latest or [()] * len(self.bodies)
         saved = self._saved_frames() if self._hidden else {}
-        frames: list[ReportedPose] = list(map(pybullet.getBasePositionAndOrientation, self._seen, repeat(client)))
+        frames: list[Frame] = list(map(pybullet.getBasePositionAndOrientation, self._seen, repeat(client)))
         frames += [saved[row, BASE] for row, _ in self._hidden]
         for id, links in self._jointed:
             # Without forward kinematics the poses of links lag one step behind.
             frames += pybullet.getLinkStates(id, links, computeForwardKinematics=1, physicsClientId=client)
         frames += [saved[row, link] for row, links in self._hidden for link in links]
-        self.frames = frames
+        self._latest = frames
         # changeDynamics may turn a static body into a moving one, and back. A body that has moved of itself is not
         # static; one that is moved by hand is asked once it rests.
         for k, id in enumerate(self.bodies):
             if self.static[k] or frames[k] == before[k]:
                 self.static[k] = pybullet.getDynamicsInfo(id, BASE, client)[0] == 0
+        return frames
 
-    def _saved_frames(self) -> dict[tuple[int, int], ReportedPose]:
+    def _saved_frames(self) -> dict[tuple[int, int], Frame]:
         """Of the hidden bodies, by place in a .bullet file and link."""
         bodies = save(self._client).bodies
         keys = [(row, link) for row, links in self._hidden for link in (BASE, *links)]

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
 import pybullet
+from numpy.typing import NDArray
 
 from overlapper import Hull
-from overlapper.simulation.asked_pairs import AskedPairs, Numbered
-from overlapper.simulation.bullet.recorder import Link
-from overlapper.simulation.collision_rules import CollisionRules
+from overlapper.simulation.collision_rules import Mask
 from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.layout import Layout
+from overlapper.simulation.model import Link
 
 DISTANCE = 8  # of a contact point
 
@@ -23,14 +25,13 @@ def links_in_contact_with_each_other(client: int, body: int) -> tuple[int, int] 
 
 
 def touching_within_margins(
-    client: int, found: Contacts, asked: AskedPairs, among: Numbered, rules: CollisionRules
+    client: int, found: Contacts, layout: Layout, chosen: Callable[[NDArray[np.int32]], Mask]
 ) -> int:
-    """How many pairs of links that were asked for touch in Bullet and not in `found`, one of them by a hull.
+    """How many pairs of links that are `chosen` touch in Bullet and not in `found`, one of them by a hull.
 
     Bullet lays a margin around hulls, and its contact points are of the surfaces with margins. They are those of its
     last collision detection.
     """
-    layout = asked.layout
     links = _touching(client) - {((a, la), (b, lb)) for a, la, _, b, lb, _ in found.keys.tolist()}
     starts = np.searchsorted(layout.colliders, np.arange(len(layout.collider_rows) + 1))
     is_hull = [isinstance(shape, Hull) for shape in layout.shapes]
@@ -44,8 +45,8 @@ def touching_within_margins(
             some = [(i, j) for i, j in product(first, second) if is_hull[i] or is_hull[j]]
             pairs += some
             number += [k] * len(some)
-    chosen = asked.chosen(np.array(pairs, dtype=np.int32).reshape(-1, 2), among, rules)
-    return len(np.unique(np.array(number, dtype=int)[chosen]))
+    asked = chosen(np.array(pairs, dtype=np.int32).reshape(-1, 2))
+    return len(np.unique(np.array(number, dtype=int)[asked]))
 
 
 def _touching(client: int) -> set[tuple[Link, Link]]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from overlapper import _core
 from overlapper.quaternion import rotated
 from overlapper.simulation.bullet.calls import unheard
-from overlapper.simulation.kinematic_tree import joint_between
+from overlapper.simulation.bullet.joints import joint_between
 from overlapper.simulation.model import BASE, Array
 
 # By kinematic_tree.Kind: the number that _core.ContactSolver knows it by, and how many coordinates it has.
@@ -22,8 +22,8 @@ MASS, FRICTION, INERTIA = 0, 1, 2  # of getDynamicsInfo
 HELD = (-1, 0, np.zeros(3), np.zeros(3))  # a base: no parent, no joint
 
 
-class Dynamics:
-    """The links of some bodies, base by base, and the `solver` that knows their masses and joints.
+class BulletDynamics:
+    """See `Dynamics`: the links of some bodies, base by base, and the `solver` that knows their masses and joints.
 
     `links` are (body, link) in the solver's order, `place` the place of each there, `friction` (n,) their coefficients.
     """

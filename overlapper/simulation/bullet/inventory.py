@@ -122,7 +122,7 @@ def _of_bullet_file(
 ) -> Inventory:
     """Of what saveBullet wrote; loadBullet would not load all of it. Bodies have numbers, and no names."""
     from overlapper.simulation.bullet.bullet_file import BulletFile
-    from overlapper.simulation.collision_rules import Colliders, CollisionRules
+    from overlapper.simulation.collision_rules import Colliders, CollisionRules, partners
     from overlapper.simulation.model import Settings
     from overlapper.simulation.modelling import in_one_sentence, modelled
 
@@ -145,11 +145,10 @@ def _of_bullet_file(
             skipped.append((names[key], in_one_sentence(reasons, len(parts) + len(reasons))))
         decomposed += [(names[key], len(mesh.parts)) for _, mesh in meshes]
     rows = {key: row for row, key in enumerate(colliders)}
-    group, mask = np.array([(each.group, each.mask) for each in colliders.values()], dtype=int).reshape(-1, 2).T
-    bodies = np.array([body for body, _ in colliders], dtype=int)
-    rules = CollisionRules(Colliders(rows, bodies, group, mask, {}), None)
+    filters = {key: (each.group, each.mask) for key, each in colliders.items()}
+    rules = CollisionRules(Colliders.of(rows, filters))
     read = np.array([len(listed.get(key, ())) for key in colliders])
-    meets = {key: len(others) for key, others in rules.partners(np.flatnonzero(read)).items()}
+    meets = {key: len(others) for key, others in partners(rules, [*rows], np.flatnonzero(read)).items()}
     shapes = sum(len(file.leaves(each.shape)) for each in colliders.values())
     return Inventory(
         len(file.bodies),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 import pybullet
 
@@ -12,14 +11,15 @@ from overlapper.simulation.bullet.body_marks import BodyMarks
 from overlapper.simulation.bullet.bullet_file import BulletFile
 from overlapper.simulation.bullet.recorder import Recorder
 from overlapper.simulation.bullet.saved_scene import body_ids, saved_bodies
-from overlapper.simulation.model import BASE, Body, Color, Decomposed, Settings, Skipped
+from overlapper.simulation.model import BASE, ModelledBody, Settings, Skipped
 
 
 class KnownBodies:
     """`by_id` are the bodies, sorted; each is read once, and again when its margin or its heights have changed.
 
-    `hidden` are the places in a .bullet file of those whose poses have no other source. `filters` are group and mask by
-    body and link, as they were when the last body was read, or at the last `read_filters`.
+    `unidentified` is the number of bodies without an id. `hidden` are the places in a .bullet file of those whose poses
+    have no other source. `filters` are group and mask by body and link, as they were when the last body was read, or at
+    the last `read_filters`.
     """
 
     def __init__(
@@ -28,16 +28,17 @@ class KnownBodies:
         self._client, self._settings, self._recorder = client, settings, recorder
         self._given_names = given_names
         self._marks = BodyMarks(client)
-        self._unidentified = 0
+        self.unidentified = 0
         self._scenes_loaded = -1  # those that the recorder has noted
-        self.by_id: dict[int, Body] = {}
+        self.by_id: dict[int, ModelledBody] = {}
+        self._margins: dict[int, float] = {}  # of the outermost shape of each base
         self.hidden: dict[int, int] = {}
         self.filters: dict[tuple[int, int], tuple[int, int]] = {}
 
-    def refresh(self, placed: Collection[int]) -> list[Skipped] | None:
-        """Read what is new; None if nothing has come or gone, else what is newly skipped. `placed` ones have shapes."""
+    def refresh(self) -> list[Skipped] | None:
+        """Read what is new; None if nothing has come or gone, else what is newly skipped."""
         loaded = self._scene_loaded()
-        changed = self._margins_changed(placed) | self._ground_changed() | loaded
+        changed = self._margins_changed() | self._ground_changed() | loaded
         if not changed and self._marks.are_as_remembered():
             return None
         # After a syncBodyInfo, pybullet would show the user data of a removed body on the one that inherits its id.
@@ -58,52 +59,21 @@ class KnownBodies:
         self._take_filters(file, rows)
 
     @property
-    def shape_count(self) -> int:
-        """How many shapes there are, modelled or not."""
-        return sum(body.shape_count for body in self.by_id.values()) + self._unidentified
-
-    @property
-    def links(self) -> dict[int, Collection[int]]:
-        """The links of each body."""
-        return {id: body.link_names for id, body in self.by_id.items()}
-
-    @property
-    def labels(self) -> dict[int, str]:
-        """Names of the bodies; those that several would share end in "#" and the id."""
-        return _distinct({id: body.name for id, body in self.by_id.items()})
-
-    @property
-    def names(self) -> dict[tuple[int, int], str]:
-        """By (body, link): label and link, of which what several would share ends in "#" and its number."""
-        labels = self.labels
-        return {
-            (id, link): f"{labels[id]}/{name}"
-            for id, body in self.by_id.items()
-            for link, name in _distinct(body.link_names).items()
-        }
-
-    @property
-    def colors(self) -> dict[tuple[int, int], Color]:
-        """By (body, link)."""
-        return {(id, link): color for id, body in self.by_id.items() for link, color in body.colors.items()}
-
-    @property
-    def decomposed(self) -> list[Decomposed]:
-        """The concave meshes that are modelled as unions of convex parts."""
-        return [each for body in self.by_id.values() for each in body.decomposed]
-
-    @property
     def skipped(self) -> list[Skipped]:
-        """What is not modelled, one entry per body and link."""
-        return [each for body in self.by_id.values() for each in body.skipped] + self._skipped_unidentified()
+        """The bodies without an id, as one entry; nothing if there are none."""
+        if not self.unidentified:
+            return []
+        number = "1 body" if self.unidentified == 1 else f"{self.unidentified} bodies"
+        reason = "pybullet gives no id to what loadBullet brings, nor to links of robots in maximal coordinates"
+        return [Skipped(-1, BASE, number, reason)]
 
-    def _margins_changed(self, placed: Collection[int]) -> bool:
+    def _margins_changed(self) -> bool:
         """Whether a base has another margin than before, where that counts; its body is then new."""
         if self._settings.surface == "nominal":
             return False
-        watched = body_ids(self._client).intersection(placed)
-        margins = {id: pybullet.getDynamicsInfo(id, BASE, self._client)[11] for id in watched}
-        changed = [id for id, margin in margins.items() if margin != self.by_id[id].margin]
+        shaped = {id for id, body in self.by_id.items() if body.shapes or body.ground}
+        watched = body_ids(self._client).intersection(shaped)
+        changed = [id for id in watched if _margin(self._client, id) != self._margins[id]]
         for id in changed:
             del self.by_id[id]
         return bool(changed)
@@ -129,7 +99,7 @@ class KnownBodies:
         """
         client = self._client
         ids, known = self._still_known()
-        unidentified = self._unidentified
+        unidentified = self.unidentified
         if loaded or not ids or len(known) < len(ids) or self.hidden:
             file, rows, hidden = saved_bodies(client, ids)
             if len(rows) < len(file.bodies):
@@ -146,15 +116,16 @@ class KnownBodies:
         for id in fresh:
             body = file.bodies[rows[id]] if id in rows else None
             field = self._recorder.height_field(id) if self._recorder else None
-            source = self._recorder.sources.get(id) if self._recorder else None
-            known[id] = read_body(client, id, file, body, self._settings, field, source, self._given_names.get(id))
+            loaded_from = self._recorder.loaded.get(id) if self._recorder else None
+            known[id] = read_body(client, id, file, body, self._settings, field, loaded_from, self._given_names.get(id))
+            self._margins[id] = _margin(client, id)
             self._marks.put(id)
         self.by_id = dict(sorted(known.items()))
-        grown, self._unidentified = unidentified > self._unidentified, unidentified
+        grown, self.unidentified = unidentified > self.unidentified, unidentified
         skipped = [each for id in fresh for each in self.by_id[id].skipped]
-        return skipped + (self._skipped_unidentified() if grown else [])
+        return skipped + (self.skipped if grown else [])
 
-    def _still_known(self) -> tuple[list[int], dict[int, Body]]:
+    def _still_known(self) -> tuple[list[int], dict[int, ModelledBody]]:
         """The ids of all bodies, sorted, and of those that have been read what they are."""
         ids = sorted(body_ids(self._client))
         return ids, {id: self.by_id[id] for id in ids if id in self.by_id and self._marks.is_on(id)}
@@ -166,14 +137,7 @@ class KnownBodies:
             for link, collider in file.bodies[row].colliders.items()
         }
 
-    def _skipped_unidentified(self) -> list[Skipped]:
-        if not self._unidentified:
-            return []
-        number = "1 body" if self._unidentified == 1 else f"{self._unidentified} bodies"
-        reason = "pybullet gives no id to what loadBullet brings, nor to links of robots in maximal coordinates"
-        return [Skipped(-1, BASE, number, reason)]
 
-
-def _distinct(names: Mapping[int, str]) -> dict[int, str]:
-    number = Counter(names.values())
-    return {id: name if number[name] == 1 else f"{name}#{id}" for id, name in names.items()}
+def _margin(client: int, id: int) -> float:
+    """Of the outermost shape of a base, as Bullet has it."""
+    return float(pybullet.getDynamicsInfo(id, BASE, client)[11])

@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 from typing import Any, NamedTuple
 
+import numpy as np
 import pybullet
+from numpy.typing import ArrayLike
 
 from overlapper.simulation.bullet.calls import Arguments, listen, unlisten
 from overlapper.simulation.bullet.commands import Commands
 from overlapper.simulation.height_field import HeightField
+from overlapper.simulation.model import Link
 
-Link = tuple[int, int]  # body and link, -1 for the base
-
-# What is heard, and says nothing of collisions.
+# Calls that are heard and do not change who collides.
 UNNOTED = frozenset(
     {
         *("connect", "stepSimulation", "setRealTimeSimulation", "changeConstraint", "applyExternalForce"),
@@ -26,7 +27,7 @@ UNNOTED = frozenset(
 FILE_NAMES = ("fileName", "sdfFileName", "mjcfFileName")
 
 
-class Source(NamedTuple):
+class Loaded(NamedTuple):
     """The file that a body was loaded from, `alone` or with others."""
 
     file: str
@@ -68,7 +69,7 @@ class Recorder:
         """collisionFilterMode 0; by default one mask that admits the other's group is enough."""
         self.self_collision: dict[int, int] = {}
         """The flags, by body, that a body with URDF_USE_SELF_COLLISION was loaded with."""
-        self.sources: dict[int, Source] = {}
+        self.loaded: dict[int, Loaded] = {}
         """Where bodies come from that loadURDF, loadSDF or loadMJCF made."""
         self._fields: dict[int, HeightField] = {}  # by shape
         self._shapes: dict[int, int] = {}  # by body that is a height field
@@ -110,7 +111,7 @@ class Recorder:
                 for body in made:
                     self._drop(body)
                     if file := next((arguments[each] for each in FILE_NAMES if each in arguments), None):
-                        self.sources[body] = Source(os.fspath(file), len(made) == 1)
+                        self.loaded[body] = Loaded(os.fspath(file), len(made) == 1)
                     if arguments.get("baseCollisionShapeIndex", -1) in self._fields:
                         self._shapes[body] = arguments["baseCollisionShapeIndex"]
                     if flags & pybullet.URDF_USE_SELF_COLLISION:
@@ -131,7 +132,7 @@ class Recorder:
 
     def _note_field(self, arguments: Arguments, shape: int) -> None:
         replaced = self._fields.get(arguments.get("replaceHeightfieldIndex", -1))
-        self._fields[shape] = HeightField.of_pybullet(
+        self._fields[shape] = height_field(
             arguments["heightfieldData"],
             arguments["numHeightfieldRows"],
             arguments["numHeightfieldColumns"],
@@ -142,4 +143,18 @@ class Recorder:
     def _drop(self, body: int) -> None:
         self.self_collision.pop(body, None)
         self._shapes.pop(body, None)
-        self.sources.pop(body, None)
+        self.loaded.pop(body, None)
+
+
+def height_field(
+    data: ArrayLike, rows: int, columns: int, scale: ArrayLike, before: HeightField | None = None
+) -> HeightField:
+    """The field that createCollisionShape makes of these heights, `rows` of them along x.
+
+    Bullet puts the middle height at z = 0. A field that takes the place of another one `before` keeps its middle.
+    """
+    x, y, z = np.asarray(scale, dtype=float)
+    # Bullet keeps the heights in single precision.
+    plain = z * np.asarray(data, dtype=np.float32).astype(float).reshape(columns, rows)
+    middle = before.middle if before else float(plain.min() + plain.max()) / 2
+    return HeightField(plain - middle, (float(x), float(y)), middle)

@@ -5,26 +5,19 @@ from __future__ import annotations
 import math
 import warnings
 from typing import Literal
-from weakref import WeakValueDictionary
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from overlapper import Batch, Overlaps
 from overlapper._core import ContactSolver
 from overlapper.simulation.asked_pairs import Among, listed
-from overlapper.simulation.bodies import Bodies
-from overlapper.simulation.bullet.calls import listen, tell, unheard, unlisten
-from overlapper.simulation.bullet.commands import Commands
-from overlapper.simulation.bullet.dynamics import Dynamics
-from overlapper.simulation.bullet.recorder import Link
-from overlapper.simulation.bullet.response import Response
+from overlapper.simulation.bodies import AnyBodies
+from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning
 from overlapper.simulation.contacts import Contacts
-from overlapper.simulation.forces.cautions import NoDirectionWarning, SubstepsWarning
 from overlapper.simulation.forces.forces import Forces
 from overlapper.simulation.forces.parameter import OfPair, Parameter
-from overlapper.simulation.model import Array
+from overlapper.simulation.model import Array, Link
 
 # A swing that turns by more than so many radians in a step is followed by backward Euler.
 COARSE = 2.0
@@ -40,10 +33,6 @@ BISECTIONS = 8
 
 # What is swept in a step at most: stiffness beyond is damped.
 MOST_SUBSTEPS = 200
-
-
-_INSIDE: WeakValueDictionary[int, VolumetricContact] = WeakValueDictionary()
-"""Who is in its `with`, by client."""
 
 
 class VolumetricContact:
@@ -96,7 +85,7 @@ class VolumetricContact:
 
     def __init__(
         self,
-        bodies: Bodies,
+        bodies: AnyBodies,
         pairs: Among | None = None,
         stiffness: float | OfPair = 1e7,
         dissipation: float | OfPair = 1e-3,
@@ -119,8 +108,7 @@ class VolumetricContact:
         if substeps != "auto" and not (whole and int(substeps) >= 1):
             raise ValueError(f"substeps must be a whole number from 1, or 'auto', not {substeps!r}")
         self._substeps = substeps
-        self._response = Response(bodies.physicsClientId)
-        self._commands = bodies.recorder.commands if bodies.recorder else Commands(bodies.physicsClientId)
+        self._mechanics = bodies.mechanics()
         self._inside = False
         self._parts: list[tuple[float, Forces]] = []  # of a step, the parts that substeps are, and their forces
         self._after: Array | None = None  # the velocity that the last step left
@@ -134,26 +122,14 @@ class VolumetricContact:
         """How often the solver went through all pairs in the last substep."""
 
     def __enter__(self) -> VolumetricContact:
-        client = self.bodies.physicsClientId
-        if client in _INSIDE:
-            raise RuntimeError(f"physicsClientId {client} is within a `with` of a VolumetricContact already")
-        _INSIDE[client] = self
+        self._rules = self.bodies.rules
+        self._mechanics.enter(self.bodies.link_pairs(self._among))
         self._inside = True
-        self._turn_off()
-        if not self.bodies.recorder:
-            self._commands.learn()
-            listen(self._commands.hear)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._inside = False
-        client = self.bodies.physicsClientId
-        _INSIDE.pop(client, None)
-        if not self.bodies.recorder:
-            unlisten(self._commands.hear)
-        if pybullet.isConnected(client):
-            self._response.turn_on(self.bodies.recorder)
-            self._commands.prepare(pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"], first=True)
+        self._mechanics.leave()
 
     def step(self) -> None:
         """Let the simulation go on by one of its time steps.
@@ -162,8 +138,7 @@ class VolumetricContact:
         """
         if not self._inside:
             raise RuntimeError("step() is for within `with contact:`, where Bullet does not respond to these pairs")
-        client = self.bodies.physicsClientId
-        duration = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
+        duration = self.bodies.time_step
         self._refresh()
         left, taken = duration, 0
         length = duration / (self._planned or 1)
@@ -180,25 +155,23 @@ class VolumetricContact:
                     if not taken or highest * length**2 > 1:
                         length = left / min(_followed(highest, left), max(1, MOST_SUBSTEPS - taken))
                 wrenches = self._solve(length, velocity, frequency2)
-                pybullet.setTimeStep(length, client)
-                self._commands.prepare(length, first=not taken, share=length / duration)
+                self._mechanics.begin(length, duration, first=not taken)
                 self._dynamics.apply(wrenches, self._frames)
-                unheard("stepSimulation")(client)
+                self._mechanics.step()
                 self._parts.append((length / duration, self._found))
                 left -= length
                 taken += 1
         finally:
-            pybullet.setTimeStep(duration, client)
-            self._commands.stepped()
+            self._mechanics.stepped(duration)
         self.substeps = taken
         self._after = self._dynamics.velocity()
-        tell("stepSimulation", {"physicsClientId": client})  # one, to whoever watches
+        self._mechanics.announce()
 
     def forces(self) -> Forces:
         """The forces with which a step of the simulator would begin, without taking it: for scripts that integrate."""
         self._refresh()
         frequency2 = self._place(self._dynamics.solver)
-        duration = pybullet.getPhysicsEngineParameters(self.bodies.physicsClientId)["fixedTimeStep"]
+        duration = self.bodies.time_step
         substeps = self._planned or min(_followed(frequency2.max(initial=0.0), duration), MOST_SUBSTEPS)
         self._solve(duration / substeps, self._dynamics.velocity(), frequency2)
         self._after = None
@@ -288,12 +261,14 @@ class VolumetricContact:
     def _refresh(self) -> None:
         """See what has come or gone, and how heavy things are."""
         self.bodies.update()
-        if self._keys is not self.bodies.keys or self._restored != self._commands.restored:
+        if self._keys is not self.bodies.keys or self._restored != self._mechanics.restored:
             self._model()
         elif self._dynamics.read():
             self._forget()
-        if self._inside and self._rules is not self.bodies._in_force.rules:
-            self._turn_off()
+        if self._inside and self._rules is not self.bodies.rules:
+            # A script may have let pairs collide since, or made new ones.
+            self._rules = self.bodies.rules
+            self._mechanics.turn_off(self.bodies.link_pairs(self._among))
 
     def _follow(self) -> None:
         """Where the bodies are within a step, or at its end."""
@@ -307,15 +282,10 @@ class VolumetricContact:
         first, second = found.pairs.T.astype(np.int64)
         return np.asarray(first * len(self._keys) + second)
 
-    def _turn_off(self) -> None:
-        """Turn Bullet's response off, also of pairs that a script has let collide since, or made to."""
-        self._rules = self.bodies._in_force.rules
-        self._response.turn_off(self.bodies.link_pairs(self._among))
-
     def _model(self) -> None:
         """Read the masses and joints of the bodies that there are."""
-        self._keys, self._restored = self.bodies.keys, self._commands.restored
-        self._dynamics = Dynamics(self.bodies.physicsClientId, sorted({body for body, _, _ in self._keys}))
+        self._keys, self._restored = self.bodies.keys, self._mechanics.restored
+        self._dynamics = self._mechanics.dynamics(sorted({body for body, _, _ in self._keys}))
         self._links = np.array([self._dynamics.place[body, link] for body, link, _ in self._keys], dtype=np.int64)
         self._frames = self._dynamics.frames()
         self._batch = Batch(self.bodies.shapes)  # for what is not yet: the one of `bodies` knows what is
@@ -394,7 +364,7 @@ class VolumetricContact:
         positions, orientations = self._dynamics.solver.ahead(
             duration, velocity, self._links, bodies.positions, bodies.orientations
         )
-        pairs = bodies._pairs_at(positions, orientations, self._among)
+        pairs = bodies.pairs_at(positions, orientations, self._among)
         return self._batch.overlaps(positions, orientations, pairs, separated=False)
 
     def _solve(self, duration: float, velocity: Array, frequency2: Array) -> Array:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.simulation.bullet.recorder import Link
-from overlapper.simulation.model import Array
+from overlapper.simulation.model import Array, Link
 
 OfPair = Callable[[Link, Link], float]
 """What a pair of links ((body, link), (body, link)) has, the lesser first."""

@@ -1,0 +1,98 @@
+"""Steps of a pybullet client in which other forces stand in for Bullet's response to contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from weakref import WeakValueDictionary
+
+import pybullet
+
+from overlapper.simulation.bullet.calls import listen, tell, unheard, unlisten
+from overlapper.simulation.bullet.commands import Commands
+from overlapper.simulation.bullet.dynamics import BulletDynamics
+from overlapper.simulation.bullet.recorder import Recorder
+from overlapper.simulation.model import Link
+
+_INSIDE: WeakValueDictionary[int, Stepping] = WeakValueDictionary()
+"""Who has entered, by client."""
+
+
+class Stepping:
+    """See `Mechanics`; the recorder is that of the bodies, if they have one."""
+
+    def __init__(self, client: int, recorder: Recorder | None) -> None:
+        self._client, self._recorder = client, recorder
+        self._commands = recorder.commands if recorder else Commands(client)
+        self._response = Response(client)
+
+    @property
+    def restored(self) -> int:
+        return self._commands.restored
+
+    def dynamics(self, bodies: Sequence[int]) -> BulletDynamics:
+        return BulletDynamics(self._client, bodies)
+
+    def enter(self, pairs: Iterable[tuple[Link, Link]]) -> None:
+        if self._client in _INSIDE:
+            raise RuntimeError(f"physicsClientId {self._client} is within a `with` of a VolumetricContact already")
+        _INSIDE[self._client] = self
+        self.turn_off(pairs)
+        if not self._recorder:
+            self._commands.learn()
+            listen(self._commands.hear)
+
+    def turn_off(self, pairs: Iterable[tuple[Link, Link]]) -> None:
+        self._response.turn_off(pairs)
+
+    def leave(self) -> None:
+        _INSIDE.pop(self._client, None)
+        if not self._recorder:
+            unlisten(self._commands.hear)
+        if pybullet.isConnected(self._client):
+            self._response.turn_on(self._recorder)
+            duration = pybullet.getPhysicsEngineParameters(self._client)["fixedTimeStep"]
+            self._commands.prepare(duration, first=True)
+
+    def begin(self, length: float, duration: float, first: bool) -> None:
+        pybullet.setTimeStep(length, self._client)
+        self._commands.prepare(length, first, share=length / duration)
+
+    def step(self) -> None:
+        unheard("stepSimulation")(self._client)
+
+    def stepped(self, duration: float) -> None:
+        pybullet.setTimeStep(duration, self._client)
+        self._commands.stepped()
+
+    def announce(self) -> None:
+        tell("stepSimulation", {"physicsClientId": self._client})
+
+
+class Response:
+    """Which pairs of links of a client Bullet pushes apart no more.
+
+    A pair filter takes a pair from Bullet's collision detection, so that it costs nothing there and has no contact
+    points. No recorder hears of it: to `Bodies` the pair is as before.
+    """
+
+    def __init__(self, client: int) -> None:
+        self._client = client
+        self._off: set[tuple[Link, Link]] = set()
+
+    def turn_off(self, pairs: Iterable[tuple[Link, Link]]) -> None:
+        """Of those pairs, too."""
+        for pair in pairs:
+            self._set(pair, 0)
+            self._off.add(pair)
+
+    def turn_on(self, recorder: Recorder | None) -> None:
+        """Of all pairs of which it is off, but for those that a script has filtered itself, as a recorder has heard."""
+        filters = recorder.pair_filters if recorder else {}
+        for pair in sorted(self._off):
+            if filters.get(pair, True):
+                self._set(pair, 1)
+        self._off.clear()
+
+    def _set(self, pair: tuple[Link, Link], enabled: int) -> None:
+        (a, link_a), (b, link_b) = pair
+        unheard("setCollisionFilterPair")(a, b, link_a, link_b, enabled, self._client)
