@@ -108,34 +108,21 @@ bool axis_soon_found(const Body& a, const Body& b) {
 
 // ------------------------------------------------------------------------------------------------------------ Overlaps
 
-void Overlaps::append(IndexPair pair, const Row& row) {
-  pairs.push_back(pair);
-  const Measures& m = row.measures;
-  const bool overlapping = m.status == Status::kOverlapping;
-  status.push_back(static_cast<std::int8_t>(m.status));
-  way.push_back(static_cast<std::int8_t>(m.way));
-  widened.push_back(overlapper::widened(m.way));
-  facets_touched.push_back(m.facets_touched);
-  volume.push_back(m.volume);
-  volume_error.push_back(m.volume_error);
-  area.push_back(m.area);
-  depth.push_back(row.depth);
-  centroid.push_back(overlapping ? m.centroid : Vec3{kNaN, kNaN, kNaN});
-  normal.push_back(row.normal);
-  gradient.push_back({gradient_row(m.pulls[0]), gradient_row(m.pulls[1])});
+Vec3 centroid_or_nan(const Measures& measures) {
+  return measures.status == Status::kOverlapping ? measures.centroid : Vec3{kNaN, kNaN, kNaN};
+}
+
+BodyGradients gradients(const Measures& measures) {
+  return {gradient_row(measures.pulls[0]), gradient_row(measures.pulls[1])};
+}
+
+void Overlaps::append(const Row& row) {
+  std::apply([&](const auto&... column) { ((this->*column.values).push_back(column.of(row)), ...); }, kColumns);
   source.push_back(row.source);
 }
 
 void Overlaps::reserve(size_t rows) {
-  pairs.reserve(rows);
-  status.reserve(rows);
-  way.reserve(rows);
-  widened.reserve(rows);
-  facets_touched.reserve(rows);
-  for (std::vector<double>* column : {&volume, &volume_error, &area, &depth}) column->reserve(rows);
-  centroid.reserve(rows);
-  normal.reserve(rows);
-  gradient.reserve(rows);
+  std::apply([&](const auto&... column) { ((this->*column.values).reserve(rows), ...); }, kColumns);
   source.reserve(rows);
 }
 
@@ -191,18 +178,7 @@ Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
     to.reserve(rows.size());
     for (std::int64_t i : rows) to.push_back(from[i]);
   };
-  pick(pairs, chosen.pairs);
-  pick(status, chosen.status);
-  pick(way, chosen.way);
-  pick(widened, chosen.widened);
-  pick(facets_touched, chosen.facets_touched);
-  pick(volume, chosen.volume);
-  pick(volume_error, chosen.volume_error);
-  pick(area, chosen.area);
-  pick(depth, chosen.depth);
-  pick(centroid, chosen.centroid);
-  pick(normal, chosen.normal);
-  pick(gradient, chosen.gradient);
+  std::apply([&](const auto&... column) { (pick(this->*column.values, chosen.*column.values), ...); }, kColumns);
   pick(source, chosen.source);
   return chosen;
 }
@@ -309,6 +285,7 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
   const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
   const size_t planes_before = planes_asked;
   next_rows[i] = separated ? Overlaps::Row{} : row_of(a.placed, b.placed, with_tolerance, by_method);
+  next_rows[i].pair = pair.pair;
   asked.fetch_add(planes_asked - planes_before, std::memory_order_relaxed);
   done[i] = true;
   return !next_rows[i].source;
@@ -388,7 +365,7 @@ Overlaps Batch::overlaps(std::span<const double> positions, std::span<const doub
     for (size_t i = first; i < first + count; ++i) answer.examined += memory->done[i], rows += listed(i);
     if (first == 0) answer.reserve(separated ? pairs.size() : rows);
     for (size_t i = first; i < first + count; ++i)
-      if (listed(i)) answer.append(pairs[i], memory->next_rows[i]);
+      if (listed(i)) answer.append(memory->next_rows[i]);
   }
   answer.planes_asked = memory->asked;
   if (finished) memory->keep(tolerance, method);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "batch/box_tree.h"
@@ -18,6 +19,9 @@ namespace overlapper {
 /// Position, then quaternion x, y, z, w as given.
 using PoseNumbers = std::array<double, 7>;
 
+/// d volume / d (translation, rotation vector about the body's own position) of a and of b.
+using BodyGradients = std::array<std::array<double, 6>, 2>;
+
 /// The common sets of the pairs of one call, a column per quantity and a row per pair.
 struct Overlaps {
   struct Row {
@@ -25,17 +29,17 @@ struct Overlaps {
     double depth = 0;
     Vec3 normal;                      ///< {0, 0, 0} if separated
     std::shared_ptr<Overlap> source;  ///< if it took more than measuring at once
+    IndexPair pair{};
   };
 
+  // What each column says stands in kColumns.
   std::vector<IndexPair> pairs;
-  std::vector<std::int8_t> status;  ///< a Status
-  std::vector<std::int8_t> way;     ///< a Way
+  std::vector<std::int8_t> status, way;
   std::vector<char> widened;
   std::vector<int> facets_touched;
   std::vector<double> volume, volume_error, area, depth;
-  std::vector<Vec3> centroid;  ///< not a number unless overlapping
-  std::vector<Vec3> normal;
-  std::vector<std::array<std::array<double, 6>, 2>> gradient;
+  std::vector<Vec3> centroid, normal;
+  std::vector<BodyGradients> gradient;
 
   /// The pair that a row was taken from, while the batch that has it remembers; none where that is quickly made again.
   std::vector<std::weak_ptr<Overlap>> source;
@@ -55,7 +59,7 @@ struct Overlaps {
   };
 
   size_t size() const { return pairs.size(); }
-  void append(IndexPair pair, const Row& row);
+  void append(const Row& row);
   void reserve(size_t rows);
   /// The pair of that row with all that can be asked of it.
   std::shared_ptr<Overlap> overlap(size_t row) const;
@@ -68,6 +72,53 @@ struct Overlaps {
 
   std::shared_ptr<Once<Patches>> patches_ = std::make_shared<Once<Patches>>();
 };
+
+/// A column of Overlaps: its name in Python, its values, the value of a row, and what Python says of it.
+template <class T>
+struct Column {
+  const char* name;
+  std::vector<T> Overlaps::* values;
+  T (*of)(const Overlaps::Row&);
+  const char* doc;
+};
+
+Vec3 centroid_or_nan(const Measures& measures);
+BodyGradients gradients(const Measures& measures);
+
+/// The columns that Python has, in its order. A new column is a line here, and the vector that it names.
+inline constexpr std::tuple kColumns{
+    Column<IndexPair>{"pairs", &Overlaps::pairs, [](const Overlaps::Row& row) { return row.pair; },
+                      "(p, 2) indices of the shapes a and b of each row."},
+    Column<std::int8_t>{"status", &Overlaps::status,
+                        [](const Overlaps::Row& row) { return static_cast<std::int8_t>(row.measures.status); },
+                        "(p,) Overlaps.SEPARATED (0), TOUCHING (1) or OVERLAPPING (2)."},
+    Column<std::int8_t>{"way", &Overlaps::way,
+                        [](const Overlaps::Row& row) { return static_cast<std::int8_t>(row.measures.way); },
+                        "(p,) how the answer came: a place in Overlaps.WAYS, which has the names of Overlap.way."},
+    Column<double>{"volume", &Overlaps::volume, [](const Overlaps::Row& row) { return row.measures.volume; },
+                   "(p,) m³; 0 unless overlapping."},
+    Column<double>{"volume_error", &Overlaps::volume_error,
+                   [](const Overlaps::Row& row) { return row.measures.volume_error; },
+                   "(p,) m³, certified: the true volume is within volume ± volume_error."},
+    Column<Vec3>{"centroid", &Overlaps::centroid,
+                 [](const Overlaps::Row& row) { return centroid_or_nan(row.measures); },
+                 "(p, 3) centre of the common volume, m; not a number unless overlapping."},
+    Column<double>{"area", &Overlaps::area, [](const Overlaps::Row& row) { return row.measures.area; },
+                   "(p,) m², of the surface of the common polytope."},
+    Column<Vec3>{"normal", &Overlaps::normal, [](const Overlaps::Row& row) { return row.normal; },
+                 "(p, 3) unit, from b to a as pybullet's contactNormalOnB; 0 for pairs that are separated."},
+    Column<double>{"depth", &Overlaps::depth, [](const Overlaps::Row& row) { return row.depth; },
+                   "(p,) m, the least translation that separates the pair, of a along normal; 0 unless overlapping."},
+    Column<BodyGradients>{
+        "gradient", &Overlaps::gradient, [](const Overlaps::Row& row) { return gradients(row.measures); },
+        R"((p, 2, 6) d volume / d (translation, rotation vector about the body's own position) of a and of b, m² and m³;
+0 unless overlapping.)"},
+    Column<int>{"facets_touched", &Overlaps::facets_touched,
+                [](const Overlaps::Row& row) { return row.measures.facets_touched; },
+                "(p,) how many planes of the shapes took part in building the polytope."},
+    Column<char>{"widened", &Overlaps::widened,
+                 [](const Overlaps::Row& row) { return static_cast<char>(overlapper::widened(row.measures.way)); },
+                 "(p,) True where the volume was computed again in wider arithmetic."}};
 
 /// The pairs of shapes that move: what was found in the last call is kept, and serves where it proves the same answer.
 /// May be called from several threads at once; one of them has the memory, the others go without.

@@ -84,63 +84,77 @@ nb::object candidates(Batch& batch, nb::handle positions, nb::handle orientation
   return nb::cast(to_numpy<IndexMatrix>(std::move(flat), {pairs.size(), 2}), nb::rv_policy::move);
 }
 
-/// A read-only array over one column of the answer, which it keeps alive.
-template <class T, class Element>
-void column(nb::class_<Overlaps>& cls, const char* name, std::vector<Element> Overlaps::* values,
-            std::initializer_list<size_t> row_shape, const char* type, const char* doc) {
-  const std::vector<size_t> row(row_shape);
+/// What NumPy makes of an element of a column: numbers of one type, in a shape.
+template <class T>
+struct Numbers {
+  using Type = T;
+  static std::vector<size_t> shape() { return {}; }
+};
+template <>
+struct Numbers<char> : Numbers<bool> {};
+template <>
+struct Numbers<Vec3> : Numbers<double> {
+  static std::vector<size_t> shape() { return {3}; }
+};
+template <>
+struct Numbers<Mat3> : Numbers<double> {
+  static std::vector<size_t> shape() { return {3, 3}; }
+};
+template <class T, size_t n>
+struct Numbers<std::array<T, n>> : Numbers<T> {
+  static std::vector<size_t> shape() {
+    std::vector<size_t> all = Numbers<T>::shape();
+    all.insert(all.begin(), n);
+    return all;
+  }
+};
+
+template <class T>
+constexpr const char* kNumpyName = nullptr;
+template <>
+constexpr const char* kNumpyName<double> = "float64";
+template <>
+constexpr const char* kNumpyName<int> = "int32";
+template <>
+constexpr const char* kNumpyName<std::int8_t> = "int8";
+template <>
+constexpr const char* kNumpyName<bool> = "bool_";
+
+/// A read-only array over the vector that `values(overlaps)` finds, which the answer keeps alive.
+template <class T, class Values>
+void define_column(nb::class_<Overlaps>& cls, const char* name, Values values, const char* doc) {
+  using Number = typename Numbers<T>::Type;
+  const std::string type = kNumpyName<Number>;
   const std::string sig = "def " + std::string(name) + "(self) -> numpy.typing.NDArray[numpy." + type + "]";
   cls.def_prop_ro(
       name,
-      [values, row](nb::handle self) {
-        const std::vector<Element>& elements = nb::cast<const Overlaps&>(self).*values;
-        std::vector<size_t> shape{elements.size()};
-        shape.insert(shape.end(), row.begin(), row.end());
-        return nb::ndarray<nb::numpy, const T>(reinterpret_cast<const T*>(elements.data()), shape.size(), shape.data(),
-                                               self);
-      },
-      nb::rv_policy::reference, nb::sig(sig.c_str()), doc);
-}
-
-template <class Element>
-void patch_column(nb::class_<Overlaps>& cls, const char* name, std::vector<Element> Overlaps::Patches::* values,
-                  std::initializer_list<size_t> row_shape, const char* doc) {
-  const std::vector<size_t> row(row_shape);
-  const std::string sig = "def " + std::string(name) + "(self) -> numpy.typing.NDArray[numpy.float64]";
-  cls.def_prop_ro(
-      name,
-      [values, row](nb::handle self) {
-        const Overlaps& overlaps = nb::cast<const Overlaps&>(self);
-        const std::vector<Element>& elements =
-            unlocked([&]() -> const Overlaps::Patches& { return overlaps.patches(); }).*values;
-        std::vector<size_t> shape{elements.size()};
-        shape.insert(shape.end(), row.begin(), row.end());
-        return nb::ndarray<nb::numpy, const double>(reinterpret_cast<const double*>(elements.data()), shape.size(),
+      [values](nb::handle self) {
+        const std::vector<T>& elements = values(nb::cast<const Overlaps&>(self));
+        std::vector<size_t> shape = Numbers<T>::shape();
+        shape.insert(shape.begin(), elements.size());
+        return nb::ndarray<nb::numpy, const Number>(reinterpret_cast<const Number*>(elements.data()), shape.size(),
                                                     shape.data(), self);
       },
       nb::rv_policy::reference, nb::sig(sig.c_str()), doc);
 }
 
+template <class T>
+void define_column(nb::class_<Overlaps>& cls, const Column<T>& column) {
+  const auto values = [member = column.values](const Overlaps& overlaps) -> const auto& { return overlaps.*member; };
+  define_column<T>(cls, column.name, values, column.doc);
+}
+
+template <class T>
+void define_patch_column(nb::class_<Overlaps>& cls, const char* name, std::vector<T> Overlaps::Patches::* member,
+                         const char* doc) {
+  const auto values = [member](const Overlaps& overlaps) -> const auto& {
+    return unlocked([&]() -> const Overlaps::Patches& { return overlaps.patches(); }).*member;
+  };
+  define_column<T>(cls, name, values, doc);
+}
+
 void define_columns(nb::class_<Overlaps>& cls) {
-  column<int>(cls, "pairs", &Overlaps::pairs, {2}, "int32", "(p, 2) indices of the shapes a and b of each row.");
-  column<std::int8_t>(cls, "status", &Overlaps::status, {}, "int8",
-                      "(p,) Overlaps.SEPARATED (0), TOUCHING (1) or OVERLAPPING (2).");
-  column<std::int8_t>(cls, "way", &Overlaps::way, {}, "int8",
-                      "(p,) how the answer came: a place in Overlaps.WAYS, which has the names of Overlap.way.");
-  column<double>(cls, "volume", &Overlaps::volume, {}, "float64", "(p,) m³; 0 unless overlapping.");
-  column<double>(cls, "volume_error", &Overlaps::volume_error, {}, "float64",
-                 "(p,) m³, certified: the true volume is within volume ± volume_error.");
-  column<double>(cls, "centroid", &Overlaps::centroid, {3}, "float64",
-                 "(p, 3) centre of the common volume, m; not a number unless overlapping.");
-  column<double>(cls, "area", &Overlaps::area, {}, "float64", "(p,) m², of the surface of the common polytope.");
-  column<double>(cls, "normal", &Overlaps::normal, {3}, "float64",
-                 "(p, 3) unit, from b to a as pybullet's contactNormalOnB; 0 for pairs that are separated.");
-  column<double>(cls, "depth", &Overlaps::depth, {}, "float64",
-                 "(p,) m, the least translation that separates the pair, of a along normal; 0 unless overlapping.");
-  column<double>(
-      cls, "gradient", &Overlaps::gradient, {2, 6}, "float64",
-      R"((p, 2, 6) d volume / d (translation, rotation vector about the body's own position) of a and of b, m² and m³;
-0 unless overlapping.)");
+  std::apply([&](const auto&... column) { (define_column(cls, column), ...); }, kColumns);
   cls.def_prop_ro(
       "patch_area",
       [](nb::handle self) {
@@ -152,20 +166,16 @@ void define_columns(nb::class_<Overlaps>& cls) {
       },
       nb::rv_policy::reference, nb::sig("def patch_area(self) -> numpy.typing.NDArray[numpy.float64]"),
       "(p, 3) m², the area vector of the patch, from b to a; zeros unless overlapping.");
-  patch_column(
-      cls, "patch_centre", &Overlaps::Patches::centre, {3},
+  define_patch_column(
+      cls, "patch_centre", &Overlaps::Patches::centre,
       R"((p, 3) m, the centre of that area in the plane through the centroid; not a number without an area. It, the
 moments and the distance take some microseconds a pair when one of them is first asked for.)");
-  patch_column(cls, "patch_moments", &Overlaps::Patches::moments, {3, 3},
-               "(p, 3, 3) m⁴, ∫ x xᵀ dA of that area about its centre; zeros without an area.");
-  patch_column(
-      cls, "patch_distance", &Overlaps::Patches::distance, {},
+  define_patch_column(cls, "patch_moments", &Overlaps::Patches::moments,
+                      "(p, 3, 3) m⁴, ∫ x xᵀ dA of that area about its centre; zeros without an area.");
+  define_patch_column(
+      cls, "patch_distance", &Overlaps::Patches::distance,
       R"((p,) m, how far points of that area are on the average from the centroid, seen along the area vector; not a number
 without an area.)");
-  column<int>(cls, "facets_touched", &Overlaps::facets_touched, {}, "int32",
-              "(p,) how many planes of the shapes took part in building the polytope.");
-  column<bool>(cls, "widened", &Overlaps::widened, {}, "bool_",
-               "(p,) True where the volume was computed again in wider arithmetic.");
 }
 
 /// One that others have as well is copied to where Python keeps it: nanobind ends the process if it has no memory to

@@ -786,6 +786,14 @@ class Overlaps:
         """
 
     @property
+    def facets_touched(self) -> numpy.typing.NDArray[numpy.int32]:
+        """(p,) how many planes of the shapes took part in building the polytope."""
+
+    @property
+    def widened(self) -> numpy.typing.NDArray[numpy.bool_]:
+        """(p,) True where the volume was computed again in wider arithmetic."""
+
+    @property
     def patch_area(self) -> numpy.typing.NDArray[numpy.float64]:
         """
         (p, 3) m², the area vector of the patch, from b to a; zeros unless overlapping.
@@ -810,14 +818,6 @@ class Overlaps:
         (p,) m, how far points of that area are on the average from the centroid, seen along the area vector; not a number
         without an area.
         """
-
-    @property
-    def facets_touched(self) -> numpy.typing.NDArray[numpy.int32]:
-        """(p,) how many planes of the shapes took part in building the polytope."""
-
-    @property
-    def widened(self) -> numpy.typing.NDArray[numpy.bool_]:
-        """(p,) True where the volume was computed again in wider arithmetic."""
 
     SEPARATED: int = 0
 
