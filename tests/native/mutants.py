@@ -279,8 +279,10 @@ class Bench:
             return noticed[1]
         return f"the process ended by {done.returncode}" if done.returncode < 0 else done.stdout[-300:].strip()
 
-    def noticed(self, number: int) -> str:
+    def noticed(self, number: int, quick: bool) -> str:
         first, *others = self.mutants[number].tests
+        if quick:
+            others = []
         return self.complaint(number, first, seconds=90) or next(
             filter(None, (self.complaint(number, tests, seconds=900) for tests in others)), ""
         )
@@ -313,6 +315,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200, help="mutants drawn that are not known as equivalent")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="mutants shown to the tests at once")
     parser.add_argument("--under", default="", help="the folder or file that mutants are drawn from, as in forces/")
+    parser.add_argument("--quick", action="store_true", help="show them to the first tests only; then use --again")
     parser.add_argument("--again", action="store_true", help="show those once more that survived")
     chosen = parser.parse_args()
 
@@ -340,7 +343,7 @@ def main() -> None:
                 writer.writerow([mutant.name[0], mutant.line + 1, *mutant.name[1:], by])
 
     def show(number: int) -> None:
-        results[number] = bench.noticed(number)
+        results[number] = bench.noticed(number, chosen.quick)
         print(f"{len(results)}/{len(bench.mutants)} {results[number] or survivor(bench.mutants[number])}", flush=True)
         write()
 
