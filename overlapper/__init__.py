@@ -23,7 +23,7 @@ from overlapper._core import (
     penetration_depth,
 )
 from overlapper.face import lazily as _lazily
-from overlapper.shape import Shape
+from overlapper.shapes import Shape
 
 if TYPE_CHECKING:
     from overlapper.polytopes.database import read_polytopes as read_polytopes

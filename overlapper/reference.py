@@ -14,20 +14,20 @@ from typing import Any, Literal
 
 import numpy as np
 
-from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Overlap, RoundedHull, Shape, Sphere
+from overlapper import Overlap
 from overlapper.install import hint
 from overlapper.jobs.worker import Ended, NotStarted, Worker
 from overlapper.proof.signed_distance import signed_distance_bounds
+from overlapper.shapes.facts import FclModel
+from overlapper.shapes.table import facts
 
 try:
     import fcl
 except ImportError:
     fcl = None
 
-# A shape as plain values: FCL's name for it and the arguments. Hashable, so that each geometry is built once.
-Model = tuple[str, tuple[Any, ...]]
 # For each of the two bodies its model and its pose: quaternion wxyz, position.
-Request = tuple[tuple[Model, tuple[Any, Any]], ...]
+Request = tuple[tuple[FclModel, tuple[Any, Any]], ...]
 
 # FCL's default distance_tolerance, in m, which python-fcl cannot change. EPA stops when its bounds of the depth are
 # this near. The distance search stops when a step gains less than this, which promises nothing: beside curved shapes it
@@ -164,7 +164,7 @@ def _signed_distance(request: Request, bodies: list[Any], contacts: Any) -> floa
 
 
 @lru_cache(maxsize=4096)
-def _geometry(model: Model) -> Any:
+def _geometry(model: FclModel) -> Any:
     name, values = model
     if name == "Convex":
         vertices, faces, count = values
@@ -174,42 +174,20 @@ def _geometry(model: Model) -> Any:
     return getattr(fcl, name)(*values)
 
 
-def _model(shape: Shape) -> Model:
-    """A shape in FCL's terms: a box by its sides; capsule and cylinder along z about the centre, as ours."""
-    match shape:
-        case Box():
-            return "Box", tuple(2.0 * shape.half_extents)
-        case Sphere():
-            return "Sphere", (shape.radius,)
-        case Capsule():
-            return "Capsule", (shape.radius, shape.length)
-        case Cylinder():
-            return "Cylinder", (shape.radius, shape.length)
-        case RoundedHull():
-            raise TypeError("shape must not be a rounded hull, of which FCL has none")
-        case Ellipsoid():
-            raise TypeError("shape must not be an ellipsoid, of which no exact distance is known")
-        case HalfSpace():
-            return "Halfspace", (*shape.normal, shape.offset)
-        case Hull():
-            faces = np.concatenate([[len(ring), *ring] for ring in shape.facets]).astype(np.int32)
-            return "Convex", (shape.vertices.tobytes(), faces.tobytes(), len(shape.facets))
-
-
-def _request(overlap: Overlap) -> Request:
-    return tuple((_model(body.shape), (np.roll(body.orientation, 1), body.position)) for body in overlap.shapes)
-
-
 def _unsupported(overlap: Overlap) -> str | None:
     if len(overlap.shapes) != 2:
         return f"FCL is asked about two bodies at a time, not {len(overlap.shapes)}."
-    if any(isinstance(body.shape, RoundedHull) for body in overlap.shapes):
-        return "FCL has no rounded hulls."
-    if any(isinstance(body.shape, Ellipsoid) for body in overlap.shapes):
-        return "FCL is not asked about ellipsoids, of which no exact distance is known to judge it by."
-    if all(isinstance(body.shape, HalfSpace) for body in overlap.shapes):
+    known = [facts(body.shape) for body in overlap.shapes]
+    if not any(each.bounded for each in known):
         return "FCL gives no depth or distance of two half-spaces."
-    return None
+    return next((said for said in (each.fcl() for each in known) if isinstance(said, str)), None)
+
+
+def _request(overlap: Overlap) -> Request:
+    """A pair that is supported."""
+    models = [facts(body.shape).fcl() for body in overlap.shapes]
+    poses = [(np.roll(body.orientation, 1), body.position) for body in overlap.shapes]
+    return tuple((model, pose) for model, pose in zip(models, poses) if not isinstance(model, str))
 
 
 def _ours(overlap: Overlap) -> Figures:

@@ -3,31 +3,19 @@
 from __future__ import annotations
 
 import itertools
-import math
 import pickle
 
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import (
-    Batch,
-    Box,
-    Capsule,
-    Cylinder,
-    Ellipsoid,
-    HalfSpace,
-    Hull,
-    Overlaps,
-    RoundedHull,
-    Shape,
-    Sphere,
-)
+from overlapper import Batch, Overlaps
 from overlapper.audit.kinematics import Kinematics
 from overlapper.audit.pairs import LinkPair, link_pairs
 from overlapper.audit.robot import Robot
 from overlapper.audit.sampling import Sampling
 from overlapper.audit.tally import Array, Counts, Seen, Tally
 from overlapper.quaternion import rotated
+from overlapper.shapes.table import facts
 
 Mask = NDArray[np.bool_]
 
@@ -57,7 +45,7 @@ class Examiner:
         places = {pair.links: k for k, pair in enumerate(self.pairs)}
         pair = np.array([places.get((a, b), -1) for a, b in zip(links[first].tolist(), links[second].tolist())], int)
         self._first, self._second, self._pair = (each[pair >= 0] for each in (first, second, pair))
-        balls = [ball(shape) for shape in shapes]
+        balls = [facts(shape).ball() for shape in shapes]
         self._centres = np.array([centre for centre, _ in balls]).reshape(-1, 3)
         self._radii = np.array([radius for _, radius in balls])
         self._copies = max(1, AT_ONCE // max(len(shapes), 1))
@@ -132,25 +120,3 @@ def prepared(setup: bytes) -> Examiner:
     """The examiner of a setup."""
     robot, count, seed, tolerance, least_depth = pickle.loads(setup)
     return Examiner(robot, Sampling(robot, count, seed), tolerance, least_depth)
-
-
-def ball(shape: Shape) -> tuple[Array, float]:
-    """Centre and radius of a ball around a shape; a half-space has one without end."""
-    match shape:
-        case Hull() | RoundedHull():
-            core = shape if isinstance(shape, Hull) else shape.core
-            centre = core.bounds.mean(axis=0)
-            radius = float(np.linalg.norm(core.corners - centre, axis=1).max())
-            return centre, radius + (shape.radius if isinstance(shape, RoundedHull) else 0.0)
-        case HalfSpace():
-            return np.zeros(3), math.inf
-        case Sphere():
-            return np.zeros(3), shape.radius
-        case Capsule():
-            return np.zeros(3), shape.radius + shape.length / 2
-        case Ellipsoid():
-            return np.zeros(3), float(shape.half_axes.max())
-        case Cylinder():
-            return np.zeros(3), math.hypot(shape.radius, shape.length / 2)
-        case Box():
-            return np.zeros(3), float(np.linalg.norm(shape.half_extents))

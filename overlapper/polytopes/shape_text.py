@@ -10,20 +10,11 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper._core import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, RoundedHull, Sphere
 from overlapper.printable import first_line
-from overlapper.shape import Shape
+from overlapper.shapes import Shape
+from overlapper.shapes.table import KINDS, facts
 
-PARAMETERS: dict[type, tuple[str, ...]] = {
-    Box: ("half_extents",),
-    Sphere: ("radius",),
-    Capsule: ("radius", "length"),
-    Cylinder: ("radius", "length"),
-    Ellipsoid: ("half_axes",),
-    HalfSpace: ("normal", "offset"),
-}
 LARGEST = 24 * 1_000_000  # bytes of the vertices of a hull: a million, of which Hull itself needs seconds
-KINDS = {kind.__name__: kind for kind in (*PARAMETERS, Hull, RoundedHull)}
 
 
 def text_of(shape: Shape) -> str:
@@ -31,26 +22,30 @@ def text_of(shape: Shape) -> str:
 
     The vertices of a hull are sorted, as little-endian doubles, deflated and in base 64: 20 characters each, mostly.
     """
-    if isinstance(shape, Hull | RoundedHull):
-        hull, radius = (shape, []) if isinstance(shape, Hull) else (shape.core, [shape.radius])
-        vertices = hull.vertices[np.lexsort(hull.vertices.T[::-1])]
-        packed = base64.b64encode(zlib.compress(vertices.astype("<f8").tobytes(), level=9)).decode()
-        return json.dumps([type(shape).__name__, packed, *radius])
-    parameters = [np.asarray(getattr(shape, name)).tolist() for name in PARAMETERS[type(shape)]]
-    return json.dumps([type(shape).__name__, *parameters])
+    return json.dumps([type(shape).__name__, *map(_text_of_parameter, facts(shape).parameters())])
+
+
+def _text_of_parameter(value: float | NDArray[np.float64]) -> object:
+    if np.ndim(value) < 2:
+        return np.asarray(value).tolist()
+    return base64.b64encode(zlib.compress(np.asarray(value, "<f8").tobytes(), level=9)).decode()
 
 
 def shape_of(text: str) -> Shape:
-    """The shape of such a text. ValueError if it is none."""
+    """The shape of such a text. ValueError if the text is invalid."""
     try:
-        kind, *parameters = json.loads(text)
-        if kind in ("Hull", "RoundedHull"):
-            packed, *radius = parameters
-            parameters = [np.frombuffer(_inflated(base64.b64decode(packed)), "<f8").reshape(-1, 3), *radius]
-        shape: Shape = KINDS[kind](*parameters)
+        name, *parameters = json.loads(text)
+        kind = {each.__name__: each for each in KINDS}[name]
+        shape: Shape = kind(*map(_parameter_of_text, parameters))
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError, zlib.error, binascii.Error) as error:
         raise ValueError(f"{text[:60]!r} is no shape: {first_line(error)}") from error
     return shape
+
+
+def _parameter_of_text(value: object) -> object:
+    if isinstance(value, str):
+        return np.frombuffer(_inflated(base64.b64decode(value)), "<f8").reshape(-1, 3)
+    return value
 
 
 def _inflated(data: bytes) -> bytes:
@@ -71,7 +66,8 @@ def alike(a: Shape, b: Shape) -> bool:
 
 
 def _figures(shape: Shape) -> NDArray[np.float64]:
-    """What a shape of its kind is known by, lengths all of them; of a half-space, the normal and the offset."""
-    if isinstance(shape, Hull | RoundedHull):
+    """Numbers that tell a shape from others of its kind, all of them lengths; for a half-space, normal and offset."""
+    parameters = facts(shape).parameters()
+    if any(np.ndim(value) == 2 for value in parameters):
         return np.hstack([np.cbrt(shape.volume), shape.centroid, shape.bounds.ravel()])
-    return np.hstack([getattr(shape, name) for name in PARAMETERS[type(shape)]])
+    return np.hstack(parameters)

@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Capsule, Cylinder, Ellipsoid, HalfSpace, Overlap, RoundedHull, Sphere
-from overlapper.proof.body_planes import BodyPlanes, Floats, supporting
+from overlapper import Overlap, Shape
 from overlapper.proof.claims import (
     Bounds,
     Bracketed,
@@ -31,9 +30,11 @@ from overlapper.proof.claims import (
     volume_bounds,
 )
 from overlapper.proof.clipping import BORDER, ClippedPolytope
-from overlapper.proof.deepest_ball import DeepestBall, room
-from overlapper.proof.rational import Exact, RationalBody, cross, exact, fans, integers, primitive, root, triple
-from overlapper.proof.ray_exit import ray_exits
+from overlapper.proof.deepest_ball import DeepestBall, room, supporting
+from overlapper.proof.rational_body import RationalBody
+from overlapper.rational import Exact, cross, exact, fans, integers, primitive, root, triple
+
+Floats = NDArray[np.float64]
 
 # Bits of a coordinate below the thickness of the common part, and of a share below 1. Facets of hulls that differ only
 # by rounding meet in corners that the first number cannot tell apart.
@@ -41,7 +42,6 @@ BITS = (64, 256)
 
 # Bits to which the volume of a pair with a round body is proved.
 NARROW = 48
-Round = Sphere | Capsule | Cylinder | RoundedHull | Ellipsoid
 
 
 def certificate(overlap: Overlap) -> Certificate:
@@ -58,17 +58,19 @@ def certificate(overlap: Overlap) -> Certificate:
             return _touching(overlap, bodies)
         case _ if len(bodies) == 2 and _in_one_frame(bodies):
             return _bracketed(overlap)
-        case _ if any(isinstance(body.shape, RoundedHull) for body in bodies):
-            others = "an ellipsoid" if len(bodies) == 2 else "two bodies or more"
-            raise CertificateError(f"a rounded hull that overlaps with {others} has no certificate")
         case _:
+            for number, body in enumerate(bodies):
+                if not body.facts.has_exits:
+                    others = bodies[1 - number].facts.name if len(bodies) == 2 else "two bodies or more"
+                    raise CertificateError(f"{body.facts.name} that overlaps with {others} has no certificate")
             return _overlapping(overlap, bodies)
 
 
 def _in_one_frame(bodies: list[RationalBody]) -> bool:
-    """Whether one is round, and whether coordinates make all that is round of balls and cylinders."""
-    round_ones = [body.shape for body in bodies if isinstance(body.shape, Round)]
-    return bool(round_ones) and (len(round_ones) == 1 or not any(isinstance(x, Ellipsoid) for x in round_ones))
+    """Whether one is round, and whether in the same coordinates all round ones are made of balls and cylinders."""
+    round_ones = [body.facts for body in bodies if body.facts.planes is None]
+    alone = len(round_ones) == 1
+    return bool(round_ones) and all(each.has_blocks and (alone or each.half_axes is None) for each in round_ones)
 
 
 # ----------------------------------------------------------------------------------------------- separated and touching
@@ -82,13 +84,13 @@ def _separated(overlap: Overlap, bodies: list[RationalBody]) -> Separated:
 
 
 def _facing(overlap: Overlap, bodies: list[RationalBody]) -> list[OwnedPlane]:
-    """The supporting planes of a pair across its normal; of a half-space there is only one."""
+    """The supporting planes of a pair across its normal, or across that of a half-space."""
     if overlap.normal is None:
         return []
     normal = exact(overlap.normal)
     for body, sign in zip(bodies, (-1, 1)):
-        if isinstance(body.shape, HalfSpace):
-            normal = sign * (body.axes @ exact(body.shape.given_normal))
+        if not body.facts.bounded:
+            normal = sign * body.tightest(body.position)
     if any(body.support(sign * normal) is None for body, sign in zip(bodies, (-1, 1))):
         return []
     return [supporting(bodies, -normal, 0), supporting(bodies, normal, 1)]
@@ -96,27 +98,27 @@ def _facing(overlap: Overlap, bodies: list[RationalBody]) -> list[OwnedPlane]:
 
 def _touching(overlap: Overlap, bodies: list[RationalBody]) -> Touching:
     planes = _facing(overlap, bodies)
-    if planes and any(isinstance(body.shape, Round) for body in bodies):
+    if planes and any(body.facts.planes is None for body in bodies):
         point: Exact = (exact(overlap.witness_a) + exact(overlap.witness_b)) / 2
     else:
         ball = DeepestBall(bodies, planes)
         planes, point = ball.settled()
-    nearest = np.array([_nearest(body, point) for body in bodies])
+    nearest = np.array([_nearest(body, shape.shape, point) for body, shape in zip(bodies, overlap.shapes)])
     miss = max(root((point - other) @ (point - other))[1] for other in nearest)
     inradius = room(planes) / sum(root(plane.normal @ plane.normal)[room(planes) < 0] for plane in planes)
     return Touching(overlap.shapes, tuple(planes), inradius, point, nearest, miss)
 
 
-def _nearest(body: RationalBody, point: Exact) -> Exact:
+def _nearest(body: RationalBody, shape: Shape, point: Exact) -> Exact:
     """A point of the body, next to a point that is next to it: on the way to the middle of the body."""
     if body.contains(point[None])[0]:
         return point
-    if isinstance(body.shape, HalfSpace):
-        normal = body.axes @ exact(body.shape.given_normal)
+    if not body.facts.bounded:
+        normal = body.tightest(point)
         outside = normal @ point - support_above(body, normal)
         foot: Exact = point - normal * (outside / (normal @ normal))
         return foot
-    middle = body.position + body.axes @ exact(body.shape.centroid)
+    middle = body.position + body.axes @ exact(shape.centroid)
     if not body.contains(middle[None])[0]:
         raise CertificateError("a body too thin for its centroid to lie in it has no certificate")
     shares = np.array([Fraction(1, 2**k) for k in range(128)])
@@ -143,14 +145,13 @@ def _bracketed(overlap: Overlap) -> Bracketed:
 
 
 def _overlapping(overlap: Overlap, bodies: list[RationalBody]) -> Overlapping:
-    known = [BodyPlanes(body) for body in bodies]
     planes = [
-        supporting(bodies, known[owner].along(halfspace[:3]), int(owner))
+        supporting(bodies, bodies[owner].facing(halfspace[:3]), int(owner))
         for halfspace, owner in zip(overlap.halfspaces, overlap.owner)
     ]
-    surfaces = [_common_polytope] if all(body.flat for body in known) else [_published_surface, _common_polytope]
-    made = (surface(overlap, known, planes) for surface in surfaces)
-    for found, fine in ((surface, fine) for surface in made for fine in BITS):
+    ways = [_common_polytope] if _are_flat(bodies) else [_published_polytope, _common_polytope]
+    made = (way(overlap, bodies, planes) for way in ways)
+    for found, fine in ((polytope, fine) for polytope in made for fine in BITS):
         bounding, rings, facet, corners, point = found
         thickness = min(float(p.offset - p.normal @ point) / math.sqrt(p.normal @ p.normal) for p in bounding)
         if thickness > 0.0:
@@ -162,12 +163,16 @@ def _overlapping(overlap: Overlap, bodies: list[RationalBody]) -> Overlapping:
     else:
         raise CertificateError("the facets do not surround a point: the bodies may only touch")
     margin = _margin(bodies, centre, thickness)
-    pull = np.minimum.reduce([_pull(body, centre, vertices, fine) for body in known]) * Fraction(1, 1 << fine)
+    pull = np.minimum.reduce([_pull(body, centre, vertices, fine) for body in bodies]) * Fraction(1, 1 << fine)
     return Overlapping(overlap.shapes, tuple(bounding), vertices, tuple(rings), facet, centre, margin, pull)
 
 
-class Surface(NamedTuple):
-    """Planes, polygons of corners, the number of each polygon's plane, corners, next to their mean."""
+def _are_flat(bodies: list[RationalBody]) -> bool:
+    return all(body.facts.planes for body in bodies)
+
+
+class Polyhedron(NamedTuple):
+    """Planes, polygons of corners, the number of each polygon's plane, the corners, and a point next to their mean."""
 
     planes: list[OwnedPlane]
     rings: list[NDArray[np.int32]]
@@ -176,7 +181,7 @@ class Surface(NamedTuple):
     middle: Exact
 
 
-def _published_surface(overlap: Overlap, known: list[BodyPlanes], planes: list[OwnedPlane]) -> Surface:
+def _published_polytope(overlap: Overlap, bodies: list[RationalBody], planes: list[OwnedPlane]) -> Polyhedron:
     """The facets of the overlap, where their exact planes meet: of round bodies there are too many to clip.
 
     From the centroid, corners are pulled less than from the mean of them, as most of them are where bodies are round.
@@ -191,7 +196,7 @@ def _on_fine_grid(points: Exact) -> tuple[Exact, int, Exact]:
     return numbers, scale, points[0]
 
 
-def _about_middles(planes: list[OwnedPlane], rings: list[NDArray[np.int32]], corners: Exact) -> Surface:
+def _about_middles(planes: list[OwnedPlane], rings: list[NDArray[np.int32]], corners: Exact) -> Polyhedron:
     """Triangles about the middle of every facet, which on round bodies needs less pull than the corners."""
     numbers, scale, first = _on_fine_grid(corners)
     middles = np.array([numbers[ring].sum(axis=0) // len(ring) for ring in rings])
@@ -199,10 +204,10 @@ def _about_middles(planes: list[OwnedPlane], rings: list[NDArray[np.int32]], cor
     facet = np.repeat(np.arange(len(middles), dtype=np.int32), [len(ring) for ring in rings])
     numbers = np.vstack([numbers, middles])
     middle = first + numbers.sum(axis=0) * Fraction(1, scale * len(numbers))
-    return Surface(planes, list(np.array(fan, np.int32)), facet, first + numbers * Fraction(1, scale), middle)
+    return Polyhedron(planes, list(np.array(fan, np.int32)), facet, first + numbers * Fraction(1, scale), middle)
 
 
-def _common_polytope(overlap: Overlap, known: list[BodyPlanes], planes: list[OwnedPlane]) -> Surface:
+def _common_polytope(overlap: Overlap, bodies: list[RationalBody], planes: list[OwnedPlane]) -> Polyhedron:
     """What is below the planes of the overlap's facets and of all flat facets of the bodies, without rounding."""
     box = exact(overlap.bounds)
     reference = box.sum(axis=0) / 2
@@ -211,12 +216,14 @@ def _common_polytope(overlap: Overlap, known: list[BodyPlanes], planes: list[Own
     planes = list(planes)
     for label, plane in enumerate(planes):
         polytope.cut(_row_about(reference, plane), label)
-    for owner, body in ((i, body) for i, body in enumerate(known) if body.flat):
-        normals = body.normals @ body.body.axes.T
-        offsets = body.offsets + normals @ body.body.position
+    for owner, body in enumerate(bodies):
+        if body.facts.planes is None:
+            continue
+        normals = body.facts.planes.normals @ body.axes.T
+        offsets = body.facts.planes.offsets + normals @ body.position
         rows = np.array([_row_about(reference, OwnedPlane(n, d, owner)) for n, d in zip(normals, offsets)], object)
         for missing in np.flatnonzero(polytope.reaches_past(rows)):
-            planes.append(supporting([body.body for body in known], normals[missing], owner))
+            planes.append(supporting(bodies, normals[missing], owner))
             polytope.cut(_row_about(reference, planes[-1]), len(planes) - 1)
     if not polytope.rings:
         raise CertificateError("no point is strictly inside of all bodies: they only touch")
@@ -227,11 +234,11 @@ def _common_polytope(overlap: Overlap, known: list[BodyPlanes], planes: list[Own
     corners = np.array([[Fraction(x, point[3]) for x in point[:3]] for point in map(polytope.points.__getitem__, used)])
     planes = [planes[label] for label in polytope.labels]
     rings = [np.array([number[point] for point in ring], np.int32) for ring in polytope.rings]
-    if not all(body.flat for body in known):
+    if not _are_flat(bodies):
         return _about_middles(planes, rings, corners + reference)
     numbers, scale, first = _on_fine_grid(corners)
     middle = reference + first + numbers.sum(axis=0) * Fraction(1, scale * len(numbers))
-    return Surface(planes, rings, np.arange(len(rings), dtype=np.int32), corners + reference, middle)
+    return Polyhedron(planes, rings, np.arange(len(rings), dtype=np.int32), corners + reference, middle)
 
 
 def _row_about(reference: Exact, plane: OwnedPlane) -> tuple[int, ...]:
@@ -288,10 +295,10 @@ def _margin(bodies: Sequence[RationalBody], point: Exact, thickness: float) -> F
     raise CertificateError("no point was found strictly inside of all bodies: they may only touch")
 
 
-def _pull(known: BodyPlanes, point: Exact, vertices: Exact, fine: int) -> Exact:
+def _pull(body: RationalBody, point: Exact, vertices: Exact, fine: int) -> Exact:
     """For each vertex the greatest share of the way to it, from a point inside, that does not leave the body."""
     pull = np.full(len(vertices), 1 << fine, object)
-    outside = ~known.body.contains(vertices)
+    outside = ~body.contains(vertices)
     if outside.any():
-        pull[outside] = ray_exits(known, point, vertices[outside] - point, fine)
+        pull[outside] = body.exits(point, vertices[outside] - point, fine)
     return pull

@@ -1,9 +1,9 @@
 """What a certificate claims about the common part of bodies, and the check of it in rational arithmetic.
 
-A check trusts the numbers that define the bodies (see `overlapper.proof.rational`) and what is written here, and
-nothing else: neither the core nor the search that found the certificate. It raises `CertificateError` with the first
-claim that fails, and returns (lower, upper) bounds of the common volume, in m³, as fractions. All coordinates are in m
-in the world.
+A check trusts the numbers that define the bodies (see `overlapper.proof.rational_body`), what `overlapper.shapes` says
+of them exactly, and what is written here. It trusts neither the core nor the search that found the certificate. It
+raises `CertificateError` with the first claim that fails, and returns (lower, upper) bounds of the common volume, in
+m³, as fractions. All coordinates are in m in the world.
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import HalfSpace, Placed
+from overlapper import Placed
 from overlapper.install import hint
-from overlapper.proof.rational import Exact, RationalBody, fans, integers, is_closed, root, triple
+from overlapper.proof.rational_body import RationalBody
 from overlapper.proof.refusal import Bounds as Bounds
 from overlapper.proof.refusal import CertificateError as CertificateError
-
-AXES = np.array([[Fraction(int(i == j)) for j in range(3)] for i in range(3)])
-
+from overlapper.rational import Exact, fans, integers, is_closed, root, triple
+from overlapper.shapes.planes import AXES
 
 # Bits below 1 to which shares of single cones are rounded, upwards: their sum then is as short as they are.
 ROUNDED = 128
@@ -177,7 +176,7 @@ class Touching(Short):
         The inner parallel bodies of a convex set have less surface than the set, and that has less than a box around
         it; the volume is the integral of their surfaces over depths from 0 to the inradius.
         """
-        bounded = [RationalBody(shape) for shape in self.shapes if not isinstance(shape.shape, HalfSpace)]
+        bounded = [body for body in map(RationalBody, self.shapes) if body.facts.bounded]
         require(bool(bounded), "one of the bodies must be bounded")
         upper, lower = ([min(support_above(body, way) for body in bounded) for way in ways] for ways in (AXES, -AXES))
         x, y, z = (max(a + b, Fraction(0)) for a, b in zip(upper, lower))

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.proof.rational import DOUBT, UNDERFLOW, Exact, bits, in_doubles, primitive
+from overlapper.rational import DOUBT, UNDERFLOW, Exact, bits, in_doubles, primitive
 
 BORDER = -1
 SIDES = ((0, 2, 6, 4), (1, 5, 7, 3), (0, 4, 5, 1), (2, 3, 7, 6), (0, 1, 3, 2), (4, 6, 7, 5))

@@ -12,8 +12,8 @@ from flint import fmpq
 
 from overlapper.proof.clipping import BORDER, ClippedPolytope
 from overlapper.proof.pieces import Floats, Plane
-from overlapper.proof.rational import exact
 from overlapper.proof.vectors import Vector, cross, dot, minus
+from overlapper.rational import exact
 
 # Planes that are cut with before it is asked again which of the others are needed.
 AT_ONCE = 16

@@ -8,10 +8,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from overlapper import HalfSpace
-from overlapper.proof.body_planes import BodyPlanes, supporting
-from overlapper.proof.claims import CertificateError, OwnedPlane
-from overlapper.proof.rational import Exact, RationalBody
+from overlapper.proof.claims import CertificateError, OwnedPlane, support_above
+from overlapper.proof.rational_body import RationalBody
+from overlapper.rational import Exact
 
 # Kelley's method on round bodies has no end.
 ROUNDS = 200
@@ -19,6 +18,11 @@ ROUNDS = 200
 
 def room(planes: Sequence[OwnedPlane]) -> Fraction:
     return sum((plane.offset for plane in planes), Fraction(0))
+
+
+def supporting(bodies: Sequence[RationalBody], normal: Exact, owner: int) -> OwnedPlane:
+    """The plane of that normal, of any length, which one of the bodies touches from below."""
+    return OwnedPlane(normal, support_above(bodies[owner], normal), owner)
 
 
 class DeepestBall:
@@ -30,7 +34,6 @@ class DeepestBall:
 
     def __init__(self, bodies: list[RationalBody], hints: Sequence[OwnedPlane] = ()) -> None:
         self.bodies = bodies
-        self.known = [BodyPlanes(body) for body in bodies]
         self.basis = self._simplex()
         self.weights = self._solve(np.array([self._row(plane) for plane in self.basis]).T, [0, 0, 0, 1])
         for plane in hints:
@@ -71,8 +74,8 @@ class DeepestBall:
     def tightest(self, centre: Exact, radius: Fraction) -> OwnedPlane | None:
         """The plane that the ball reaches through farthest; None if it is inside of all."""
         found, farthest = None, Fraction(0)
-        for owner, known in enumerate(self.known):
-            plane = supporting(self.bodies, known.tightest(centre), owner)
+        for owner, body in enumerate(self.bodies):
+            plane = supporting(self.bodies, body.tightest(centre), owner)
             length = self._row(plane)[3]
             outside = (plane.normal @ centre + length * radius - plane.offset) / length
             if outside > farthest:
@@ -101,9 +104,10 @@ class DeepestBall:
         """Around one of the bodies, or around everything if none is bounded: then owned by nobody."""
         directions = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * Fraction(1)
         for owner, body in enumerate(self.bodies):
-            if not isinstance(body.shape, HalfSpace):
+            if body.facts.bounded:
                 return [supporting(self.bodies, direction, owner) for direction in directions]
-        reach = max(abs(x) for body, known in zip(self.bodies, self.known) for x in [*body.position, *known.levels])
+        planes = [body.facts.planes for body in self.bodies if body.facts.planes]
+        reach = max(map(abs, np.hstack([*(body.position for body in self.bodies), *(each.levels for each in planes)])))
         return [OwnedPlane(direction, Fraction(2**20 * (1 + reach)), -1) for direction in directions]
 
     @staticmethod

@@ -6,7 +6,7 @@ the two support values, and every polytope with vertices in D gives an upper one
 nearest to the origin (van den Bergen, Collision Detection in Interactive 3D Environments, 2003, section 4.3) until the
 bounds meet; it is built anew each time, because an arbiter is seldom asked.
 
-Balls and capsules go in as points and segments; their radii are subtracted in the end.
+A ball is left out of each shape that is the sum of a ball and a core, and the radii are subtracted in the end.
 
 Doubles only propose: which directions, which vertices, which facets. What is returned was evaluated in rational
 arithmetic on the very doubles that describe the pair, and rounded once, outwards. Only the points on the rim of a
@@ -24,9 +24,10 @@ from itertools import combinations_with_replacement, product
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere
-from overlapper.proof.nearest import nearest_weights
-from overlapper.proof.rational import Exact, RationalBody, cross, exact
+from overlapper import Hull, Placed
+from overlapper.proof.rational_body import RationalBody
+from overlapper.rational import Exact, cross, exact
+from overlapper.shapes.nearest import nearest_weights
 
 Floats = NDArray[np.float64]
 
@@ -48,11 +49,12 @@ def signed_distance_bounds(
     `directions`, (3,) each, in the world frame, are tried first: the normals, from A to B, that somebody claims. The
     search stops when the bounds are `resolution` m apart, or as near as they get.
     """
-    # Only across its plane has a half-space an end, so that direction sees the signed distance itself.
+    # A half-space ends only across its plane, so that direction sees the signed distance itself.
     bodies = RationalBody(a), RationalBody(b)
     for body, sign in zip(bodies, (1, -1)):
-        if isinstance(body.shape, HalfSpace):
-            return _gap(*bodies, sign * (body.axes @ exact(body.shape.normal)))
+        if not body.facts.bounded:
+            normal = body.tightest(body.position)
+            return _gap(*bodies, sign * normal / max(abs(normal)))
     difference = Difference(*bodies)
     for direction in directions:
         difference.extend(np.asarray(direction, float))
@@ -69,9 +71,7 @@ class Difference:
 
     def __init__(self, a: RationalBody, b: RationalBody) -> None:
         self.bodies = (a, b)
-        self.radius = sum(
-            body.shape.radius for body in (a, b) if isinstance(body.shape, Sphere | Capsule | RoundedHull)
-        )
+        self.radius = a.facts.rounding + b.facts.rounding
         self.offset = a.position - b.position
         self.points: dict[tuple[float, ...], Exact] = {}
         self.lower = -math.inf
@@ -89,7 +89,7 @@ class Difference:
         """Adds a farthest point of A - B along `outward`; False if it is there already."""
         point = self.offset
         for body, sign in zip(self.bodies, (1.0, -1.0)):
-            local = _support(body.shape, (body.axes.T @ exact(sign * outward)).astype(float))
+            local = body.facts.core_tip((body.axes.T @ exact(sign * outward)).astype(float))
             point = point + exact(sign) * (body.axes @ exact(local))
         rounded = point.astype(float)
         gap = -float(rounded @ outward) / float(np.linalg.norm(outward))
@@ -162,31 +162,6 @@ def _gap(a: RationalBody, b: RationalBody, outward: Exact) -> tuple[float, float
     norm = math.sqrt(outward @ outward)
     value, rounding = (float(flat) - curved) / norm, OUTWARDS * (abs(float(flat)) + curved) / norm
     return value - rounding, value + rounding
-
-
-def _support(shape: Shape, direction: Floats) -> Floats:
-    """A farthest point of a bounded shape without its round part, in its own frame."""
-    tip = np.array([0.0, 0.0, math.copysign(1.0, direction[2])])
-    radial = np.array([direction[0], direction[1], 0.0])
-    farthest: Floats
-    match shape:
-        case Box():
-            farthest = np.copysign(shape.half_extents, direction)
-        case Hull():
-            farthest = shape.vertices[np.argmax(shape.vertices @ direction)]
-        case RoundedHull():
-            farthest = _support(shape.core, direction)
-        case Sphere():
-            farthest = np.zeros(3)
-        case Capsule():
-            farthest = shape.length / 2 * tip
-        case Cylinder():
-            farthest = shape.length / 2 * tip + shape.radius * radial / (np.linalg.norm(radial) or 1.0)
-        case Ellipsoid():
-            raise TypeError("shape must not be an ellipsoid, of which no exact distance is known")
-        case _:
-            raise TypeError(f"shape must be bounded, not {shape!r}")
-    return farthest
 
 
 def _solid_angle(triangle: Floats, volume: Fraction) -> float:

@@ -14,12 +14,12 @@ from fractions import Fraction
 import numpy as np
 from flint import arb, ctx, fmpq
 
-from overlapper import Box, Ellipsoid, HalfSpace, Hull, Placed
+from overlapper import Placed
 from overlapper.proof import one_quadric
 from overlapper.proof.ball_and_tube import BallAndTube
 from overlapper.proof.corners import Polytope, below
 from overlapper.proof.pieces import DOUBT, Ball, Floats, Piece, Plane, Quadric, Tube, pieces
-from overlapper.proof.rational import RationalBody, exact
+from overlapper.proof.rational_body import RationalBody
 from overlapper.proof.refusal import Bounds, CertificateError
 from overlapper.proof.signs import Undecided
 from overlapper.proof.slices import Slices
@@ -39,25 +39,24 @@ class Common:
 
     def __init__(self, a: Placed, b: Placed) -> None:
         bodies = RationalBody(a), RationalBody(b)
-        stretched = [body for body in bodies if isinstance(body.shape, Ellipsoid)]
-        if stretched and not any(isinstance(body.shape, Box | Hull | HalfSpace) for body in bodies):
-            raise CertificateError("of an ellipsoid and another round body no volume is proved")
-        bounded = [body for body in bodies if not isinstance(body.shape, HalfSpace)]
+        stretched = [body for body in bodies if body.facts.half_axes is not None]
+        if stretched and not any(body.facts.planes for body in bodies):
+            raise CertificateError(f"of {stretched[0].facts.name} and another round body no volume is proved")
+        bounded = [body for body in bodies if body.facts.bounded]
         if not bounded:
             raise CertificateError("one of the bodies must be bounded")
         home = (stretched or bounded)[0]
-        # Of a unit of volume in its axes.
-        shape = home.shape
-        self._unit = math.prod(exact(shape.half_axes)) if isinstance(shape, Ellipsoid) else Fraction(1)
-        self._parts: list[Part] = []
+        # The volume of a unit cube in the axes of home.
+        self._unit = Fraction(1) if home.facts.half_axes is None else math.prod(home.facts.half_axes)
+        self._summands: list[Summand] = []
         self.lost = fmpq(0)
         first, second = (_Pieces(pieces(body, home)) for body in bodies)
         for i, j in first.near(second):
             one, other = first.pieces[i], second.pieces[j]
-            self._parts += parts(one, other)
+            self._summands += summands(one, other)
             self.lost += one.lost + other.lost
         self._enough = arb(0)
-        self._known: list[arb | None] = [None] * len(self._parts)
+        self._known: list[arb | None] = [None] * len(self._summands)
 
     def bounds(self, bits: int) -> Bounds | None:
         """With numbers of so many bits; None if these are too few for one of the parts.
@@ -66,14 +65,14 @@ class Common:
         """
         with ctx.workprec(bits):
             wide = [k for k, volume in enumerate(self._known) if volume is None or volume.rad() > self._enough]
-            for k in wide or range(len(self._parts)):
+            for k in wide or range(len(self._summands)):
                 known = self._known[k]
                 with suppress(Undecided):
-                    found = finite(self._parts[k](bits))
+                    found = finite(self._summands[k](bits))
                     if known is None or found.rad() < known.rad():
                         self._known[k] = found
             volumes = [volume for volume in self._known if volume is not None]
-            if len(volumes) < len(self._parts):
+            if len(volumes) < len(self._summands):
                 return None
             total = sum(volumes, arb(0))
             self._enough = total.lower().nonnegative_part() / (ENOUGH * len(volumes) + 1)
@@ -81,7 +80,7 @@ class Common:
         return max(lower, Fraction(0)) * self._unit, upper * self._unit
 
 
-Part = Callable[[int], arb]
+Summand = Callable[[int], arb]
 
 
 class OrBetween:
@@ -162,7 +161,7 @@ def in_doubles(plane: Plane) -> list[float]:
     return [int(x.p) / int(x.q) for x in ratios]
 
 
-def parts(one: Piece, other: Piece) -> list[Part]:
+def summands(one: Piece, other: Piece) -> list[Summand]:
     """What two pieces share, as volumes that wait to be computed."""
     around = np.array([f(p, q) for f, p, q in zip((np.maximum, np.minimum), box(one), box(other))])
     planes = (*one.planes, *other.planes)
@@ -172,7 +171,7 @@ def parts(one: Piece, other: Piece) -> list[Part]:
     return _of_one(quadrics[0] if quadrics else None, planes, around)
 
 
-def _of_one(quadric: Quadric | None, planes: tuple[Plane, ...], around: Floats) -> list[Part]:
+def _of_one(quadric: Quadric | None, planes: tuple[Plane, ...], around: Floats) -> list[Summand]:
     polytope = _below(quadric, planes, around)
     if polytope is None:
         return []
@@ -201,7 +200,7 @@ def _below(quadric: Quadric | None, planes: tuple[Plane, ...], around: Floats) -
     return below(planes, around)
 
 
-def _of_two(one: Quadric, other: Quadric, planes: tuple[Plane, ...], around: Floats) -> list[Part]:
+def _of_two(one: Quadric, other: Quadric, planes: tuple[Plane, ...], around: Floats) -> list[Summand]:
     alike = isinstance(one, Ball) and isinstance(other, Ball)
     if isinstance(one, Tube) and isinstance(other, Tube):
         alike = not any(cross(one.axis, other.axis))
@@ -218,7 +217,7 @@ def _of_two(one: Quadric, other: Quadric, planes: tuple[Plane, ...], around: Flo
     return _sliced(lambda tube, polytope: BallAndTube(ball, tube, polytope), tube, _below(ball, planes, around))
 
 
-def _sliced(slices: Callable[[Tube, Polytope], Slices], tube: Tube, polytope: Polytope | None) -> list[Part]:
+def _sliced(slices: Callable[[Tube, Polytope], Slices], tube: Tube, polytope: Polytope | None) -> list[Summand]:
     return [OrBetween(lambda thick: slices(thick, polytope), tube)] if polytope else []
 
 
@@ -229,7 +228,7 @@ def is_within(between: fmpq, small: fmpq, large: fmpq) -> bool:
     return small <= large and excess <= 0 and excess * excess >= 4 * between * small
 
 
-def _split(one: Quadric, other: Quadric, planes: tuple[Plane, ...], around: Floats) -> list[Part]:
+def _split(one: Quadric, other: Quadric, planes: tuple[Plane, ...], around: Floats) -> list[Summand]:
     """Two balls or two parallel tubes: on each side of the plane of the circle or lines in which they meet is one."""
     if isinstance(one, Ball) and isinstance(other, Ball):
         centre, arm = one.centre, minus(other.centre, one.centre)

@@ -9,7 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Batch, Shape, Sphere, _core
+from overlapper import Batch, Shape, _core
+from overlapper.shapes.table import facts
 from overlapper.simulation.model import BASE, Array, Link, ModelledBody
 
 Frame = Sequence[Sequence[float]]
@@ -83,6 +84,5 @@ class Layout:
 
 
 def _reach(shape: Shape) -> float:
-    if isinstance(shape, Sphere):
-        return shape.radius
-    return float(np.linalg.norm(np.abs(shape.bounds).max(axis=0)))
+    corner = np.abs(shape.bounds).max(axis=0)
+    return float(corner[0] if facts(shape).isotropic else np.linalg.norm(corner))

@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from overlapper import Hull, Shape
+from overlapper import Shape
 from overlapper.polytopes.shape_text import alike
+from overlapper.shapes.table import facts
 from overlapper.tables.still import Still
 from overlapper.verdicts.comparison import (
     Differences,
@@ -113,9 +114,10 @@ def _shape_moves(
 
 
 def _described(shape: Shape | None) -> str:
-    if isinstance(shape, Hull):
-        return f"{shape} of {shape.volume:.9g} m³"
-    return "not there" if shape is None else str(shape)
+    if shape is None:
+        return "not there"
+    _, _, corners = facts(shape).words()
+    return f"{shape} of {shape.volume:.9g} m³" if corners else str(shape)
 
 
 def _notes(geometry: Differences, shaken: dict[str, float], dynamics: Differences) -> list[str]:

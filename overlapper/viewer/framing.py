@@ -12,10 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from overlapper import HalfSpace, Overlap, Placed
+from overlapper import Overlap, Placed
+from overlapper.shapes.drawing import triangles
+from overlapper.shapes.table import facts
 from overlapper.viewer.labels import Bodies, Contact
 from overlapper.viewer.look import FIELD_OF_VIEW, Array
-from overlapper.viewer.tessellation import triangles
 
 GROUND = 30.0  # times as large as every other body: a ground. The plane of pybullet is that beside what is under 9 m.
 BACK = np.array([0.60, -0.68, 0.42]) / np.linalg.norm([0.60, -0.68, 0.42])  # the usual way to the camera
@@ -70,7 +71,7 @@ class Framing:
 
     def is_ground(self, placed: Placed) -> bool:
         """True of a half-space, and of what is as large as a body that is a ground."""
-        return isinstance(placed.shape, HalfSpace) or _extent(placed.bounds) >= self._ground_size
+        return not facts(placed.shape).bounded or _extent(placed.bounds) >= self._ground_size
 
     def pushed_second(self, contact: Contact) -> bool:
         """True if the second is what a force is seen on: the first is a ground, or stays where it is beside it."""
@@ -138,7 +139,7 @@ def _boxes(bodies: Bodies) -> list[tuple[tuple[int, int, int], Array]]:
     return [
         (key, np.asarray(placed.bounds))
         for key, placed in zip(bodies.keys, bodies.placed, strict=True)
-        if not isinstance(placed.shape, HalfSpace)
+        if facts(placed.shape).bounded
     ]
 
 

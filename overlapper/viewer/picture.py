@@ -17,6 +17,7 @@ import numpy as np
 from overlapper import Overlap, Placed
 from overlapper.install import hint
 from overlapper.quaternion import rotated
+from overlapper.shapes.drawing import polytope_edges
 from overlapper.viewer.framing import Framing, View
 from overlapper.viewer.labels import Bodies, Contact, Pair, labelled
 from overlapper.viewer.look import (
@@ -53,7 +54,7 @@ from overlapper.viewer.pressure import (
     key_of,
     pressures,
 )
-from overlapper.viewer.tessellation import Ground, ground, polytope_edges, tessellation
+from overlapper.viewer.tessellation import Ground, ground, tessellation
 from overlapper.whole_file import beside
 
 try:

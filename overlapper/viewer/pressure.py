@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Overlap
+from overlapper.shapes.drawing import polytope_edges, triangles
 from overlapper.viewer.framing import Framing
 from overlapper.viewer.labels import Bodies, Contact, LinkName, labelled
 from overlapper.viewer.look import Array, channels, to_draw
-from overlapper.viewer.tessellation import polytope_edges, triangles
 
 COLORS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21908c", "#27ad81", "#5dc863", "#aadc32", "#fde725")
 FORCE = (1.00, 1.00, 1.00)  # arrows: of no colour that pressures have

@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Overlap, Placed, Sphere
+from overlapper import Overlap, Placed
+from overlapper.shapes.table import facts
 from overlapper.viewer.framing import Framing, View
 from overlapper.viewer.labels import ROOT, Bodies, Contact, LinkName, Pair, body_paths, labelled
 from overlapper.viewer.look import (
@@ -390,7 +391,7 @@ def _look_alike(a: Overlap, b: Overlap, slack: int) -> bool:
 
 def _motion(before: Placed, after: Placed, point: Array, reach: float) -> float:
     """About how far the shape has moved, at the most, as far as `reach` from a point."""
-    if isinstance(before.shape, Sphere):
+    if facts(before.shape).isotropic:
         return math.dist(after.position, before.position)
     # A quaternion and its negative are the same rotation.
     turn = 2 * min(math.dist(after.orientation, sign * before.orientation) for sign in (1, -1))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from overlapper import Overlap, Placed
 from overlapper.install import hint
+from overlapper.shapes.drawing import polytope_edges, triangles
 from overlapper.viewer.framing import Framing, View
 from overlapper.viewer.look import (
     BOTTOM,
@@ -30,15 +31,7 @@ from overlapper.viewer.look import (
     to_draw,
 )
 from overlapper.viewer.pressure import FORCE, FRICTION, Arrow, Press, Scale, colors, pressures
-from overlapper.viewer.tessellation import (
-    Ground,
-    cone,
-    ground,
-    polytope_edges,
-    rotation_from_z,
-    tessellation,
-    triangles,
-)
+from overlapper.viewer.tessellation import Ground, cone, ground, rotation_from_z, tessellation
 
 try:
     from meshcat import geometry

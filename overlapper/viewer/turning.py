@@ -10,9 +10,10 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from overlapper import HalfSpace, Overlap, Placed
+from overlapper import Overlap, Placed
 from overlapper import overlap as common_part
 from overlapper.quaternion import rotated
+from overlapper.shapes.table import facts
 from overlapper.viewer.framing import around
 from overlapper.viewer.look import BOTTOM, INK, LIGHT, MANY_FACETS, OWNER_COLORS, TOP, Array
 from overlapper.viewer.tessellation import rotation_from_z, tessellation
@@ -61,7 +62,7 @@ def turning(overlap: Overlap) -> str:
 
 def _framed(overlap: Overlap, placed: Sequence[Placed]) -> tuple[Array, float]:
     """The middle of the picture, and how far above and below it is seen, m."""
-    bodies = [np.asarray(each.bounds) for each in placed if not isinstance(each.shape, HalfSpace)]
+    bodies = [np.asarray(each.bounds) for each in placed if facts(each.shape).bounded]
     lower, upper = around([np.asarray(overlap.bounds)] if overlap else bodies)
     reach = float(np.linalg.norm(upper - lower)) / 2
     largest = max((float(np.linalg.norm(box[1] - box[0])) / 2 for box in bodies), default=reach)
@@ -79,9 +80,9 @@ def _views() -> Array:
 
 def _body(placed: Placed, color: Sequence[float], center: Array, reach: float, seen: _Seen) -> Iterator[str]:
     """What is seen of a body: how it stands out, and its edges."""
-    if isinstance(placed.shape, HalfSpace):
+    if not facts(placed.shape).bounded:
         edges = np.empty((0, 3))
-        rings = seen(_disc(placed.shape, placed, center, 2 * reach))
+        rings = seen(_disc(placed, center, 2 * reach))
     else:
         drawn = tessellation(placed.shape)
         rings = _outermost(seen(rotated(placed.orientation, drawn.vertices) + placed.position))
@@ -95,10 +96,13 @@ def _body(placed: Placed, color: Sequence[float], center: Array, reach: float, s
         yield f'<path fill="none" {paint} stroke-opacity=".3">{_moving("d", paths)}</path>'
 
 
-def _disc(shape: HalfSpace, placed: Placed, center: Array, radius: float) -> Array:
+def _disc(placed: Placed, center: Array, radius: float) -> Array:
     """(AROUND, 3) points of a half-space's boundary plane, about the one that is nearest to `center`."""
-    normal = rotated(placed.orientation, shape.normal)
-    foot = center - (normal @ (center - placed.position) - shape.offset) * normal
+    side = facts(placed.shape).side(center)
+    assert side is not None
+    normal, offset, _ = side
+    normal = rotated(placed.orientation, normal)
+    foot = center - (normal @ (center - placed.position) - offset) * normal
     angles = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
     across, along = rotation_from_z(normal).T[:2]
     points: Array = foot + radius * (np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * along)

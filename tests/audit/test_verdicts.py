@@ -10,25 +10,17 @@ from robots import DATA, moved, turntable
 
 from overlapper import (
     Box,
-    Capsule,
-    Cylinder,
-    Ellipsoid,
-    HalfSpace,
-    Hull,
     Placed,
-    RoundedHull,
-    Sphere,
     overlap,
 )
 from overlapper.audit import verdicts
-from overlapper.audit.examiner import Examiner, ball, prepared
+from overlapper.audit.examiner import Examiner, prepared
 from overlapper.audit.robot import read_robot
 from overlapper.audit.sampling import BLOCK, Sampling
 from overlapper.audit.verdicts import audit, wilson
 from overlapper.jobs.cluster import Cluster
 from overlapper.jobs.hand import Failed
 from overlapper.jobs.processes import Processes
-from overlapper.quaternion import rotated
 from overlapper.simulation import Bodies
 from overlapper.simulation.bullet.model_file import load
 
@@ -151,19 +143,6 @@ def test_pairs_are_those_that_pybullet_and_bodies_find_one_configuration_at_a_ti
             if each.met and len(each.largest.contact.contacts) == 1:
                 assert each.largest.contact.volume == pytest.approx(largest[each.pair.links], rel=1e-9)
     assert sum(each.status == "sometimes" for each in found.verdicts) > 3
-
-
-def test_shapes_are_within_their_balls():
-    random = np.random.default_rng(0)
-    points = random.normal(size=(30, 3)) + [5, -2, 1]
-    shapes = [Box((1, 2, 3)), Sphere(2.0), Capsule(0.5, 2.0), Cylinder(1.0, 0.3), Ellipsoid((1, 2, 0.5)), Hull(points)]
-    for shape in [*shapes, RoundedHull(points, 0.7)]:
-        centre, radius = ball(shape)
-        for turn in random.normal(size=(200, 4)):
-            placed = Placed(shape, (0, 0, 0), turn)
-            reach = np.abs(placed.bounds - rotated(placed.orientation, centre)).max()
-            assert 0.2 * radius < reach <= radius * (1 + 1e-12)
-    assert ball(HalfSpace((0, 0, 1), 0.0))[1] == np.inf
 
 
 def test_intervals_are_those_of_wilson():

@@ -20,6 +20,7 @@ CLOSED_FORMS = {
     "crossed_capsules": (Placed(Capsule(0.3, 2.0)), Placed(Capsule(0.2, 2.0), (0.4, 0, 0), (1, 0, 0, 1)), -0.1),
     "coaxial_cylinders": (Placed(Cylinder(0.3, 1.0)), Placed(Cylinder(0.2, 1.0), (0.0, 0.0, 1.5)), 0.5),
     "ball_over_a_floor": (Placed(Sphere(0.5), (0, 0, 2)), Placed(HalfSpace((0, 0, 2), 1)), 1.0),
+    "ball_over_a_slope": (Placed(Sphere(0.5), (2, 4, 6)), Placed(HalfSpace((1, 2, 3), 14)), np.sqrt(14) - 0.5),
     "cylinder_on_its_rim_in_a_floor": (
         Placed(HalfSpace((0, 0, 1), 0.0)),
         Placed(Cylinder(0.3, 0.8), (0, 0, 0.4), (np.sin(np.pi / 8), 0, 0, np.cos(np.pi / 8))),

@@ -13,7 +13,7 @@ from round_truth import number
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, Placed, RoundedHull, Sphere, overlap
 from overlapper.proof.certificate import certificate
 from overlapper.proof.claims import Bracketed, CertificateError
-from overlapper.proof.rational import RationalBody
+from overlapper.proof.rational_body import RationalBody
 from overlapper.proof.volume import Common, proved_bounds
 
 NARROW = Fraction(1, 10**13)

@@ -9,7 +9,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from overlapper import Hull
+from overlapper.shapes.table import facts
 from overlapper.simulation.collision_rules import Mask
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.layout import Layout
@@ -34,7 +34,7 @@ def touching_within_margins(
     """
     links = _touching(client) - {((a, la), (b, lb)) for a, la, _, b, lb, _ in found.keys.tolist()}
     starts = np.searchsorted(layout.colliders, np.arange(len(layout.collider_rows) + 1))
-    is_hull = [isinstance(shape, Hull) for shape in layout.shapes]
+    widened = [facts(shape).bullet_margin for shape in layout.shapes]
     pairs: list[tuple[int, int]] = []
     number: list[int] = []  # of the links that each is of
     for k, (a, b) in enumerate(links):
@@ -42,7 +42,7 @@ def touching_within_margins(
             first, second = (
                 range(starts[row], starts[row + 1]) for row in map(layout.collider_rows.__getitem__, (a, b))
             )
-            some = [(i, j) for i, j in product(first, second) if is_hull[i] or is_hull[j]]
+            some = [(i, j) for i, j in product(first, second) if widened[i] or widened[j]]
             pairs += some
             number += [k] * len(some)
     asked = chosen(np.array(pairs, dtype=np.int32).reshape(-1, 2))

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere
+from overlapper import Placed
 from overlapper.quaternion import composed, rotated
+from overlapper.shapes.table import facts
 from overlapper.simulation.bullet.model_file import NotRead, load, read_apart
 
 if TYPE_CHECKING:
@@ -170,28 +171,6 @@ def _links(
 
 
 def _listed(placed: Placed) -> ListedShape:
-    shape, sides = placed.shape, tuple(float(side) for side in placed.bounds[1] - placed.bounds[0])
-    kind, corners = type(shape).__name__.lower(), 0
-    match shape:
-        case Box():
-            size = _product(2 * shape.half_extents)
-        case Sphere():
-            size = f"radius {shape.radius:.4g}"
-        case Capsule() | Cylinder():
-            size = f"radius {shape.radius:.4g}, length {shape.length:.4g}"
-        case Ellipsoid():
-            size = f"half axes {_product(shape.half_axes)}"
-        case HalfSpace():
-            kind, size = "plane", f"normal {', '.join(f'{x:.4g}' for x in shape.normal)}"
-        case Hull() | RoundedHull():
-            core = shape if isinstance(shape, Hull) else shape.core
-            corners = len(core.vertices)
-            low, high = core.bounds
-            size = f"{corners} corners in {_product(high - low)}"
-            if isinstance(shape, RoundedHull):
-                kind, size = "hull", f"{size}, rounded by {shape.radius:.4g}"
-    return ListedShape(kind, size, corners, shape.volume, sides)
-
-
-def _product(sides: Any) -> str:
-    return " × ".join(f"{side:.4g}" for side in sides)
+    sides = tuple(float(side) for side in placed.bounds[1] - placed.bounds[0])
+    kind, size, corners = facts(placed.shape).words()
+    return ListedShape(kind, size, corners, placed.shape.volume, sides)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from overlapper import HalfSpace, Overlaps, Placed, overlaps
+from overlapper import Overlaps, Placed, overlaps
 from overlapper.quaternion import rotated
+from overlapper.shapes.table import facts
 from overlapper.simulation.model import Array
 
 # Gauss and Legendre's, from 0 to 1.
@@ -23,16 +24,20 @@ def energies(found: Overlaps, normals: Array, stiffness: Array) -> Array:
     for row in np.flatnonzero(found.status == Overlaps.OVERLAPPING).tolist():
         overlap = found[row]
         a, b = overlap.shapes
-        plane = next((each for each in (a, b) if isinstance(each.shape, HalfSpace)), None)
-        if plane is not None:
-            assert isinstance(plane.shape, HalfSpace)
-            outward = rotated(plane.orientation, plane.shape.normal)
-            depth = plane.shape.offset - outward @ (overlap.centroid - plane.position)
-            result[row] = stiffness[row] * overlap.volume * depth
-            continue
-        work = _work(a, b, normals[row], np.ptp(overlap.vertices @ normals[row]))
-        result[row] = stiffness[row] * work
+        plane = next((each for each in (a, b) if not facts(each.shape).bounded), None)
+        if plane is None:
+            result[row] = stiffness[row] * _work(a, b, normals[row], np.ptp(overlap.vertices @ normals[row]))
+        else:
+            result[row] = stiffness[row] * overlap.volume * _depth(plane, overlap.centroid)
     return result
+
+
+def _depth(plane: Placed, point: Array) -> float:
+    """How far a point is below the plane of a half-space, m."""
+    side = facts(plane.shape).side(point)
+    assert side is not None
+    normal, offset, _ = side
+    return float(offset - rotated(plane.orientation, normal) @ (point - plane.position))
 
 
 def _work(a: Placed, b: Placed, normal: Array, way: float) -> float:

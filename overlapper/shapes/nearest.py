@@ -1,4 +1,4 @@
-"""The points of triangles that are nearest to the origin, in doubles."""
+"""The point of a triangle that is nearest to the origin, in doubles."""
 
 from __future__ import annotations
 

@@ -1,0 +1,105 @@
+"""What Python asks of a shape. Each kind answers in a file of its own, and `table` says which file that is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper.rational import Exact
+from overlapper.shapes.drawing import Tessellation
+from overlapper.shapes.planes import Planes
+
+Floats = NDArray[np.float64]
+FclModel = tuple[str, tuple[Any, ...]]  # the name of FCL's class, and the arguments; hashable
+
+
+@dataclass(frozen=True)
+class Block:
+    """A part of a shape with at most one curved side, in the shape's own frame; numbers are exact but for `radius`.
+
+    With `centre`, the block lies in the ball of `radius` about it, or with `axis` in the cylinder about that line. It
+    lies below `planes`, each a normal (3,) and an offset, and within `radius` of the hull of `spine` (k, 3), which is
+    None if the block has no end. Its planes cut off no more than the volume `lost` of the shape.
+    """
+
+    planes: Sequence[tuple[Exact, Fraction]]
+    spine: Exact | None
+    radius: float = 0.0
+    centre: Exact | None = None
+    axis: Exact | None = None
+    lost: Fraction = Fraction(0)
+
+
+class Facts(Protocol):
+    """The answers for one shape. Everything is in the shape's own frame, and in SI units."""
+
+    name: str  # in a sentence, with its article
+    bounded: bool
+    isotropic: bool  # no rotation about the origin changes it
+    has_blocks: bool  # it is made up of `blocks`, which each have at most one ball or cylinder
+    has_exits: bool  # `exits` are known exactly
+    bullet_margin: bool  # Bullet collides with a margin around it
+
+    def __init__(self, shape: Any) -> None: ...
+
+    def parameters(self) -> list[float | Floats]:
+        """The values of which its class makes the same shape."""
+
+    def words(self) -> tuple[str, str, int]:
+        """Its kind, its dimensions in m, and the number of its corners, 0 for all but hulls, as an inventory lists."""
+
+    def tessellation(self) -> Tessellation:
+        """Its surface as triangles; TypeError for a shape that is not bounded."""
+
+    def side(self, towards: Floats) -> tuple[Floats, float, Floats] | None:
+        """Unit normal, offset and corners (k, 3) of the flat side that faces a point most; None without flat sides.
+
+        The side of a half-space has no corners.
+        """
+
+    def ball(self) -> tuple[Floats, float]:
+        """Centre (3,) and radius of a ball around the shape; the radius is infinite if the shape is not bounded."""
+
+    def fcl(self) -> FclModel | str:
+        """The shape for FCL, or the sentence that says why FCL is not asked."""
+
+    def core_tip(self, direction: Floats) -> Floats:
+        """A farthest point (3,) of the shape less `rounding`; TypeError if its distances are not known exactly."""
+
+    @property
+    def rounding(self) -> float:
+        """The radius of a ball that `core_tip` leaves out: the shape is the Minkowski sum of the rest and the ball."""
+
+    @property
+    def planes(self) -> Planes | None:
+        """The planes that bound it, exactly; None if it is round."""
+
+    @property
+    def half_axes(self) -> Exact | None:
+        """The units of the axes in which the shape is a ball of radius 1; `blocks` are in these. None for 1 m."""
+
+    def support(self, direction: Exact, scale: int) -> tuple[Fraction, Fraction] | None:
+        """(flat, square): flat + sqrt(square) is the greatest direction . x / scale; None if there is none."""
+
+    def holds(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
+        """Whether the shape holds the ball of radius `margin` about each of points (n, 3) / scale; points are integers.
+
+        True is proved. False may be said of a ball that just fits.
+        """
+
+    def tightest(self, point: Exact) -> Exact:
+        """The normal of the plane of the shape that a point is farthest above, of any length."""
+
+    def exits(self, start: Exact, arms: Exact, scale: int, fine: int) -> Exact:
+        """The shares of arms (n, 3) at which rays from `start` leave the shape, in units of 2^-fine, rounded down.
+
+        `start`, a point inside, and `arms` are integers over `scale`. TypeError without `has_exits`.
+        """
+
+    def blocks(self) -> list[Block]:
+        """The blocks that make up the shape. TypeError without `has_blocks`; ValueError for an inexact hull."""

@@ -1,0 +1,76 @@
+"""Half-spaces."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper._core import HalfSpace
+from overlapper.rational import Exact, cross, exact
+from overlapper.shapes.drawing import Tessellation
+from overlapper.shapes.facts import Block, FclModel, Floats
+from overlapper.shapes.planes import Planes
+
+
+class HalfSpaceFacts:
+    name = "a half-space"
+    bounded = False
+    isotropic = False
+    has_blocks = True
+    has_exits = True
+    bullet_margin = False
+    rounding = 0.0
+    half_axes = None
+
+    def __init__(self, shape: HalfSpace) -> None:
+        self.shape = shape
+
+    @cached_property
+    def planes(self) -> Planes:
+        """Of the normal and the offset as given, which are not rounded."""
+        return Planes.of(exact(self.shape.given_normal)[None], exact([self.shape.given_offset]))
+
+    def parameters(self) -> list[float | Floats]:
+        return [self.shape.normal, self.shape.offset]
+
+    def words(self) -> tuple[str, str, int]:
+        return "plane", f"normal {', '.join(f'{x:.4g}' for x in self.shape.normal)}", 0
+
+    def tessellation(self) -> Tessellation:
+        raise TypeError("a half-space has no surface to draw: it is drawn as a ground")
+
+    def side(self, towards: Floats) -> tuple[Floats, float, Floats]:
+        return np.asarray(self.shape.normal), float(self.shape.offset), np.empty((0, 3))
+
+    def ball(self) -> tuple[Floats, float]:
+        return np.zeros(3), math.inf
+
+    def fcl(self) -> FclModel:
+        return "Halfspace", (*self.shape.normal, self.shape.offset)
+
+    def core_tip(self, direction: Floats) -> Floats:
+        raise TypeError(f"shape must be bounded, not {self.shape!r}")
+
+    def support(self, direction: Exact, scale: int) -> tuple[Fraction, Fraction] | None:
+        """Only along its normal has a half-space an end."""
+        normal, offset = self.planes.normals[0], self.planes.offsets[0]
+        if any(cross(normal, direction)) or direction @ normal < 0:
+            return None
+        return offset * (direction @ normal) / (normal @ normal) / scale, Fraction(0)
+
+    def holds(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
+        return self.planes.hold(points, scale, margin)
+
+    def tightest(self, point: Exact) -> Exact:
+        normal: Exact = self.planes.normals[0]
+        return normal
+
+    def exits(self, start: Exact, arms: Exact, scale: int, fine: int) -> Exact:
+        return self.planes.exits(start, arms, scale, fine)
+
+    def blocks(self) -> list[Block]:
+        return [Block([(self.planes.normals[0], self.planes.offsets[0])], None)]

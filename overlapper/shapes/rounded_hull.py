@@ -1,0 +1,190 @@
+"""Rounded hulls: a core, prisms on its facets, wedges of cylinders on its edges, wedges of balls at its corners."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper._core import Hull, RoundedHull
+from overlapper.rational import Exact, cross, exact, in_doubles
+from overlapper.shapes.blocks import ball_block
+from overlapper.shapes.drawing import Tessellation
+from overlapper.shapes.facts import Block, Floats
+from overlapper.shapes.hull import HullFacts, Row
+
+# Bits to which the height of a prism is known, below 1.
+PRISM = 320
+Edge = tuple[int, int]
+
+
+class RoundedHullFacts:
+    name = "a rounded hull"
+    bounded = True
+    isotropic = False
+    has_blocks = True
+    has_exits = False
+    bullet_margin = False
+    planes = None
+    half_axes = None
+
+    def __init__(self, shape: RoundedHull) -> None:
+        self.core = HullFacts(shape.core)
+        self.rounding = shape.radius
+
+    def parameters(self) -> list[float | Floats]:
+        return [*self.core.parameters(), self.rounding]
+
+    def words(self) -> tuple[str, str, int]:
+        kind, size, corners = self.core.words()
+        return kind, f"{size}, rounded by {self.rounding:.4g}", corners
+
+    def tessellation(self) -> Tessellation:
+        """With bevelled edges: the hull of the facets, each as far out as the radius."""
+        core = self.core.shape
+        outward = [core.vertices[ring] + self.rounding * plane[:3] for ring, plane in zip(core.facets, core.halfspaces)]
+        return HullFacts(Hull(np.concatenate(outward))).tessellation()
+
+    def side(self, towards: Floats) -> None:
+        return None
+
+    def ball(self) -> tuple[Floats, float]:
+        centre, radius = self.core.ball()
+        return centre, radius + self.rounding
+
+    def fcl(self) -> str:
+        return "FCL has no rounded hulls."
+
+    def core_tip(self, direction: Floats) -> Floats:
+        return self.core.core_tip(direction)
+
+    def support(self, direction: Exact, scale: int) -> tuple[Fraction, Fraction]:
+        tip, _ = self.core.support(direction, scale)
+        return tip, Fraction(self.rounding) ** 2 * Fraction(direction @ direction, scale * scale)
+
+    def holds(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
+        """A point on the surface may be said to be outside: the nearest point of the core is only known to rounding."""
+        room = Fraction(self.rounding) - margin
+        inside = self.core.holds(points, scale, max(-room, Fraction(0)))
+        for i in np.flatnonzero(~inside) if room >= 0 else ():
+            arm = points[i] - scale * self.core.nearest(in_doubles(points[i], scale))
+            inside[i] = arm @ arm <= (room * scale) ** 2
+        return inside
+
+    def tightest(self, point: Exact) -> Exact:
+        local, halfspaces = point.astype(float), self.core.shape.halfspaces
+        above = halfspaces[:, :3] @ local + halfspaces[:, 3]
+        outward = halfspaces[above.argmax(), :3]
+        if above.max() > 0.0:
+            arm = local - self.core.nearest(local).astype(float)
+            outward = arm if arm.any() else outward
+        normal: Exact = exact(outward)
+        return normal
+
+    def exits(self, start: Exact, arms: Exact, scale: int, fine: int) -> Exact:
+        raise TypeError("where rays leave a rounded hull is not known exactly")
+
+    def blocks(self) -> list[Block]:
+        core = self.core.blocks()
+        if self.rounding == 0.0:
+            return core
+        sides = self._sides()
+        prisms = [self._prism(plane, edges) for plane, edges in sides.items()]
+        return [*core, *prisms, *self._wedges(sides), *self._caps(sides)]
+
+    def _sides(self) -> dict[Row, list[Edge]]:
+        """For each plane the edges around its triangles; those without area go with the triangle at their long side."""
+        owner: dict[Edge, Row] = {}
+        thin = []
+        for triangle, plane in zip(self.core.shape.triangles.tolist(), self.core.plane_of_triangle):
+            edges = [(triangle[i - 1], triangle[i]) for i in range(3)]
+            if plane:
+                owner.update((edge, plane) for edge in edges)
+            else:
+                thin.append(edges)
+        while thin:
+            left = []
+            for edges in thin:
+                p, q = max(edges, key=self._square)
+                if (q, p) in owner:
+                    owner.update((edge, owner[q, p]) for edge in edges)
+                else:
+                    left.append(edges)
+            if len(left) == len(thin):
+                raise ValueError("a hull of triangles without area has no certificate")
+            thin = left
+        sides: dict[Row, list[Edge]] = {tuple(row): [] for row in self.core.planes.rows}
+        for (p, q), plane in owner.items():
+            if owner[q, p] != plane:
+                sides[plane].append((p, q))
+        return sides
+
+    def _along(self, edge: Edge) -> Exact:
+        """In units of the corners."""
+        corners, _ = self.core.corners
+        along: Exact = corners[edge[1]] - corners[edge[0]]
+        return along
+
+    def _square(self, edge: Edge) -> int:
+        along = self._along(edge)
+        return int(along @ along)
+
+    def _corner(self, number: int) -> Exact:
+        corners, unit = self.core.corners
+        point: Exact = corners[number] * Fraction(1, unit)
+        return point
+
+    def _plane(self, normal: Exact, corner: int) -> tuple[Exact, Fraction]:
+        """Through a corner; the normal is in units of the corners."""
+        corners, unit = self.core.corners
+        return normal * Fraction(1, unit), Fraction(normal @ corners[corner], unit * unit)
+
+    def _prism(self, plane: Row, edges: Sequence[Edge]) -> Block:
+        normal, offset = np.array(plane[:3], object), plane[3]
+        square = int(normal @ normal)
+        rise, is_exact = _root_below(square * Fraction(self.rounding) ** 2)
+        planes = [(normal, offset + rise), (-normal, Fraction(-offset))]
+        planes += [self._plane(cross(self._along((p, q)), normal), p) for p, q in edges]
+        ring = np.array([self._corner(p) for p in sorted({p for edge in edges for p in edge})])
+        spine = np.vstack([ring, ring + normal * (rise / square)])
+        area = Fraction(float(np.linalg.norm(np.ptp(spine.astype(float), axis=0))) * (1.0 + 2.0**-40)) ** 2
+        # The height lost is 2^-PRISM of all or less.
+        lost = Fraction(0) if is_exact else area * Fraction(self.rounding) / 2**PRISM
+        return Block(planes, spine, lost=lost)
+
+    def _wedges(self, sides: dict[Row, list[Edge]]) -> list[Block]:
+        plane_at = {edge: plane for plane, edges in sides.items() for edge in edges}
+        found = []
+        for (p, q), plane in plane_at.items():
+            if p < q:
+                along = self._along((p, q))
+                n, m = (np.array(each[:3], object) for each in (plane, plane_at[q, p]))
+                # Seen along the edge the first facet is on the left, so that the wedge is on the right of its normal.
+                planes = [self._plane(wall, p) for wall in (cross(n, along), cross(along, m))]
+                planes += [self._plane(along, q), self._plane(-along, p)]
+                ends = np.array([self._corner(p), self._corner(q)])
+                axis = along * Fraction(1, self.core.corners[1])
+                found.append(Block(planes, ends, self.rounding, ends[0], axis))
+        return found
+
+    def _caps(self, sides: dict[Row, list[Edge]]) -> list[Block]:
+        from_corner: dict[int, list[Edge]] = {}
+        for edges in sides.values():
+            for edge in edges:
+                from_corner.setdefault(edge[0], []).append(edge)
+        return [
+            ball_block(self._corner(p), self.rounding, [self._plane(self._along(edge), p) for edge in edges])
+            for p, edges in from_corner.items()
+        ]
+
+
+def _root_below(square: Fraction) -> tuple[Fraction, bool]:
+    """The square root, not above and by at most 2^-PRISM of it below; and whether it is exact."""
+    p, q = square.numerator, square.denominator
+    shift = max(0, PRISM + (q.bit_length() - p.bit_length()) // 2 + 1)
+    floor = math.isqrt((p << 2 * shift) // q)
+    found = Fraction(floor, 1 << shift)
+    return found, found * found == square
