@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from strategies import in_general_position, placed, polyhedra, quaternion, solids
 
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
-from overlapper.proof.certificate import Round, certificate
+from overlapper.proof.certificate import certificate
 from overlapper.proof.claims import Bracketed, CertificateError, Overlapping, OwnedPlane, Separated, Touching
+from overlapper.shapes.table import facts
 
 CUBE = Box([0.5, 0.5, 0.5])
 ROUNDED = RoundedHull(np.array(np.meshgrid([-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5])).reshape(3, -1).T, 0.25)
@@ -58,6 +59,10 @@ IN_COMMON = {
 }
 
 
+def rounded(common):
+    return [body.shape for body in common.shapes if facts(body.shape).planes is None]
+
+
 def found(bodies):
     return overlap(*bodies, tolerance=0.1)
 
@@ -70,14 +75,14 @@ def proved(common):
     volume, error = Fraction(common.volume), Fraction(common.volume_error)
     assert 0 <= lower <= upper
     # Of several bodies with a round one, the inner polytope is a star about another point than the core's.
-    room = 2 if len(common.shapes) > 2 and any(isinstance(body.shape, Round) for body in common.shapes) else 1
+    room = 2 if len(common.shapes) > 2 and rounded(common) else 1
     assert volume - room * error <= lower and upper <= volume + error
     return lower, upper
 
 
 def kind(common):
     if common:
-        round_ones = [body.shape for body in common.shapes if isinstance(body.shape, Round)]
+        round_ones = rounded(common)
         in_one_frame = len(round_ones) == 1 or not any(isinstance(shape, Ellipsoid) for shape in round_ones)
         return Bracketed if len(common.shapes) == 2 and round_ones and in_one_frame else Overlapping
     return {"separated": Separated, "touching": Touching}[common.status]
