@@ -6,6 +6,7 @@ import html
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -17,29 +18,41 @@ if TYPE_CHECKING:
     import polars
     import pyarrow
 
-# The measures of a pair, in the order of the columns; the unit is in the name. The centroid is missing of a pair that
-# only touches, `normal` points from B to A.
-MEASURES = [
-    "volume_m3",
-    "volume_error_m3",
-    *[f"centroid_{axis}_m" for axis in "xyz"],
-    "area_m2",
-    "depth_m",
-    *[f"normal_{axis}" for axis in "xyz"],
-]
+# The measures of a pair, by their attribute of `Overlap`, `Overlaps` and `LinkContact`, each with its columns. The unit
+# is in the name of a column. A pair that only touches has no centroid, and `normal` points from B to A.
+MEASURES = {
+    "volume": ["volume_m3"],
+    "volume_error": ["volume_error_m3"],
+    "centroid": [f"centroid_{axis}_m" for axis in "xyz"],
+    "area": ["area_m2"],
+    "depth": ["depth_m"],
+    "normal": [f"normal_{axis}" for axis in "xyz"],
+}
 
-# What volumetric contact adds: force and torque on A, the latter about the centroid, the energy that pressures store,
-# and the velocity of A over B at the centroid.
-FORCE_MEASURES = [
-    *[f"force_{axis}_n" for axis in "xyz"],
-    *[f"torque_{axis}_nm" for axis in "xyz"],
-    "energy_j",
-    *[f"slip_{axis}_m_s" for axis in "xyz"],
-]
+# What volumetric contact adds, by the attribute of `Forces`: force and torque on A, the torque about the centroid, the
+# energy that pressures store, and the velocity of A over B at the centroid.
+FORCE_MEASURES = {
+    "force": [f"force_{axis}_n" for axis in "xyz"],
+    "torque": [f"torque_{axis}_nm" for axis in "xyz"],
+    "energy": ["energy_j"],
+    "slip": [f"slip_{axis}_m_s" for axis in "xyz"],
+}
+
+MEASURE_COLUMNS, FORCE_COLUMNS = ([*chain.from_iterable(each.values())] for each in (MEASURES, FORCE_MEASURES))
 
 MOST_ROWS = 20  # that a notebook shows
 
 Columns = dict[str, NDArray[Any] | Sequence[Any]]
+
+
+def measures_of(pair: object) -> dict[str, float | None]:
+    """The values of MEASURE_COLUMNS of an Overlap or a LinkContact; None where it has no such measure."""
+    row: dict[str, float | None] = dict.fromkeys(MEASURE_COLUMNS)
+    for name, columns in MEASURES.items():
+        value = getattr(pair, name, None)
+        if value is not None:
+            row |= zip(columns, [value] if isinstance(value, float) else value.tolist())
+    return row
 
 
 class Tabular(ABC):

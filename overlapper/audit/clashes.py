@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from overlapper import Batch, Hull, Overlaps, Placed
 from overlapper.audit.allowed import is_allowed, must_name_some
-from overlapper.columns import MEASURES
+from overlapper.columns import measures_of
 from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, Surface, decompose
 from overlapper.polytopes.mesh_file import ASSEMBLIES, BODIES, Part, read_parts
 from overlapper.polytopes.mesh_overlap import mesh_overlap, window
@@ -200,12 +200,9 @@ def _row(clash: Clash) -> Row:
     row: Row = {"step": 1, "time_s": 0.0, "status": "touching" if clash.status == "touching" else "overlapping"}
     for side, body, name in zip("AB", clash.pair, clash.names):
         row |= {f"body{side}": body, f"link{side}": -1, f"name{side}": name}
-    row |= {"volume_m3": clash.volume, "volume_error_m3": clash.volume_error}
     if clash.parts is not None:
-        centroid = [None] * 3 if clash.parts.centroid is None else clash.parts.centroid.tolist()
-        measures = [*centroid, None, clash.parts.depth, *clash.parts.normal.tolist()]
-        row |= dict(zip(MEASURES[2:], measures))
-    return row
+        row |= measures_of(clash.parts)
+    return row | {"volume_m3": clash.volume, "volume_error_m3": clash.volume_error}
 
 
 def write_page(found: Clashes, path: Path) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Overlap, Overlaps
-from overlapper.columns import MEASURES, Columns, Tabular
+from overlapper.columns import MEASURE_COLUMNS, MEASURES, Columns, Tabular
 
 STATUS = np.array(["separated", "touching", "overlapping"])  # by the numbers of Overlaps.status
 
@@ -94,8 +95,8 @@ class Contacts(Tabular, Sequence[Contact]):
         for side, at in (("A", keys[:, :3]), ("B", keys[:, 3:])):
             columns |= {f"{word}{side}": values for word, values in zip(("body", "link", "shape"), at.T)}
             columns[f"name{side}"] = [self.names.get((body, link)) for body, link in at[:, :2].tolist()]
-        measures = [found.volume, found.volume_error, *found.centroid.T, found.area, found.depth, *found.normal.T]
-        return columns | {"status": STATUS[found.status].tolist()} | dict(zip(MEASURES, measures))
+        measures = chain.from_iterable(np.atleast_2d(getattr(found, name).T) for name in MEASURES)
+        return columns | {"status": STATUS[found.status].tolist()} | dict(zip(MEASURE_COLUMNS, measures))
 
     def __repr__(self) -> str:
         return f"Contacts({len(self)}, {int((self.overlaps.status == Overlaps.OVERLAPPING).sum())} of them overlapping)"

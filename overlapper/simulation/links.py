@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.columns import MEASURES, Columns, Tabular
+from overlapper.columns import MEASURE_COLUMNS, Columns, Tabular, measures_of
 from overlapper.simulation.contacts import Contact, Contacts
 from overlapper.union import UnionOverlap, of_pair, of_pairs
 
@@ -107,13 +107,9 @@ class LinkContacts(Tabular, list[LinkContact]):
             at = np.array(links, np.int64).reshape(-1, 2)
             columns |= {f"body{side}": at[:, 0], f"link{side}": at[:, 1]}
             columns[f"name{side}"] = [self.names.get(link) for link in links]
-        missing = [np.nan] * 3
-        measures = [
-            [p.volume, p.volume_error, *(missing if p.centroid is None else p.centroid), np.nan, p.depth, *p.normal]
-            for p in self
-        ]
-        status = [pair.status for pair in self]
-        return columns | {"status": status} | dict(zip(MEASURES, np.array(measures).reshape(-1, len(MEASURES)).T))
+        measures = [measures_of(pair) for pair in self]
+        columns["status"] = [pair.status for pair in self]
+        return columns | {name: np.array([each[name] for each in measures], float) for name in MEASURE_COLUMNS}
 
 
 def link_contacts(contacts: Iterable[Contact]) -> LinkContacts:

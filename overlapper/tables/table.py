@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.columns import FORCE_MEASURES, MEASURES
+from overlapper.columns import FORCE_COLUMNS, MEASURE_COLUMNS, measures_of
 
 if TYPE_CHECKING:
     from overlapper.reference import Comparison
@@ -34,13 +34,13 @@ COLUMNS: dict[str, type] = {
     },
     **{part.format(side): float for side in "AB" for part in POSE},
     "status": str,
-    **dict.fromkeys(MEASURES, float),
+    **dict.fromkeys(MEASURE_COLUMNS, float),
     "fcl": str,
     "fcl_explanation": str,
 }
 
 # What a run with volumetric contact has beside: nothing of a pair that it does not push apart.
-FORCES: dict[str, type] = dict.fromkeys(FORCE_MEASURES, float)
+FORCES: dict[str, type] = dict.fromkeys(FORCE_COLUMNS, float)
 
 
 class Bodies(Protocol):
@@ -102,19 +102,14 @@ def rows(
     a, b = placements(bodies, "A"), placements(bodies, "B")
     table: list[Row] = []
     for k, contact in enumerate(contacts):
-        overlap = contact.overlap
-        assert overlap.depth is not None and overlap.normal is not None
-        centroid = [None] * 3 if overlap.centroid is None else overlap.centroid.tolist()
-        normal = overlap.normal.tolist()
-        measures = [overlap.volume, overlap.volume_error, *centroid, overlap.area, overlap.depth, *normal]
         table.append(
             {
                 "step": step,
                 "time_s": time,
                 **a[contact.bodyA, contact.linkA, contact.shapeA],
                 **b[contact.bodyB, contact.linkB, contact.shapeB],
-                "status": overlap.status,
-                **dict(zip(MEASURES, measures)),
+                "status": contact.overlap.status,
+                **measures_of(contact.overlap),
                 "fcl": opinions[k].verdict if opinions else None,
                 "fcl_explanation": opinions[k].explanation if opinions else None,
                 **pushed.get(_key(contact), {}),
@@ -146,8 +141,6 @@ def link_rows(
     at = {} if forces is None else {pair: k for k, pair in enumerate(map(tuple, forces.pairs.tolist()))}
     table: list[Row] = []
     for pair in pairs:
-        centroid = [None] * 3 if pair.centroid is None else pair.centroid.tolist()
-        measures = [pair.volume, pair.volume_error, *centroid, None, pair.depth, *pair.normal.tolist()]
         table.append(
             {
                 "step": step,
@@ -159,7 +152,7 @@ def link_rows(
                 "linkB": pair.linkB,
                 "nameB": names[pair.bodyB, pair.linkB],
                 "status": pair.status,
-                **dict(zip(MEASURES, measures)),
+                **measures_of(pair),
                 **_sum_of(pair, forces, [at[_key(each)] for each in pair.contacts if _key(each) in at]),
             }
         )

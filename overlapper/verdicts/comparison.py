@@ -10,8 +10,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper.columns import FORCE_MEASURES, MEASURES
 from overlapper.tables.table import Row, Value, key, poses
-from overlapper.verdicts.expected import FORCE_MEASURES, MEASURES, Budget
+from overlapper.verdicts.expected import Budget
 
 Names = Mapping[tuple[int, int], str]
 

@@ -28,20 +28,6 @@ SHAPES = "shapes "
 # so that every shape of a step is placed, and a pair out of nothing is noticed.
 EXPECTED_COLUMNS = [name for name in COLUMNS if name not in ("time_s", "nameA", "nameB", "fcl", "fcl_explanation")]
 
-# The measures that are compared, each with its columns; those of volumetric contact are told by the simulation alone.
-MEASURES = {
-    "volume": ["volume_m3"],
-    "centroid": ["centroid_x_m", "centroid_y_m", "centroid_z_m"],
-    "area": ["area_m2"],
-    "depth": ["depth_m"],
-    "normal": ["normal_x", "normal_y", "normal_z"],
-}
-FORCE_MEASURES = {
-    "force": ["force_x_n", "force_y_n", "force_z_n"],
-    "torque": ["torque_x_nm", "torque_y_nm", "torque_z_nm"],
-    "energy": ["energy_j"],
-}
-
 
 @dataclass(frozen=True, slots=True)
 class Budget:

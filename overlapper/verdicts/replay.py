@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from overlapper.columns import MEASURES
 from overlapper.tables.still import Still
 from overlapper.tables.table import Row
 from overlapper.verdicts.comparison import compare_measures
-from overlapper.verdicts.expected import DRIFT, FORCES, MEASURES, ROUNDING, Budget, Expected
+from overlapper.verdicts.expected import DRIFT, FORCES, ROUNDING, Budget, Expected
 
 # Where a scene is put to see how far rounding alone changes its measures, in m.
 ASIDES = ((0.3, 0.7, 0.1), (-0.2, 0.4, 0.9), (0.6, -0.5, -0.3))

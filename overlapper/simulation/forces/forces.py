@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.columns import FORCE_MEASURES, Columns, Tabular
+from overlapper.columns import FORCE_COLUMNS, FORCE_MEASURES, Columns, Tabular
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.forces.energy import energies
 from overlapper.simulation.model import Array
@@ -81,10 +81,10 @@ class Forces(Tabular):
     @cached_property
     def measures(self) -> Array:
         """(p, 10) force, torque, energy and slip, by the columns of `overlapper run`."""
-        return np.column_stack([self.force, self.torque, self.energy, self.slip])
+        return np.column_stack([getattr(self, name) for name in FORCE_MEASURES])
 
     def _columns(self) -> Columns:
-        return {**self.contacts._columns(), **dict(zip(FORCE_MEASURES, self.measures.T))}
+        return {**self.contacts._columns(), **dict(zip(FORCE_COLUMNS, self.measures.T))}
 
     def __len__(self) -> int:
         return len(self.force)
