@@ -22,10 +22,10 @@ from pathlib import Path
 import numpy as np
 
 from overlapper import Batch, Hull, Overlaps, Placed, overlap
+from overlapper.audit.audit import audit
 from overlapper.audit.examiner import Examiner
 from overlapper.audit.robot import read_robot
 from overlapper.audit.sampling import Sampling
-from overlapper.audit.verdicts import audit
 from overlapper.simulation.bullet.model_file import NotRead
 
 ROBOTS = Path(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots"))
@@ -212,7 +212,7 @@ def row_of(path: Path, count: int) -> str:
     seconds = time.process_time() - start
     counts = [len(found.of_status(status)) for status in ("never", "sometimes", "always")]
     links = len({shape.link for shape in robot.tree.shapes})
-    pairs = len(found.verdicts)
+    pairs = len(found.pairs)
     cells = [path.stem, len(robot.degrees), links, pairs, pairs - sum(counts), *counts, f"{seconds:.1f}"]
     return f"| {' | '.join(map(str, cells))} |"
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from overlapper import Batch, Hull
+from overlapper.audit.audit import audit
 from overlapper.audit.robot import read_robot
-from overlapper.audit.verdicts import audit
 from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, Surface, decompose
 from overlapper.printable import first_line
 from overlapper.simulation.bullet.joints import ENDINGS
@@ -96,7 +96,7 @@ def _model(name: str, path: Path, units: str, least_depth: float, settings: dict
     robot = read_robot(path, **settings)
     links = robot.tree.links
     skipped = [f"{label}: {link.skipped}" for label, link in zip(robot.link_names, links) if link.skipped]
-    met = [each for each in audit(robot, 1, least_depth=least_depth).verdicts if not each.pair.adjacent]
+    met = [each for each in audit(robot, 1, least_depth=least_depth).pairs if not each.pair.adjacent]
     overlaps = [
         Shared(each.names, each.largest.contact.volume, each.largest.contact.depth) for each in met if each.largest
     ]

@@ -1,8 +1,8 @@
 """Which bodies of mesh files clash: all pairs of a folder, of files, or of one assembly.
 
-A pair of which the convex hulls are apart is apart. What closed meshes share that are not convex is measured of the
-meshes themselves (`overlapper.polytopes.mesh_overlap`). Where they share something, convex parts stand for them
-(`overlapper.polytopes.decomposition`), which say how deep, and are what a page shows.
+Two bodies are apart if their convex hulls are. The common volume of closed meshes that are not convex is measured on
+the meshes (`overlapper.polytopes.mesh_overlap`). If there is any, convex parts stand for the meshes
+(`overlapper.polytopes.decomposition`): the depth is that of the parts, and a page shows the parts.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from overlapper import Batch, Hull, Overlaps, Placed
 from overlapper.audit.allowed import is_allowed, must_name_some
 from overlapper.columns import measures_of
 from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, Surface, decompose
-from overlapper.polytopes.mesh_file import ASSEMBLIES, BODIES, Part, read_parts
+from overlapper.polytopes.mesh_file import ASSEMBLIES, BODIES, MeshPart, read_parts
 from overlapper.polytopes.mesh_overlap import mesh_overlap, window
 from overlapper.printable import first_line
 from overlapper.simulation.links import LinkContact, link_contacts
@@ -44,18 +44,22 @@ COLORS += [(0.62, 0.55, 0.85, 1.0), (0.80, 0.62, 0.48, 1.0)]
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
-    """A body as it was measured, where it stands, in m.
+class MeshBody:
+    """A body of a mesh file as it was measured, in world coordinates, in m.
 
-    `triangles` (t, 3, 3) are those of a closed mesh, counter-clockwise from outside; None of a mesh that bounds no
-    volume that is known, and of one of which the hull was enough. `parts` stand for it: `way` says whether they are the
-    mesh itself ("convex"), or made by CoACD ("decomposed"), or the one of them is its convex hull ("hull"), which is
-    not enough to tell what it shares if there is no more to know ("unknown"). `parts_volume` is that of their union and
-    `mesh_volume` that of the mesh, in m³.
+    `triangles` (t, 3, 3) are those of a closed mesh, counter-clockwise from outside. They are None if the mesh bounds
+    no known volume. `parts` are the convex bodies that stand for the mesh. `way` says how they were made:
+
+    - "convex": the mesh consists of them.
+    - "decomposed": CoACD made them.
+    - "hull": the only part is the convex hull.
+    - "unknown": the only part is the convex hull, which is not enough to measure the body.
+
+    `parts_volume` is the volume of the union of the parts, `mesh_volume` that of the mesh, in m³.
     """
 
     name: str
-    part: Part
+    part: MeshPart
     triangles: Array | None
     parts: tuple[Hull, ...]
     way: Way
@@ -72,10 +76,15 @@ class Body:
 class Clash:
     """Two bodies that touch or overlap, by their places among the bodies.
 
-    They clash if nobody expects them to overlap, and not if they are "shallow", less deep than asked, or "touching": by
-    no more than the rounding of corners explains that are written with six digits.
-    `volume` (m³) is within `volume_error` of what the meshes share if `of_meshes`, and else of what their parts share,
-    which `parts` has, with depth and normal; None if these share nothing.
+    `status` says what the overlap means:
+
+    - "clash": it was not expected.
+    - "expected": the names of the two are among the expected pairs.
+    - "shallow": it is less deep than asked.
+    - "touching": it is no more than the rounding of corners explains, which files write with six digits.
+
+    `volume` (m³) is within `volume_error` of the common volume: of the meshes if `of_meshes`, else of their parts.
+    `parts` has what the parts share, with depth and normal; None if they share nothing.
     """
 
     pair: tuple[int, int]
@@ -97,7 +106,7 @@ class Clashes:
     """The bodies; the pairs that touch or overlap, the largest volume first; and sentences, of what could not be
     measured and of what was measured otherwise than asked."""
 
-    bodies: list[Body]
+    bodies: list[MeshBody]
     pairs: list[Clash]
     failures: list[str]
     remarks: list[str]
@@ -106,7 +115,7 @@ class Clashes:
         return [pair for pair in self.pairs if pair.status == status]
 
 
-def read(paths: Sequence[Path], units: str) -> tuple[list[tuple[str, Part]], list[str]]:
+def read(paths: Sequence[Path], units: str) -> tuple[list[tuple[str, MeshPart]], list[str]]:
     """The bodies of files and folders by their names, and what is wrong with files, a sentence each.
 
     A file is named by its path from the folder that all are in, and a body of an assembly by that of its node; the
@@ -114,7 +123,7 @@ def read(paths: Sequence[Path], units: str) -> tuple[list[tuple[str, Part]], lis
     """
     files = list(dict.fromkeys(file for path in paths for file in _files(path)))
     folder = Path(os.path.commonpath([file.absolute().parent for file in files]))
-    named: list[tuple[str, Part]] = []
+    named: list[tuple[str, MeshPart]] = []
     failures: list[str] = []
     for file in files:
         try:
@@ -145,13 +154,13 @@ def _files(path: Path) -> list[Path]:
 
 
 def clashes(
-    parts: Sequence[tuple[str, Part]],
+    parts: Sequence[tuple[str, MeshPart]],
     enclose: bool = False,
     threshold: float = 0.05,
     least_depth: float = 0.0,
     expected: Sequence[tuple[str, str]] = (),
 ) -> Clashes:
-    """What bodies share, of all pairs.
+    """The clashes among all pairs of bodies.
 
     A mesh that is not convex is decomposed where it shares something; `threshold` is CoACD's, and with `enclose` it
     lays walls around what is open. `least_depth` (m) is the least of a clash, and `expected` are pairs of names that
@@ -167,7 +176,7 @@ def clashes(
             found.failures.append(f"{name} is not measured: {first_line(error)}")
         else:
             hulls.append(hull)
-            found.bodies.append(_with_surface(Body(name, part, None, (hull,), "hull", hull.volume, None)))
+            found.bodies.append(_with_surface(MeshBody(name, part, None, (hull,), "hull", hull.volume, None)))
     near = [(i, j) for i, j in _overlaps(hulls).pairs.tolist()]
     shared = {pair: _shared(*(found.bodies[i] for i in pair)) for pair in near}
     solid = {pair for pair, each in shared.items() if each is None or each.volume > each.slight}
@@ -258,14 +267,14 @@ def _drawn(found: Clashes) -> _Drawn:
 
 @dataclass(frozen=True, slots=True)
 class _Shared:
-    """What two closed meshes share, m³, and how much the rounding of their corners explains."""
+    """The common volume of two closed meshes, its error, and the volume that rounded corners explain, in m³."""
 
     volume: float
     error: float
     slight: float
 
 
-def _still(bodies: Sequence[Body]) -> Still:
+def _still(bodies: Sequence[MeshBody]) -> Still:
     """The parts where they stand, as the shapes of a body each."""
     keys = [(i, -1, k) for i, body in enumerate(bodies) for k in range(len(body.parts))]
     names = {(i, -1): body.name for i, body in enumerate(bodies)}
@@ -281,7 +290,7 @@ def _overlaps(hulls: Sequence[Hull]) -> Overlaps:
     return Batch(hulls).overlaps(*_nowhere(len(hulls)))
 
 
-def _with_surface(body: Body) -> Body:
+def _with_surface(body: MeshBody) -> MeshBody:
     """With the triangles of its mesh, if that is closed, and as convex bodies, if it consists of these."""
     try:
         surface = Surface.of(body.part.triangles)
@@ -296,7 +305,7 @@ def _with_surface(body: Body) -> Body:
     return _of_parts(body, convex, "convex") if convex else body
 
 
-def _of_parts(body: Body, parts: Sequence[Hull], way: Way) -> Body:
+def _of_parts(body: MeshBody, parts: Sequence[Hull], way: Way) -> MeshBody:
     """With these parts where they stand; as it was, if none of them has a volume there."""
     placed: list[Hull] = []
     for part in parts:
@@ -308,8 +317,8 @@ def _of_parts(body: Body, parts: Sequence[Hull], way: Way) -> Body:
     return replace(body, parts=tuple(placed), way=way, parts_volume=volume)
 
 
-def _shared(a: Body, b: Body) -> _Shared | None:
-    """What the meshes share; None where that is for their parts to say: both are convex, or one is not closed."""
+def _shared(a: MeshBody, b: MeshBody) -> _Shared | None:
+    """What the meshes share; None if their parts must be measured instead: both are convex, or one is not closed."""
     if a.way == b.way == "convex" or a.triangles is None or b.triangles is None:
         return None
     found = mesh_overlap(a.triangles, b.triangles)
@@ -321,7 +330,7 @@ def _shared(a: Body, b: Body) -> _Shared | None:
 
 
 def _area_within(triangles: Array, lower: Array, upper: Array) -> float:
-    """No less than the area of triangles within a box, of which each has no more than the largest cut of the box."""
+    """An upper bound of the area of triangles within a box: none has more than the largest section of the box."""
     within = ((triangles.min(axis=1) <= upper) & (triangles.max(axis=1) >= lower)).all(axis=1)
     a, b, c = triangles[within].transpose(1, 0, 2)
     x, y, z = np.maximum(upper - lower, 0.0)
@@ -329,14 +338,14 @@ def _area_within(triangles: Array, lower: Array, upper: Array) -> float:
     return float(np.minimum(areas, np.linalg.norm([x * y, y * z, z * x])).sum())
 
 
-def _rounding(a: Body, b: Body) -> float:
-    """m: by how much two surfaces may be nearer to each other than they were before their corners were rounded."""
+def _rounding(a: MeshBody, b: MeshBody) -> float:
+    """m: by how much rounding the corners may have moved two surfaces towards each other."""
     reach = max(float(np.abs(part.bounds).max()) for body in (a, b) for part in body.parts)
     return 2 * math.sqrt(3) * ROUNDING * reach
 
 
 def _decompose(found: Clashes, needed: set[int], threshold: float, enclose: bool) -> None:
-    """Put convex parts in the place of the hulls of what is not convex; what has none, and needs them, is a failure."""
+    """Replace the hulls of bodies that are not convex by convex parts; a body that needs parts and has none fails."""
     for i, body in enumerate(found.bodies):
         if body.way == "convex" or i not in needed:
             continue
@@ -353,9 +362,13 @@ def _decompose(found: Clashes, needed: set[int], threshold: float, enclose: bool
 
 
 def _clash(
-    bodies: Sequence[Body], pair: tuple[int, int], shared: _Shared | None, link: LinkContact | None, least_depth: float
+    bodies: Sequence[MeshBody],
+    pair: tuple[int, int],
+    shared: _Shared | None,
+    link: LinkContact | None,
+    least_depth: float,
 ) -> Clash | None:
-    """What a pair comes to, None if it is apart or one of it could not be measured."""
+    """The clash of a pair; None if the two are apart, or one of them could not be measured."""
     a, b = (bodies[i] for i in pair)
     if "unknown" in (a.way, b.way):
         return None
@@ -376,6 +389,6 @@ def _clash(
 
 
 def _expected(clash: Clash, expected: Sequence[tuple[str, str]]) -> Clash:
-    """With its status, if somebody has said that the two may overlap."""
+    """The clash, with the status "expected" if the two may overlap."""
     may = clash.status == "clash" and is_allowed(clash.names, expected)
     return replace(clash, status="expected") if may else clash

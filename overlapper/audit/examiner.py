@@ -13,7 +13,7 @@ from overlapper.audit.kinematics import Kinematics
 from overlapper.audit.pairs import LinkPair, link_pairs
 from overlapper.audit.robot import Robot
 from overlapper.audit.sampling import Sampling
-from overlapper.audit.tally import Array, Counts, Seen, Tally
+from overlapper.audit.tally import Array, Counts, ShapeOverlaps, Tally
 from overlapper.quaternion import rotated
 from overlapper.shapes.table import facts
 
@@ -57,7 +57,10 @@ class Examiner:
 
     @property
     def setup(self) -> bytes:
-        """What another process makes the same of, by `prepared`; bytes, as arrays are not simply equal or not."""
+        """What `prepared` needs to make the same examiner in another process.
+
+        It is bytes, because jobs are compared and arrays have no single answer to ==.
+        """
         return pickle.dumps((self.robot, self.sampling.count, self.sampling.seed, self.tolerance, self.least_depth))
 
     def shape_pairs(self, *pairs: LinkPair) -> Counts:
@@ -66,7 +69,7 @@ class Examiner:
         return np.stack([self._first[among], self._second[among]], axis=1)
 
     def __call__(self, block: int) -> Tally:
-        """What is seen in the block of that number."""
+        """The tally of a block of configurations."""
         numbers, configurations = np.array(self.sampling.blocks[block]), self.sampling.block(block)
         rigid = np.array([pair.rigid for pair in self.pairs], dtype=bool)
         adjacent = np.array([pair.adjacent for pair in self.pairs], dtype=bool)
@@ -94,7 +97,7 @@ class Examiner:
         counts = (found.status == Overlaps.OVERLAPPING) & (found.depth > self.least_depth)
         first, second = found.pairs[counts].T
         pairs = self._pair_of[first % k, second % k]
-        seen = Seen(pairs, first // k, found.volume[counts], found.depth[counts])
+        seen = ShapeOverlaps(pairs, first // k, found.volume[counts], found.depth[counts])
         return seen.tally(asked, numbers, self.sampling.first_random)
 
     def _near(self, positions: Array, orientations: Array, wanted: Counts) -> tuple[Counts, Counts]:

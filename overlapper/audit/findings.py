@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from overlapper.audit.allowed import Patterns, is_allowed
+from overlapper.audit.audit import Audit, PairAudit
 from overlapper.audit.robot import Robot
 from overlapper.audit.srdf import Names
-from overlapper.audit.verdicts import Audit, Verdict
 
 
 def findings(audit: Audit, expected: Sequence[Patterns], disabled: Mapping[Names, str]) -> list[str]:
@@ -18,7 +18,7 @@ def findings(audit: Audit, expected: Sequence[Patterns], disabled: Mapping[Names
     """
     unknown = {name for names in disabled for name in names} - set(audit.robot.link_names)
     sentences = [f"The SRDF file names the link {name!r}, which the robot does not have." for name in sorted(unknown)]
-    for each in audit.verdicts:
+    for each in audit.pairs:
         if not each.met or is_allowed(each.names, expected):
             continue
         names = " and ".join(each.names)
@@ -40,6 +40,6 @@ def remarks(robot: Robot) -> list[str]:
     return lines
 
 
-def _how_often(verdict: Verdict) -> str:
-    assert verdict.largest
-    return f"in {verdict.met:,} of {verdict.asked:,} configurations, at first in number {verdict.largest.number:,}"
+def _how_often(audited: PairAudit) -> str:
+    assert audited.largest
+    return f"in {audited.met:,} of {audited.asked:,} configurations, at first in number {audited.largest.number:,}"

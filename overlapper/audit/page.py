@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from overlapper import Placed
+from overlapper.audit.audit import Audit, PairAudit
 from overlapper.audit.kinematics import Array, Kinematics
 from overlapper.audit.robot import Robot, shape_keys
-from overlapper.audit.verdicts import Audit, Verdict
 
 Color = tuple[float, float, float, float]
 
@@ -18,9 +18,9 @@ MOST = 100  # poses that a page has at most, so that it opens at once
 SHARED = "#ff4fa3"  # a colour that the links do not have
 
 
-def shown(audit: Audit) -> list[Verdict]:
+def shown(audit: Audit) -> list[PairAudit]:
     """The pairs that a page shows, the largest volume first: they overlap, and are not adjacent."""
-    met = [each for each in audit.verdicts if each.largest and not each.pair.adjacent]
+    met = [each for each in audit.pairs if each.largest and not each.pair.adjacent]
     return sorted(met, key=_volume, reverse=True)[:MOST]
 
 
@@ -46,13 +46,13 @@ def write_page(audit: Audit, path: Path) -> None:
     recording.save(path)
 
 
-def _volume(verdict: Verdict) -> float:
-    return verdict.largest.contact.volume if verdict.largest else 0.0
+def _volume(audited: PairAudit) -> float:
+    return audited.largest.contact.volume if audited.largest else 0.0
 
 
-def _caption(verdict: Verdict) -> str:
-    often = f", {verdict.fraction[0]:.2%}" if verdict.fraction else ""
-    return f"{' and '.join(verdict.names)}{often}"
+def _caption(audited: PairAudit) -> str:
+    often = f", {audited.fraction[0]:.2%}" if audited.fraction else ""
+    return f"{' and '.join(audited.names)}{often}"
 
 
 @dataclass(frozen=True, slots=True)

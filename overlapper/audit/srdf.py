@@ -5,26 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
-from overlapper.audit.verdicts import Audit, Verdict
+from overlapper.audit.audit import Audit, PairAudit
 from overlapper.printable import first_line
 from overlapper.whole_file import beside
 
 Names = frozenset[str]
 
 
-def reason(verdict: Verdict) -> str | None:
+def reason(audited: PairAudit) -> str | None:
     """Why a pair need not be asked about; None if it must be."""
-    if verdict.pair.adjacent:
+    if audited.pair.adjacent:
         return "Adjacent"
-    return {"never": "Never", "always": "Always"}.get(verdict.status)
+    return {"never": "Never", "always": "Always"}.get(audited.status)
 
 
 def write_srdf(audit: Audit, path: Path) -> None:
     """Write <disable_collisions> for each pair that is adjacent, never overlaps or always does."""
     root = ElementTree.Element("robot", name=audit.robot.name)
-    for verdict in audit.verdicts:
-        if why := reason(verdict):
-            first, second = verdict.names
+    for audited in audit.pairs:
+        if why := reason(audited):
+            first, second = audited.names
             ElementTree.SubElement(root, "disable_collisions", link1=first, link2=second, reason=why)
     ElementTree.indent(root)
     with beside(path) as file:

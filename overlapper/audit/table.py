@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from overlapper.audit.verdicts import Audit, Pose, Verdict
+from overlapper.audit.audit import Audit, PairAudit, Pose
 from overlapper.tables.table import Row, Value
 from overlapper.tables.table_file import TABLES, origin
 
@@ -42,7 +42,7 @@ def write_table(audit: Audit, path: Path, settings: Mapping[str, Any], page: Map
     texts = {name: str(value) for name, value in settings.items()}
     table = TABLES[path.suffix](path, origin() | {"robot": audit.robot.name} | texts, COLUMNS)
     try:
-        table.write(_row(audit, verdict, page) for verdict in audit.verdicts)
+        table.write(_row(audit, audited, page) for audited in audit.pairs)
     except BaseException:
         table.leave()
         raise
@@ -52,27 +52,27 @@ def write_table(audit: Audit, path: Path, settings: Mapping[str, Any], page: Map
 def facts(audit: Audit, page: Mapping[tuple[int, int], str]) -> list[dict[str, Any]]:
     """The rows as JSON takes them; joints are objects."""
     made = []
-    for verdict in audit.verdicts:
-        row: dict[str, Any] = dict(_row(audit, verdict, page))
-        for name, pose in (("volume_joints", verdict.largest), ("depth_joints", verdict.deepest)):
+    for audited in audit.pairs:
+        row: dict[str, Any] = dict(_row(audit, audited, page))
+        for name, pose in (("volume_joints", audited.largest), ("depth_joints", audited.deepest)):
             row[name] = _joints(audit, pose) if pose else None
         made.append(row)
     return made
 
 
-def _row(audit: Audit, verdict: Verdict, page: Mapping[tuple[int, int], str]) -> Row:
-    fraction: tuple[Value, ...] = verdict.fraction or (None,) * 3
-    row: Row = {"nameA": verdict.names[0], "nameB": verdict.names[1], "adjacent": int(verdict.pair.adjacent)}
-    row |= {"status": verdict.status, "asked": verdict.asked, "overlapping": verdict.met}
+def _row(audit: Audit, audited: PairAudit, page: Mapping[tuple[int, int], str]) -> Row:
+    fraction: tuple[Value, ...] = audited.fraction or (None,) * 3
+    row: Row = {"nameA": audited.names[0], "nameB": audited.names[1], "adjacent": int(audited.pair.adjacent)}
+    row |= {"status": audited.status, "asked": audited.asked, "overlapping": audited.met}
     row |= dict(zip(("fraction", "fraction_low", "fraction_high"), fraction))
-    for name, pose in (("volume", verdict.largest), ("depth", verdict.deepest)):
+    for name, pose in (("volume", audited.largest), ("depth", audited.deepest)):
         row[f"{name}_configuration"] = pose.number if pose else None
         row[f"{name}_joints"] = json.dumps(_joints(audit, pose)) if pose else None
-    if verdict.largest and verdict.deepest:
-        shared = verdict.largest.contact
+    if audited.largest and audited.deepest:
+        shared = audited.largest.contact
         row |= {"volume_m3": shared.volume, "volume_error_m3": shared.volume_error}
-        row["depth_m"] = verdict.deepest.contact.depth
-    row["page"] = page.get(verdict.pair.links)
+        row["depth_m"] = audited.deepest.contact.depth
+    row["page"] = page.get(audited.pair.links)
     return {name: row.get(name) for name in COLUMNS}
 
 

@@ -1,4 +1,4 @@
-"""What was seen of pairs of links in some configurations, and how it adds up with what was seen in others."""
+"""Counts of overlaps of pairs of links, added up over configurations."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ Counts = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Largest:
-    """The largest `value` (p,) of each pair, and the first configuration `at` (p,) that has it; 0 and -1 of none."""
+    """The largest `value` (p,) of each pair, and the first configuration `at` (p,) that has it.
+
+    A pair that never overlapped has the value 0 at -1.
+    """
 
     value: Array
     at: Counts
 
     def __or__(self, other: Largest) -> Largest:
-        """The larger of two, and of equal ones what was seen first."""
+        """The larger value of each pair; of equal values, the earlier configuration."""
         first = (other.at >= 0) & ((self.at < 0) | (other.at < self.at))
         better = (other.value > self.value) | ((other.value == self.value) & first)
         return Largest(np.where(better, other.value, self.value), np.where(better, other.at, self.at))
@@ -27,10 +30,11 @@ class Largest:
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """Per pair of links, (p,) each.
+    """Counts of configurations, (p,) each, per pair of links.
 
-    They were `asked` for in so many configurations, and overlapped in `met` of them; `random_asked` and `random_met`
-    are those of the random ones. `volume` is in m³, summed over pairs of shapes, and `depth` in m, of the deepest.
+    A pair was `asked` for in so many configurations and overlapped in `met` of them. `random_asked` and `random_met`
+    count the random configurations alone. `volume` is in m³, summed over pairs of shapes. `depth` is in m, of the
+    deepest pair of shapes.
     """
 
     asked: Counts
@@ -42,12 +46,12 @@ class Tally:
 
     @classmethod
     def none(cls, pairs: int) -> Tally:
-        """Of no configuration."""
+        """The tally of no configuration."""
         zero, nothing = np.zeros(pairs, dtype=np.int64), Largest(np.zeros(pairs), np.full(pairs, -1))
         return cls(zero, zero, zero, zero, nothing, nothing)
 
     def __add__(self, other: Tally) -> Tally:
-        """The same in whatever order tallies are added."""
+        """The sum, which does not depend on the order of tallies."""
         return Tally(
             self.asked + other.asked,
             self.met + other.met,
@@ -59,8 +63,8 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """Overlaps of shapes: of which pairs of links, in which of some configurations, with which volume and depth."""
+class ShapeOverlaps:
+    """Overlaps of shapes: the place of the pair of links, the place of the configuration, volume and depth of each."""
 
     pairs: Counts
     rows: Counts
@@ -68,7 +72,7 @@ class Seen:
     depths: Array
 
     def tally(self, asked: NDArray[np.bool_], numbers: Counts, first_random: int) -> Tally:
-        """Of the configurations `numbers` (n,), in which the pairs that are `asked` (p,) were asked for.
+        """The tally of the configurations `numbers` (n,), in which the pairs `asked` (p,) were asked for.
 
         Links of several shapes may overlap several times in one configuration.
         """

@@ -29,7 +29,7 @@ from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet,
 from overlapper.printable import printable
 
 if TYPE_CHECKING:
-    from overlapper.audit.verdicts import Audit, Verdict
+    from overlapper.audit.audit import Audit, PairAudit
 
 LISTED = 20  # pairs at most
 CAPTION = (
@@ -111,12 +111,12 @@ def audit(
     try:
         with input_refusals(), quiet():
             from overlapper.audit.allowed import must_name_some
+            from overlapper.audit.audit import audit as look
             from overlapper.audit.findings import findings, remarks
             from overlapper.audit.page import addresses, write_page
             from overlapper.audit.robot import read_robot
             from overlapper.audit.srdf import read_srdf, write_srdf
             from overlapper.audit.table import facts, write_table
-            from overlapper.audit.verdicts import audit as look
             from overlapper.simulation.bullet.model_file import NotRead
             from overlapper.tables.outputs import can_be_written
 
@@ -137,7 +137,7 @@ def audit(
                     working,
                     lambda blocks, count: with_progress(blocks, robot.name, count),
                 )
-            if not found.verdicts:
+            if not found.pairs:
                 raise Refused(f"{robot} has no two links with shapes that could overlap")
             page = addresses(found, html) if html else {}
             if out:
@@ -165,29 +165,29 @@ def audit(
 def _show(found: Audit, wrong: list[str], written: list[Path]) -> None:
     from overlapper.audit.findings import remarks
 
-    met = [each for each in found.verdicts if each.met and not each.pair.adjacent]
+    met = [each for each in found.pairs if each.met and not each.pair.adjacent]
     if met:
         show(_list(found, sorted(met, key=lambda each: (-_often(each), each.names))))
     counts = {status: len(found.of_status(status)) for status in ("never", "sometimes", "always")}
-    adjacent = len(found.verdicts) - sum(counts.values())
+    adjacent = len(found.pairs) - sum(counts.values())
     words = [f"{adjacent:,} {'are' if adjacent != 1 else 'is'} adjacent"]
     words += [
         f"{count:,} {status} {'overlaps' if count == 1 else 'overlap'}" for status, count in counts.items() if count
     ]
-    links = len({link for each in found.verdicts for link in each.pair.links})
+    links = len({link for each in found.pairs for link in each.pair.links})
     say(
-        f"Of {len(found.verdicts):,} pairs of {links:,} links, {', '.join(words)} in {found.sampling.count:,} "
+        f"Of {len(found.pairs):,} pairs of {links:,} links, {', '.join(words)} in {found.sampling.count:,} "
         "configurations."
     )
     for line in (*remarks(found.robot), *wrong, *(f"Written: {path}" for path in written)):
         say(line)
 
 
-def _often(verdict: Verdict) -> float:
-    return verdict.fraction[0] if verdict.fraction else verdict.met / verdict.asked
+def _often(audited: PairAudit) -> float:
+    return audited.fraction[0] if audited.fraction else audited.met / audited.asked
 
 
-def _list(found: Audit, met: list[Verdict]) -> Table:
+def _list(found: Audit, met: list[PairAudit]) -> Table:
     """The pairs that overlap most often, two lines each."""
     unit = volume_unit(max(each.largest.contact.volume for each in met if each.largest))
     left_out = f" The {LISTED} of {len(met):,} pairs that overlap most often." if len(met) > LISTED else ""

@@ -24,7 +24,7 @@ from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet,
 from overlapper.printable import printable
 
 if TYPE_CHECKING:
-    from overlapper.audit.clashes import Body, Clash, Clashes
+    from overlapper.audit.clashes import Clash, Clashes, MeshBody
 
 IN_MATRIX = 12  # bodies at most, so that a terminal holds it
 LISTED = 20  # pairs at most
@@ -110,7 +110,7 @@ def clashes(
     raise typer.Exit(code)
 
 
-def body_facts(body: Body) -> dict[str, Any]:
+def body_facts(body: MeshBody) -> dict[str, Any]:
     """What stands for a body, as JSON takes it."""
     return {
         "name": body.name,
@@ -210,7 +210,7 @@ def _depth(pair: Clash) -> str:
     return "" if pair.depth is None else f"{1e3 * pair.depth:.3g}"
 
 
-def parts_text(body: Body) -> str:
+def parts_text(body: MeshBody) -> str:
     """How many convex parts stand for a body, and how much more volume they have than its mesh."""
     if body.way == "convex":
         return "itself"

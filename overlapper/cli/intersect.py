@@ -108,10 +108,10 @@ def _of_meshes(sources: Sequence[str], method: str) -> tuple[dict[str, Any], lis
     import numpy as np
 
     from overlapper.audit.clashes import clashes
-    from overlapper.polytopes.mesh_file import Part, read_triangles
+    from overlapper.polytopes.mesh_file import MeshPart, read_triangles
 
     with quiet():
-        found = clashes([(source, Part(source, read_triangles(source), np.eye(4))) for source in sources])
+        found = clashes([(source, MeshPart(source, read_triangles(source), np.eye(4))) for source in sources])
     if found.failures:
         raise Refused(found.failures[0])
     for remark in found.remarks:

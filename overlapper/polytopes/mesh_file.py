@@ -29,7 +29,7 @@ try:
 except ImportError as error:
     raise ImportError(f"overlapper.polytopes.mesh_file needs {hint('trimesh')}") from error
 
-__all__ = ["NotConvexWarning", "Part", "check_ending", "read_hull", "read_parts", "read_triangles", "write_mesh"]
+__all__ = ["MeshPart", "NotConvexWarning", "check_ending", "read_hull", "read_parts", "read_triangles", "write_mesh"]
 
 Array = NDArray[np.float64]
 
@@ -59,8 +59,8 @@ class NotConvexWarning(UserWarning):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """A body of a mesh file.
+class MeshPart:
+    """A body of a mesh file, or one instance of it in an assembly.
 
     `name` is that of its node in the scene, "" if the file is one body. `triangles` (t, 3, 3) are its corners in the
     frame and unit of the mesh, and `transform` (4, 4) takes these to the world, in m.
@@ -75,7 +75,7 @@ class Part:
         return np.asarray(points @ self.transform[:3, :3].T + self.transform[:3, 3])
 
 
-def read_parts(path: str | Path, units: str = "m") -> list[Part]:
+def read_parts(path: str | Path, units: str = "m") -> list[MeshPart]:
     """The bodies of a mesh file: one of OBJ, OFF, PLY and STL, each instance in the scene of glTF, 3MF and STEP.
 
     `units`, a name that trimesh knows, are those of a file that does not say its own. STEP is read by OpenCASCADE, in a
@@ -97,7 +97,7 @@ def read_parts(path: str | Path, units: str = "m") -> list[Part]:
             reason, parts = worker.receive(SECONDS)
             if reason:
                 raise ValueError(reason)
-            return [Part(*each) for each in parts]
+            return [MeshPart(*each) for each in parts]
     except Ended as ended:
         raise ValueError(f"{path} is not a mesh that can be read: the process that read it {ended}") from None
     except Exception as error:  # of many kinds, as every format has a parser of its own
@@ -133,7 +133,7 @@ def _answers(request: tuple[Path, str]) -> Iterator[tuple[str, list[tuple[str, A
         yield first_line(error), []
 
 
-def _parts(path: Path, units: str) -> list[Part]:
+def _parts(path: Path, units: str) -> list[MeshPart]:
     assembly = path.suffix.lower() in ASSEMBLIES
     # The surfaces of several materials are one body's.
     options: dict[str, Any] = {"merge_primitives": True} if path.suffix.lower() in (".glb", ".gltf") else {}
@@ -147,7 +147,7 @@ def _parts(path: Path, units: str) -> list[Part]:
         else:
             meshes = [("", scene.to_mesh(), np.eye(4))]
         parts = [
-            Part(name, np.asarray(mesh.triangles, dtype=float), to_metres @ matrix)
+            MeshPart(name, np.asarray(mesh.triangles, dtype=float), to_metres @ matrix)
             for name, mesh, matrix in meshes
             if len(getattr(mesh, "faces", ()))  # and not lines or points alone
         ]

@@ -12,12 +12,12 @@ import pytest
 from pages import Film
 from robots import joint, limit, link, mimic, turntable, urdf
 
+from overlapper.audit.audit import audit
 from overlapper.audit.findings import remarks
 from overlapper.audit.page import write_page
 from overlapper.audit.robot import read_robot
 from overlapper.audit.srdf import read_srdf
 from overlapper.audit.table import COLUMNS
-from overlapper.audit.verdicts import audit
 from overlapper.cli.audit import audit as command
 from overlapper.cli.refusals import Refused
 from overlapper.cli.shapes import shapes

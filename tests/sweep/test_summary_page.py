@@ -64,6 +64,16 @@ def test_a_page_of_samples_and_settings_has_maps_and_whole_commands():
     assert page.command(sweep, "my scene.py", row, Path("a.html")).startswith("overlapper view ")
 
 
+@pytest.mark.usefixtures("balls")
+def test_the_summary_counts_the_tasks_in_which_something_overlaps():
+    grids = ["apart=0.15,0.199,0.201,0.25,0.3"]
+    swept("runs", grids, steps=1)
+    with sweep_of(grids, steps=1).opened(Path("runs")) as store:
+        page.write(sweep_of(grids, steps=1), store, "balls.py")
+    text = Path("runs/summary.html").read_text()
+    assert "5 of 5 tasks are done over apart (5). Something overlaps in 2 of them." in text
+
+
 def test_the_summary_names_what_is_to_be_installed(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
     with pytest.raises(ImportError, match=r"^the summary of a sweep needs matplotlib: pip install matplotlib$"):

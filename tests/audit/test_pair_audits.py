@@ -13,11 +13,11 @@ from overlapper import (
     Placed,
     overlap,
 )
-from overlapper.audit import verdicts
+from overlapper.audit import audit as auditing
+from overlapper.audit.audit import audit, wilson
 from overlapper.audit.examiner import Examiner, prepared
 from overlapper.audit.robot import read_robot
 from overlapper.audit.sampling import BLOCK, Sampling
-from overlapper.audit.verdicts import audit, wilson
 from overlapper.jobs.cluster import Cluster
 from overlapper.jobs.hand import Failed
 from overlapper.jobs.processes import Processes
@@ -26,7 +26,7 @@ from overlapper.simulation.bullet.model_file import load
 
 
 def by_names(found):
-    return {each.names: each for each in found.verdicts}
+    return {each.names: each for each in found.pairs}
 
 
 @pytest.fixture(scope="module")
@@ -85,9 +85,9 @@ def test_what_overlaps_no_deeper_than_asked_does_not(table):
 
 
 def test_processes_do_not_change_a_bit(table, monkeypatch):
-    monkeypatch.setattr(verdicts, "FEW", 0)
+    monkeypatch.setattr(auditing, "FEW", 0)
     one, two = (audit(table, 2 * BLOCK + 100, seed=3, engine=engine) for engine in (None, Processes(2)))
-    for a, b in zip(one.verdicts, two.verdicts, strict=True):
+    for a, b in zip(one.pairs, two.pairs, strict=True):
         assert (a.names, a.met, a.asked, a.fraction) == (b.names, b.met, b.asked, b.fraction)
         if a.largest:
             assert (a.largest.number, a.deepest.number) == (b.largest.number, b.deepest.number)
@@ -96,11 +96,11 @@ def test_processes_do_not_change_a_bit(table, monkeypatch):
 
 def test_a_cluster_says_the_same(table, monkeypatch):
     pytest.importorskip("ray")
-    monkeypatch.setattr(verdicts, "FEW", 0)
+    monkeypatch.setattr(auditing, "FEW", 0)
     with closing(Cluster()) as cluster:
         far = audit(table, BLOCK + 100, seed=3, engine=cluster)
     here = audit(table, BLOCK + 100, seed=3)
-    assert [(each.names, each.met) for each in far.verdicts] == [(each.names, each.met) for each in here.verdicts]
+    assert [(each.names, each.met) for each in far.pairs] == [(each.names, each.met) for each in here.pairs]
 
 
 def test_a_block_that_fails_is_told(table, monkeypatch):
@@ -110,7 +110,7 @@ def test_a_block_that_fails_is_told(table, monkeypatch):
         def outcomes(self, job, items, limit=None):
             yield 7, Failed("died", "its process ended with signal SIGKILL", "words")
 
-    monkeypatch.setattr(verdicts, "FEW", 0)
+    monkeypatch.setattr(auditing, "FEW", 0)
     with pytest.raises(
         RuntimeError, match=r"^configurations of block 7: its process ended with signal SIGKILL\nwords$"
     ):
@@ -137,12 +137,12 @@ def test_pairs_are_those_that_pybullet_and_bodies_find_one_configuration_at_a_ti
             volumes[each.linkA + 1, each.linkB + 1] += each.overlap.volume
         met.update(volumes.keys())
         largest |= volumes
-    for each in found.verdicts:
+    for each in found.pairs:
         if each.asked == 150:
             assert each.met == met[each.pair.links]
             if each.met and len(each.largest.contact.contacts) == 1:
                 assert each.largest.contact.volume == pytest.approx(largest[each.pair.links], rel=1e-9)
-    assert sum(each.status == "sometimes" for each in found.verdicts) > 3
+    assert sum(each.status == "sometimes" for each in found.pairs) > 3
 
 
 def test_intervals_are_those_of_wilson():

@@ -1,4 +1,4 @@
-"""What an audit says of each pair of links: whether, how often, how much and how deep they overlap, and where."""
+"""An audit of a robot: whether, how often, how much and how deep each pair of links overlaps, and where."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ NORMAL_95 = 1.959963984540054  # between minus this and this are 95 % of a norma
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """The configuration of that number: `values` (m,) by the columns of the robot, in rad and m.
+    """A configuration by its number: `values` (m,) by the columns of the robot, in rad and m.
 
-    `contact` is what the two links share in it.
+    `contact` is what the two links share in this configuration.
     """
 
     number: int
@@ -39,12 +39,13 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
-    """A pair of links, by their `names`, and what became of it in the configurations in which it was asked for.
+class PairAudit:
+    """A pair of links, by their `names`, and in how many configurations it overlapped.
 
-    It overlapped in `met` of `asked`: "never", "sometimes" or "always". `fraction` is that of the random ones, with the
-    interval of Wilson that holds it with 95 %; None if there was no random one. `largest` is the configuration with the
-    largest volume, summed over the pairs of shapes, and `deepest` the one with the largest depth.
+    The pair overlapped in `met` of `asked` configurations: "never", "sometimes" or "always". `fraction` is the fraction
+    of the random configurations, with the bounds of its 95 % Wilson interval; None without random configurations.
+    `largest` is the configuration with the largest volume, summed over the pairs of shapes. `deepest` is the
+    configuration with the largest depth.
     """
 
     pair: LinkPair
@@ -59,14 +60,14 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Audit:
-    """A robot, how it was looked at, and a verdict on each pair of links that have shapes, in their order."""
+    """A robot, its sampled configurations, and the pairs of links that have shapes, in their order."""
 
     robot: Robot
     sampling: Sampling
-    verdicts: list[Verdict]
+    pairs: list[PairAudit]
 
-    def of_status(self, status: Status, adjacent: bool = False) -> list[Verdict]:
-        return [each for each in self.verdicts if each.status == status and each.pair.adjacent == adjacent]
+    def of_status(self, status: Status, adjacent: bool = False) -> list[PairAudit]:
+        return [each for each in self.pairs if each.status == status and each.pair.adjacent == adjacent]
 
 
 def audit(
@@ -78,17 +79,17 @@ def audit(
     engine: Engine | None = None,
     progress: Callable[[Iterator[Tally], int], Iterable[Tally]] = lambda blocks, count: blocks,
 ) -> Audit:
-    """Look at a robot in so many configurations; the same of the same arguments, however many `processes` there are.
+    """Audit a robot in so many configurations. The answer does not depend on the engine.
 
-    `tolerance` is that of `overlapper.overlap`, and links share nothing that overlap by a depth of `least_depth` (m) or
-    less. `progress` passes on what is seen block by block, of which there are so many. ValueError for less than one
-    configuration, or a negative seed.
+    `tolerance` is that of `overlapper.overlap`. Overlaps of a depth of `least_depth` (m) or less do not count.
+    `progress(blocks, count)` passes on the tallies of the `count` blocks. ValueError for less than one configuration,
+    or a negative seed.
     """
     sampling = Sampling(robot, configurations, seed)
     examiner = Examiner(robot, sampling, tolerance, least_depth)
     tally = reduce(add, progress(_tallies(examiner, engine), len(sampling.blocks)))
     sights = _Sights(examiner)
-    verdicts = []
+    audited = []
     for k, pair in enumerate(examiner.pairs):
         asked, met = int(tally.asked[k]), int(tally.met[k])
         status: Status = "never" if not met else "always" if met == asked else "sometimes"
@@ -97,8 +98,8 @@ def audit(
         places = (int(tally.volume.at[k]), int(tally.depth.at[k])) if met else ()
         largest, deepest = [sights.of(pair, place) for place in places] or (None, None)
         names = robot.link_names[pair.links[0]], robot.link_names[pair.links[1]]
-        verdicts.append(Verdict(pair, names, status, asked, met, fraction, largest, deepest))
-    return Audit(robot, sampling, verdicts)
+        audited.append(PairAudit(pair, names, status, asked, met, fraction, largest, deepest))
+    return Audit(robot, sampling, audited)
 
 
 def wilson(met: int, asked: int) -> tuple[float, float, float]:
@@ -111,7 +112,7 @@ def wilson(met: int, asked: int) -> tuple[float, float, float]:
 
 
 def _tallies(examiner: Examiner, engine: Engine | None) -> Iterator[Tally]:
-    """What is seen in each block, in whatever order."""
+    """The tally of each block, in any order."""
     blocks = range(len(examiner.sampling.blocks))
     if engine is None or len(blocks) <= FEW:
         yield from map(examiner, blocks)
@@ -124,7 +125,7 @@ def _tallies(examiner: Examiner, engine: Engine | None) -> Iterator[Tally]:
 
 
 class _Sights:
-    """What two links share in a configuration, looked at again with all that can be asked of it."""
+    """Measures two links in one configuration again, with all that can be asked of an overlap."""
 
     def __init__(self, examiner: Examiner) -> None:
         self._examiner, tree = examiner, examiner.robot.tree
