@@ -123,7 +123,7 @@ struct Stack {
   std::optional<Line> low_plane, high_plane;  ///< planes parallel to the slices, if such end the stack
   Vec3 l, m, n, t;                            ///< the axes, in the world
   Point shear;                                ///< what t has along l and m
-  const View* view = nullptr;                 ///< if anything is looked at
+  std::optional<View> view;                   ///< if anything is looked at
   const quadric::Stretch* stretch = nullptr;  ///< of an ellipsoid: what makes the ball and all else out of the world
 
   /// Of a part of a plane whose normal times its area that is, along l, m and n.

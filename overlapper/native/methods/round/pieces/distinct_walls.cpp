@@ -1,0 +1,119 @@
+#include "methods/round/pieces/distinct_walls.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace overlapper::pieces {
+namespace {
+
+/// The sine between two walls up to which lines in doubles leave too much open of where the walls cross.
+constexpr double kFolded = 1e-10;
+/// The number of pairs of such walls up to which pieces are cut there: each pair makes two pieces of one.
+constexpr size_t kMostFolds = 3;
+
+/// Whether two planes are one within the extent. Their slacks are `apart`, and the difference of their normals is
+/// `tilt` long. The volume between two planes that differ and are taken for one is an error.
+bool coincide(double apart, double tilt, const PieceSetting& setting, double& error) {
+  if (apart <= 1e-24 * setting.extent && tilt <= 1e-24) return true;
+  const double gap = apart + tilt * setting.extent;
+  if (!(gap <= setting.layer)) return false;
+  error += gap * setting.surface;
+  return true;
+}
+
+/// Calls use(i, j) with every two different walls whose normals may be opposite, for `side` -1, or equal, for 1. Pairs
+/// come both ways round, until a call returns true. Such normals are equally long along a line that no body prefers: of
+/// many walls, only those next to each other along that line are looked at.
+template <class Walls, class Use>
+bool any_two(Walls&& walls, double side, const PieceSetting& setting, Use use) {
+  thread_local std::vector<std::pair<double, int>> of_thread;
+  std::vector<std::pair<double, int>>& by_length = of_thread;  // every use of what is a thread's own looks for it
+  constexpr Vec3 kAcross{0.3141, 0.5926, 0.7417};
+  const double equal = std::max(1e-12, 2 * setting.layer / setting.extent);  // beyond the rounding of these lengths
+  constexpr size_t kMany = 24;
+  by_length.clear();
+  for (int i = 0; i < static_cast<int>(walls.size()); ++i)
+    by_length.push_back({dot(kAcross, rounded(walls[i].normal)), i});
+  const bool many = walls.size() > kMany;
+  if (many) std::ranges::sort(by_length);
+  for (const auto& [length, i] : by_length) {
+    const double least = side * length - equal, most = side * length + equal;
+    auto other = many ? std::ranges::lower_bound(by_length, std::pair{least, -1}) : by_length.begin();
+    for (; other != by_length.end() && !(many && other->first > most); ++other)
+      if (other->first >= least && other->first <= most && other->second != i && use(walls[i], walls[other->second]))
+        return true;
+  }
+  return false;
+}
+
+/// 1 if the first of two walls is the nearer all over what it leaves, -1 if nowhere, 0 if that is not sure.
+int nearer_all_over(const Fold& fold, std::span<const Wall> walls, std::span<const Round> rounds, double extent) {
+  const Vec3 g = rounded(fold.nearer.normal), n = rounded(walls[fold.first].normal);
+  const double slack = fold.nearer.slack.head;
+  double most = extent, least = -extent;
+  for (const Round& r : rounds) {
+    if (!r.ball) continue;
+    // The rim of the cap that the wall leaves reaches farthest, unless the ball itself does.
+    const Vec3 c = rounded(r.centre);
+    const double level = (walls[fold.first].slack - dot(walls[fold.first].normal, r.centre)).head, up = dot(g, n);
+    const double rim = std::sqrt(std::max(0.0, (r.radius - level) * (r.radius + level)));
+    const double across = std::sqrt(std::max(0.0, 1 - up * up)), middle = dot(g, c);
+    const auto reach = [&](double side) {
+      return side * up * r.radius <= level ? r.radius : side * up * level + rim * across;
+    };
+    most = std::min(most, middle + reach(1)), least = std::max(least, middle - reach(-1));
+  }
+  const double margin = 1e-9 * (most - least) + 1e-13 * extent;
+  return slack > most + margin ? 1 : slack < least - margin ? -1 : 0;
+}
+
+}  // namespace
+
+bool is_flat(std::span<const Wall> walls, const PieceSetting& setting, double& error) {
+  return any_two(walls, -1, setting, [&](const Wall& a, const Wall& b) {
+    return coincide(std::max(0.0, (a.slack + b.slack).head), norm(rounded(a.normal + b.normal)), setting, error);
+  });
+}
+
+void find_repeated(DistinctWalls& distinct, const PieceSetting& setting, double& error) {
+  std::vector<Wall>& walls = distinct.walls;
+  distinct.instead.assign(walls.size(), DistinctWalls::kItself);
+  distinct.folded = false;
+  any_two(walls, 1, setting, [&](Wall& wall, const Wall& other) {
+    if (wall.owner == DistinctWalls::kSuperseded || other.owner == DistinctWalls::kSuperseded) return false;
+    const bool cut = wall.owner == slicing::kCut, other_is_cut = other.owner == slicing::kCut;
+    const double outer = (wall.slack - other.slack).head, tilt = norm(rounded(other.normal - wall.normal));
+    const bool first = std::abs(outer) > 1e-24 * setting.extent ? outer > 0 : &other < &wall;
+    if (!(cut == other_is_cut ? first : cut)) return false;
+    if (coincide(std::abs(outer), tilt, setting, error)) {
+      wall.owner = DistinctWalls::kSuperseded;
+      distinct.instead[&wall - walls.data()] = static_cast<int>(&other - walls.data());
+    } else {
+      distinct.folded = distinct.folded || tilt < kFolded;
+    }
+    return false;
+  });
+}
+
+std::optional<Fold> find_fold(std::vector<Wall>& walls, std::span<const Round> rounds, double extent) {
+  std::optional<Fold> found;
+  size_t folds = 0;
+  for (size_t i = 0; i < walls.size(); ++i)
+    for (size_t j = i + 1; j < walls.size(); ++j) {
+      const Wall &a = walls[i], &b = walls[j];
+      const WideVector apart = b.normal - a.normal;
+      const DoubleDouble tilt = norm(apart);
+      if (!(tilt.head > 1e-24 && tilt.head < kFolded) || (a.owner == slicing::kCut && b.owner == slicing::kCut))
+        continue;
+      const Fold fold{i, j, {apart / tilt, (b.slack - a.slack) / tilt, slicing::kCut}};
+      if (const int nearer = nearer_all_over(fold, walls, rounds, extent); nearer != 0) {
+        walls.erase(walls.begin() + static_cast<std::ptrdiff_t>(nearer > 0 ? j : i));
+        return find_fold(walls, rounds, extent);
+      }
+      if (!found) found = fold;
+      ++folds;
+    }
+  return folds <= kMostFolds ? found : std::nullopt;
+}
+
+}  // namespace overlapper::pieces

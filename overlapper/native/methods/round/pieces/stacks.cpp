@@ -1,0 +1,199 @@
+#include "methods/round/pieces/stacks.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "geometry/scratch.h"
+#include "methods/round/slicing/stack.h"
+#include "methods/round/slicing/whole_stack.h"
+
+namespace overlapper::pieces {
+namespace {
+
+using slicing::Integrals;
+using slicing::Stack;
+
+/// The fraction of a volume that may stay open before rules are made finer.
+constexpr double kClosed = 1e-12;
+/// The fraction of all else that is measured that a piece among many may leave open: what they leave open adds up.
+constexpr double kShare = 0.02;
+/// The fraction of a piece that may stay open where its centroid tells whether it lies outside.
+constexpr double kTold = 1e-6;
+
+/// Of coordinates (x, y, t).
+Vec3 in_world(const Stack& stack, Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.t; }
+
+/// The best sums over stacks of one piece.
+struct BestSum {
+  slicing::Sum best, tried;
+  double open = 0;  ///< m³: what may be missing of the best
+  slicing::DrawnIntervals intervals;
+};
+
+/// What a piece is measured with.
+struct PieceContext {
+  const SlicedPiece& piece;
+  const PieceSetting& setting;
+  const Sums& sums;  ///< over the pieces before
+
+  /// The size beside which a piece may be open or inexact.
+  double share_of(double size) const { return piece.around ? kShare * size : size; }
+  bool closed(const BestSum& sum, double part = 1) const {
+    return sum.open <= part * kClosed * (share_of(sums.totals.volume) + sum.best.integrals.volume);
+  }
+  /// Pieces whose walls leave something there are convex, and reach no farther.
+  bool outside(Vec3 centroid) const { return setting.common && setting.common->excludes(centroid + piece.offset); }
+};
+
+/// The view of the patch in coordinates of the stack.
+slicing::View view_of(const Stack& stack, const PatchView& seen, Vec3 offset) {
+  slicing::View view;
+  view.owner = seen.owner;
+  view.rest = stack.ball >= 0 && stack.quadric[stack.ball].owner == seen.owner;
+  view.u0 = seen.u0 + dot(offset, seen.u), view.v0 = seen.v0 + dot(offset, seen.v);
+  view.u = {dot(stack.l, seen.u), dot(stack.m, seen.u), dot(stack.t, seen.u)};
+  view.v = {dot(stack.l, seen.v), dot(stack.m, seen.v), dot(stack.t, seen.v)};
+  const double side = view.rest ? -1 : 1;
+  view.normal = side * Vec3{dot(stack.l, seen.normal), dot(stack.m, seen.normal), dot(stack.n, seen.normal)};
+  return view;
+}
+
+/// The stack of one of the ways to lay slices; nothing where there are not so many.
+std::optional<Stack> stack_of(const PieceContext& at, int way) {
+  const SlicedPiece& piece = at.piece;
+  std::optional<Stack> stack = slicing::stack_of(piece.rounds, piece.walls, piece.extent, way);
+  if (!stack) return std::nullopt;
+  stack->stretch = at.setting.stretch;
+  if (piece.around) {
+    const auto [least, most] = piece.around->range(stack->n);
+    const double here = dot(piece.offset, stack->n), margin = 1e-9 * (most - least) + 1e-13 * piece.extent;
+    stack->low = std::max(stack->low, least - here - margin);
+    stack->high = std::min(stack->high, most - here + margin);
+  }
+  if (at.sums.patch) stack->view = view_of(*stack, at.setting.view, piece.offset);
+  return stack;
+}
+
+/// Returns by what factor less is open than before.
+double keep_better(const Stack& stack, const PieceContext& at, bool few, double strictness, BestSum& sum) {
+  const Totals& before = at.sums.totals;
+  const double volume = at.share_of(before.volume), area = at.share_of(before.area);
+  const double open = slicing::integrate_whole(stack, sum.intervals, volume, area, few, strictness, sum.tried);
+  const double ratio = open / sum.open;
+  if (open < sum.open) sum.open = open, std::swap(sum.best, sum.tried);
+  return ratio;
+}
+
+void refine(const Stack& stack, const PieceContext& at, BestSum& sum) {
+  if (!at.closed(sum) && !at.setting.stretch) keep_better(stack, at, false, 0, sum);
+  // The rules end where the volume is exact. Where areas are not yet, the surface does not close.
+  if (!at.closed(sum) && !slicing::find_drawn_intervals(stack, true, sum.intervals)) return;
+  for (double strictness = 1; strictness < 1e9 && !at.closed(sum); strictness *= 1e3)
+    if (!(keep_better(stack, at, false, strictness, sum) < 0.5) && strictness > 1e3) break;
+}
+
+/// Where a piece that is small beside its way from its point, or as thin along one of the axes, has more digits:
+/// nothing if that point is near it.
+std::optional<Vec3> nearer_point(const Stack& stack, const SlicedPiece& piece, const Integrals& s) {
+  const Vec3 mean = s.first / s.volume, offset = in_world(stack, mean);
+  const Vec3 away = scaled(mean, mean), spread = s.squares / s.volume - away;
+  const bool far = away.x > 25 * spread.x || away.y > 25 * spread.y || away.z > 25 * spread.z;
+  if (piece.near || !far || !(norm(offset) <= piece.extent)) return std::nullopt;
+  return offset;
+}
+
+bool add_near(const SlicedPiece& piece, Vec3 step, const PieceSetting& setting, Sums& sums) {
+  SlicedPiece nearer = piece.moved(step);
+  nearer.near = true;
+  return add_slices(nearer, setting, sums);
+}
+
+/// Whether nothing is farther away than anything may be. If not, it is rounding.
+bool sound(const Stack& stack, const Integrals& s, double extent) {
+  const double far = 8 * extent * (1 + std::abs(stack.shear.x) + std::abs(stack.shear.y)), volume = std::abs(s.volume);
+  return norm(s.first) <= far * volume && std::abs(s.squares.x + s.squares.y + s.squares.z) <= far * far * volume;
+}
+
+void add_sum(const Stack& stack, const slicing::Sum& sum, Vec3 offset, const quadric::Stretch* stretch, Sums& sums) {
+  const Integrals& s = sum.integrals;
+  Totals& totals = sums.totals;
+  const auto turned = [&](Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.n; };
+  totals += s.along({stack.l, stack.m, stack.t}).seen_from(offset);
+  if (stretch)
+    totals.sizes += Moments{s.volume, abs(s.first), s.squares, abs(s.products)}
+                        .along({abs(stack.l), abs(stack.m), abs(stack.t)})
+                        .seen_from(abs(offset));
+  totals.volume += s.correction;
+  totals.error += sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
+  totals.area += s.area, totals.first_area += s.first_area, totals.area_error += sum.area_error;
+  totals.border += s.border;
+  const Vec3 pull = turned(s.pull[0]);
+  totals.pull += pull;
+  totals.moment += turned(s.moment[0]) + (stretch ? stretch->moment(offset, pull) : cross(offset, pull));
+  totals.unbalanced += turned(s.pull[0] + s.pull[1]);
+  if (sums.patch) sums.patch->add(s.seen[0], s.seen[1], s.seen[2], s.seen[3], s.seen[4], s.seen[5]);
+}
+
+/// Looks at a stack closely if the setting says so. Where more changes, closely, than can be told, the middle of every
+/// interval says more.
+bool look_at(const Stack& stack, bool closely, slicing::DrawnIntervals& intervals) {
+  return slicing::find_drawn_intervals(stack, closely, intervals) ||
+         (closely && slicing::find_drawn_intervals(stack, false, intervals));
+}
+
+/// Slices across other axes hide less of where surfaces pass or touch each other. `stack` becomes the one of the best
+/// sum. True if there is one that can be told.
+bool try_other_axes(const PieceContext& at, Stack& stack, BestSum& sum) {
+  bool told = false;
+  for (int other = 1; other < slicing::kAxes && !at.closed(sum, 2); ++other) {
+    std::optional<Stack> across = stack_of(at, other);
+    if (!across) break;
+    if (!slicing::find_drawn_intervals(*across, true, sum.intervals) || sum.intervals.intervals.empty()) continue;
+    told = true;
+    const double before = sum.open;
+    refine(*across, at, sum);
+    if (sum.open < before) stack = *across;
+  }
+  return told;
+}
+
+}  // namespace
+
+SlicedPiece SlicedPiece::moved(Vec3 step) const {
+  SlicedPiece result = *this;
+  if (step == Vec3{}) return result;
+  for (Round& r : result.rounds) r.centre = r.centre - wide(step);
+  for (Wall& wall : result.walls) wall.slack = wall.slack - dot(wall.normal, wide(step));
+  result.offset += step, result.extent += norm(step);
+  return result;
+}
+
+bool add_slices(const SlicedPiece& piece, const PieceSetting& setting, Sums& sums) {
+  const PieceContext at{piece, setting, sums};
+  std::optional<Stack> stack = stack_of(at, 0);
+  if (!stack) return false;
+  const Scratch<BestSum> scratch;
+  BestSum& sum = *scratch;
+  sum.best.integrals = {}, sum.open = std::numeric_limits<double>::infinity();
+  const bool told = look_at(*stack, setting.closely, sum.intervals);
+  if (told && sum.intervals.intervals.empty()) return true;
+  if (told) {
+    // Of few nodes, the terms of a stretched area tell too little.
+    keep_better(*stack, at, !setting.stretch, 0, sum);
+    if (!at.closed(sum, 0.1))
+      if (const auto step = nearer_point(*stack, piece, sum.best.integrals))
+        if (add_near(piece, *step, setting, sums)) return true;
+    refine(*stack, at, sum);
+  }
+  if (!try_other_axes(at, *stack, sum) && !told) return false;
+  // Slices that are not sure at all may be those of another piece.
+  const double volume = sum.best.integrals.volume;
+  if (sum.open <= kTold * volume && at.outside(in_world(*stack, sum.best.integrals.first) / volume)) return true;
+  sums.totals.open += sum.open;
+  if (sound(*stack, sum.best.integrals, piece.extent)) add_sum(*stack, sum.best, piece.offset, setting.stretch, sums);
+  else sums.totals.open += std::abs(volume);
+  return true;
+}
+
+}  // namespace overlapper::pieces

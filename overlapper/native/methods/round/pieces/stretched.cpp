@@ -1,0 +1,141 @@
+#include <limits>
+
+#include "geometry/scratch.h"
+#include "methods/round/pieces/piece.h"
+#include "methods/round/pieces/result.h"
+
+namespace overlapper::pieces {
+namespace {
+
+/// Makes a ball of radius 1 of an ellipsoid, and of pieces what that makes of them, turned to the axes of the
+/// ellipsoid.
+void into_ball(const Placed& ellipsoid, Vec3 h, Pieces& pieces) {
+  const WideMatrix rotation = wide_rotation(ellipsoid.orientation);
+  for (Round& r : pieces.rounds) {
+    const WideVector centre = apply_transposed(rotation, r.centre);
+    r.centre = {centre.x / DoubleDouble{h.x}, centre.y / DoubleDouble{h.y}, centre.z / DoubleDouble{h.z}};
+  }
+  for (Wall& wall : pieces.walls) {
+    const WideVector own = apply_transposed(rotation, wall.normal);
+    const WideVector normal{DoubleDouble{h.x} * own.x, DoubleDouble{h.y} * own.y, DoubleDouble{h.z} * own.z};
+    const DoubleDouble length = norm(normal);
+    wall.normal = normal / length, wall.slack = wall.slack / length;
+  }
+}
+
+/// The same view, in a ball that is turned and stretched to the ellipsoid. Coordinates there count from `origin`.
+PatchView stretched_view(const PatchView& view, const Mat3& turn, const quadric::Stretch& stretch, Vec3 origin) {
+  PatchView result;
+  result.owner = view.owner;
+  result.u = scaled(stretch.half_axes, apply_transposed(turn, view.u));
+  result.v = scaled(stretch.half_axes, apply_transposed(turn, view.v));
+  result.normal = stretch.normal(apply_transposed(turn, view.normal));
+  result.u0 = view.u0 + dot(origin, result.u), result.v0 = view.v0 + dot(origin, result.v);
+  return result;
+}
+
+struct StretchedPieces {
+  Pieces of_flat, of_ellipsoid;
+};
+
+/// The sums of a ball and planes that are best.
+struct BallSums {
+  Sums sums;
+  double error = std::numeric_limits<double>::infinity();
+  Vec3 moved;  ///< where they count from
+};
+
+/// Moves the point that coordinates count from.
+void move(std::span<Round> rounds, std::vector<Wall>& walls, Vec3 step) {
+  for (Round& r : rounds) r.centre = r.centre - wide(step);
+  for (Wall& wall : walls) wall.slack = wall.slack - dot(wall.normal, wide(step));
+}
+
+/// About the centroid, other slices are taken, which may do where the first do not.
+BallSums best_of_ball(std::span<Round> rounds, std::vector<Wall>& walls, const SlicedPair& pair, int owner,
+                      const Mat3& turn, const quadric::Stretch& stretch) {
+  BallSums best;
+  PieceSetting setting;
+  setting.stretch = &stretch;
+  for (int attempt = 0; attempt < 2 && !(best.error <= kMostOpen * best.sums.totals.volume); ++attempt) {
+    const Vec3 step = attempt > 0 ? best.sums.totals.first / best.sums.totals.volume : Vec3{};
+    if (!(norm(step) <= 2)) break;
+    move(rounds, walls, step);
+    setting.extent = norm(rounded(rounds[0].centre)) + 1;
+    Sums sums;
+    if (pair.patch) {
+      sums.patch = *pair.patch;
+      setting.view = stretched_view(PatchView(*pair.patch, owner), turn, stretch, step);
+    }
+    if (!add_piece(rounds, walls, nullptr, setting, sums)) break;
+    const Totals& found = sums.totals;
+    const double off = found.error + open_volume(found);
+    if (!(found.volume > 0 && off < best.error)) break;
+    best = {sums, off, step};
+  }
+  return best;
+}
+
+/// The error of each entry of the inertia. Half axes may differ by as much as a cap is shallow, so that what rounding
+/// leaves of one term counts for all.
+double inertia_error(const Totals& totals, const quadric::Stretch& stretch) {
+  const Vec3 h = stretch.half_axes;
+  const Moments& sizes = totals.sizes;
+  const Vec3 mean = sizes.first / totals.volume, f = sizes.first;
+  const Vec3 squares = sizes.squares + scaled(f, mean);
+  const Vec3 products = sizes.products + Vec3{f.y * mean.z, f.z * mean.x, f.x * mean.y};
+  return 64 * DBL_EPSILON * stretch.volume *
+         (dot(scaled(h, h), squares) + dot(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, products));
+}
+
+Moments stretched_moments(const Totals& totals, const quadric::Stretch& stretch) {
+  const Vec3 h = stretch.half_axes;
+  return {stretch.volume * totals.volume, stretch.volume * scaled(h, totals.first),
+          stretch.volume * scaled(scaled(h, h), totals.squares),
+          stretch.volume * scaled(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, totals.products)};
+}
+
+}  // namespace
+
+/// Volumes grow by the determinant, and area vectors are images by the matrix of cofactors.
+std::optional<RoundMeasures> measure_stretched(const SlicedPair& pair) {
+  const bool swapped = stretched(pair.b.shape) == nullptr;
+  const Placed &flat = swapped ? pair.b : pair.a, &ellipsoid = swapped ? pair.a : pair.b;
+  const Scratch<StretchedPieces> scratch;
+  auto& [of_flat, of_ellipsoid] = *scratch;
+  of_flat.clear(), of_ellipsoid.clear();
+  cut(flat, ellipsoid, nullptr, 0, pair.reference, pair.inside, of_flat);
+  cut(ellipsoid, flat, nullptr, 1, pair.reference, pair.inside, of_ellipsoid);
+  if (pair.outwards != 0) grow(of_flat, pair.outwards);
+  const Vec3 h = stretched(ellipsoid.shape)->half_axes;
+  into_ball(ellipsoid, h, of_flat);
+  into_ball(ellipsoid, h, of_ellipsoid);
+  const Mat3& turn = ellipsoid.pose.rotation;
+  const quadric::Stretch stretch(h);
+  const BallSums best =
+      best_of_ball(of_ellipsoid.rounds, of_flat.walls, pair, swapped ? 1 - pair.owner : pair.owner, turn, stretch);
+  const Totals& totals = best.sums.totals;
+  const double volume = totals.volume;
+  if (!(volume > 0 && best.error <= kMostError * volume)) return std::nullopt;
+  if (pair.patch) *pair.patch = *best.sums.patch;
+  const Moments whole = stretched_moments(totals, stretch);
+  RoundMeasures result;
+  result.volume = whole.volume;
+  result.area = totals.area;
+  result.first_area = swapped ? totals.area - totals.first_area : totals.first_area;
+  result.area_error =
+      totals.area_error + stretch.open() * totals.area + missing_area(stretch.normal(totals.unbalanced), totals.area);
+  result.volume_error = stretch.volume * (best.error + 4 * DBL_EPSILON * volume) + of_flat.flatness * totals.area;
+  const Vec3 origin = rounded(pair.inside) + turn * scaled(h, best.moved);
+  result.centroid = origin + turn * scaled(h, totals.first / volume);
+  result.inertia = turn * whole.inertia_about_centroid() * transposed(turn);
+  result.inertia_error = inertia_error(totals, stretch);
+  result.rounding = rounding_of_surfaces(sum_of(whole.squares) / result.volume + norm2(scaled(h, best.moved)));
+  const double side = swapped ? -1 : 1;
+  const Pull pull{side * (turn * stretch.normal(totals.pull)), side * (turn * totals.moment)};
+  result.pull = about(pull, origin, {});
+  result.facets_touched = static_cast<int>(of_flat.walls.size());
+  return result;
+}
+
+}  // namespace overlapper::pieces

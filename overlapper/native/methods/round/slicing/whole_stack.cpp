@@ -1,0 +1,81 @@
+#include "methods/round/slicing/whole_stack.h"
+
+#include <algorithm>
+#include <cfloat>
+
+#include "methods/round/slicing/nodes.h"
+
+namespace overlapper::slicing {
+namespace {
+
+/// Sums of area vectors are right to this fraction of the area.
+constexpr double kSummation = 16 * DBL_EPSILON;
+
+/// Whether there is something between where intervals end and where a quadric does.
+bool holds_to(const Stack& stack, double t, double end) {
+  const double middle = t + (end - t) / 2;
+  return t == end || !outline(Slice(stack, middle == end ? t : middle)).empty();
+}
+
+bool ended_by(const std::optional<Line>& plane, double t) { return plane && plane->offset / plane->rate == t; }
+
+/// The face at one end, for `side` -1 the lower one. It is in a plane that ends the stack, or as thin as rounding,
+/// where slices are drawn out to the end of a quadric.
+void add_end_face(const Stack& stack, const std::optional<Line>& plane, double end, int side, int drawn_to, double t,
+                  const Outline& of_last, bool few, Integrals& sum) {
+  if (plane && t == end) {
+    add_face(*plane, stack, of_last, t, sum);
+  } else if (drawn_to >= 0 && !few) {
+    Line line;
+    line.rate = side, line.offset = side * t, line.owner = drawn_to;
+    add_face(line, stack, of_last, t, sum);
+  }
+}
+
+/// What may be missing: by how much the volume differs from ∫ t N dA, and what area vectors, which sum to zero over a
+/// closed surface, leave times the size, beyond rounding. Those of lines and of arcs are other integrals over the same
+/// slices, less smooth than the volume.
+double open_part(const Stack& stack, const Integrals& s) {
+  const Vec3 left = s.pull[0] + s.pull[1] + s.pull[2];
+  const auto part = [&](double sum, double square) {
+    return std::max(0.0, std::abs(sum) - kSummation * s.border) * std::sqrt(std::max(0.0, square / s.volume));
+  };
+  return std::max(0.0, std::abs(s.across - s.volume) - kSummation * s.terms) + part(left.x, s.squares.x) +
+         part(left.y, s.squares.y) + part(left.z + stack.shear.x * left.x + stack.shear.y * left.y, s.squares.z);
+}
+
+}  // namespace
+
+bool find_drawn_intervals(const Stack& stack, bool closely, DrawnIntervals& drawn) {
+  std::vector<Interval>& intervals = drawn.intervals;
+  drawn.drawn_low = drawn.drawn_high = -1;
+  if (!find_intervals(stack, closely, intervals)) return false;
+  if (intervals.empty()) return true;
+  double &low = intervals.front().low, &high = intervals.back().high;
+  const double thin = 1e-13 * (stack.high - stack.low);
+  const auto reaches = [&](double t, double end) { return std::abs(end - t) <= thin && holds_to(stack, t, end); };
+  if (ended_by(stack.low_plane, stack.low) && reaches(low, stack.low)) low = stack.low;
+  if (ended_by(stack.high_plane, stack.high) && reaches(high, stack.high)) high = stack.high;
+  for (int i = 0; i < stack.quadrics; ++i) {
+    const Quadric& q = stack.quadric[i];
+    if (stack.low == q.low && reaches(low, stack.low)) low = stack.low, drawn.drawn_low = q.owner;
+    if (stack.high == q.high && reaches(high, stack.high)) high = stack.high, drawn.drawn_high = q.owner;
+  }
+  return true;
+}
+
+double integrate_whole(const Stack& stack, const DrawnIntervals& drawn, double volume, double area, bool few,
+                       double strictness, Sum& sum) {
+  sum.integrals = {}, sum.about = sum.error = sum.area_error = 0, sum.rules = 0, sum.samples.clear();
+  const bool sound = integrate(stack, drawn.intervals, volume, area, few, strictness, sum);
+  const Interval &lowest = drawn.intervals.front(), &highest = drawn.intervals.back();
+  add_end_face(stack, stack.low_plane, stack.low, -1, drawn.drawn_low, lowest.low, lowest.outline, few, sum.integrals);
+  add_end_face(stack, stack.high_plane, stack.high, 1, drawn.drawn_high, highest.high, highest.outline, few,
+               sum.integrals);
+  // A piece for which that does not hold is worth its size as an error. It may be rounding alone.
+  if (!sound || !(sum.integrals.volume > 0) || !within_chords(lowest.low, highest.high, sum))
+    return 8 * std::abs(sum.about) + std::abs(sum.integrals.volume);
+  return open_part(stack, sum.integrals);
+}
+
+}  // namespace overlapper::slicing
