@@ -61,7 +61,7 @@ mutants: $(VENV)/dev ## change one operator of the core at a time, report which 
 	@$(VENV)/bin/python tests/native/mutants.py $(MUTANTS)
 
 growth: $(VENV)/dev ## look for inputs that take time out of proportion to their size, with GROWTH="--rounds 50 --seed 0"
-	@$(VENV)/bin/python benchmarks/growth.py $(GROWTH)
+	@$(VENV)/bin/python benchmarks growth $(GROWTH)
 
 # Inputs that reach something new stay in build/fuzz/corpus; one that breaks something is left beside it, by name.
 fuzz: build/sanitized/dev ## give the sanitized core inputs that reach new places, for FUZZ=-max_total_time=60 seconds

@@ -27,10 +27,11 @@ from overlapper.viewer.look import LIGHT, OWNER_COLORS
 from overlapper.viewer.tessellation import tessellation
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parent / "benchmarks" / "paper"), str(HERE.parent / "tests" / "support")]
+sys.path[:0] = [str(HERE.parent / "benchmarks"), str(HERE.parent / "tests" / "support")]
 
 from families import DODECAHEDRON, icosphere  # noqa: E402
-from paper_steps import common_point  # noqa: E402
+
+from paper.steps import common_point  # noqa: E402
 
 INK, GREY, PALE, MARK = "#222222", (0.62, 0.66, 0.72), (0.93, 0.94, 0.95), "#d1206a"
 VIEW = (20, -117)

@@ -22,16 +22,17 @@ PAGE = ("overlapper/viewer/**/*", "docs/photograph.py")  # what a picture of a p
 
 
 class Maker(NamedTuple):
-    """A command, the pictures in docs/ that it makes, and what they are made from, beside the script itself."""
+    """A command, the pictures in docs/ that it makes, and what they are made from, beside its script if it is one."""
 
     command: str
     pictures: tuple[str, ...]
     sources: tuple[str, ...] = ()
 
 
-def of_results(script: str, results: str, *pictures: str, sources: tuple[str, ...] = ()) -> Maker:
+def of_results(command: str, results: str, *pictures: str, by: tuple[str, ...]) -> Maker:
     """Drawn from what was measured; what measures it is no source of the picture."""
-    return Maker(f"benchmarks/{script} --page", pictures, (f"benchmarks/results/{results}", *sources))
+    drawn_by = [f"benchmarks/{script}.py" for script in ("harness/figures", *by)]
+    return Maker(f"benchmarks {command} --page", pictures, (f"benchmarks/results/{results}", *drawn_by))
 
 
 MAKERS = (
@@ -47,25 +48,25 @@ MAKERS = (
     Maker("docs/polytopes.py", ("polytopes.png",), ("overlapper/viewer/picture.py",)),
     Maker("docs/results.py", ("results.png",), ("scenes/franka_grasp.py",)),
     of_results(
-        "forces_physics.py",
+        "physics",
         "forces.csv",
         *("forces_energy.png", "forces_friction.png", "forces_bodies.png"),
-        sources=("benchmarks/forces_page.py",),
+        by=("forces/page",),
     ),
-    of_results("round_bodies.py", "*/round.csv", "round.png"),
-    of_results("scene_steps.py", "*/steps.csv", "steps.png"),
+    of_results("round", "*/round.csv", "round.png", by=("speed/round_page",)),
+    of_results("steps", "*/steps.csv", "steps.png", by=("speed/steps_page",)),
     of_results(
-        "chart.py",
+        "chart",
         "*/[cs][lp]*.csv",
         *("speed.png", "speed_sizes.png", "speed_claims.png", "speed_families.png"),
-        sources=("benchmarks/speed/speed_figures.py",),
+        by=("speed/figures", "speed/page", "harness/peers"),
     ),
     of_results(
-        "stability.py",
+        "stability",
         "stability.csv",
         *("stability.png", "stability_degeneracy.png", "stability_distances.png"),
         *("stability_distances_degeneracy.png", "stability_planes.png", "stability_shifts.png"),
-        sources=("benchmarks/stability_page.py", "benchmarks/paper/paper_pictures.py"),
+        by=("stability/page", "paper/pictures"),
     ),
 )
 
@@ -111,7 +112,8 @@ def digests(maker: Maker, picture: str) -> tuple[str, str]:
 
 
 def _sources(maker: Maker) -> Iterator[Path]:
-    for pattern in (maker.command.split()[0], *maker.sources):
+    script = maker.command.split()[0]
+    for pattern in (*[script] * script.endswith(".py"), *maker.sources):
         found = [path for path in ROOT.glob(pattern) if path.is_file() and "__pycache__" not in path.parts]
         if not found:
             raise FileNotFoundError(f"{maker.command} is said to be made from {pattern}, which is not there")

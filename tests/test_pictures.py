@@ -31,8 +31,8 @@ def test_a_page_names_the_command_that_makes_its_pictures(page):
     """Itself, or by a link to the page that it is from."""
     text = page.read_text("utf-8")
     for picture in re.findall(r"!\[[^]]*\]\(([^):]+)\)", text):
-        (script,) = (maker.command.split()[0] for maker in pictures.MAKERS if picture in maker.pictures)
-        named = rf"(python {re.escape(script)}|overlapper {Path(script).stem})\b"
+        (command,) = (maker.command.removesuffix(" --page") for maker in pictures.MAKERS if picture in maker.pictures)
+        named = rf"(python {re.escape(command)}|overlapper {Path(command.split()[-1]).stem})\b"
         linked = [ROOT / "docs" / name for name in re.findall(r"\]\((\w+\.md)\)", text)]
         assert any(re.search(named, each.read_text("utf-8")) for each in (page, *linked)), picture
 

@@ -17,10 +17,10 @@ from zlib import crc32
 
 import families
 import numpy as np
-import truth
 from round_exact import exactly
 from strategies import directions, product, quaternion, rotation, turn
 
+from harness.bodies import exact_points, is_round, vertices
 from overlapper import (
     Box,
     Capsule,
@@ -35,12 +35,9 @@ from overlapper import (
     distance,
     overlap,
 )
+from speed import truth
 
 PI = Fraction(Decimal("3.14159265358979323846264338327950288419716939937510582"))
-
-ROUND = (Sphere, Capsule, Cylinder, Ellipsoid, RoundedHull)
-
-GROUND = 10.0  # m, side of the box that stands for the ground where a peer takes no half-space
 
 
 @dataclass(frozen=True)
@@ -95,33 +92,11 @@ class Pair:
         return truth.depth(*map(points, self.bodies))
 
 
-def is_round(body: Placed) -> bool:
-    return isinstance(body.shape, ROUND)
-
-
 def unrounded(body: Placed) -> bool:
     """Whether placing the vertices in doubles gives the exact ones."""
     if is_round(body):
         return True
     return [tuple(map(Fraction, p)) for p in vertices(body).tolist()] == [tuple(p) for p in exact_points(body)]
-
-
-def corners(body: Placed) -> np.ndarray:
-    """(n, 3) of a box, hull or half-space, in its own frame."""
-    shape = body.shape
-    if isinstance(shape, HalfSpace):
-        # Only the ground is taken: { z <= 0 } in its own frame.
-        return families.box_of((-GROUND / 2, -GROUND / 2, -GROUND), (GROUND / 2, GROUND / 2, 0.0))
-    return families.CORNERS * shape.half_extents if isinstance(shape, Box) else shape.vertices
-
-
-def exact_points(body: Placed) -> list[truth.exact.Vector]:
-    return truth.exact.placed(corners(body).tolist(), body.position.tolist(), body.given_orientation.tolist())
-
-
-def vertices(body: Placed) -> np.ndarray:
-    """(n, 3) in the world, rounded."""
-    return families.mapped(corners(body), rotation(body.orientation)) + body.position
 
 
 # Families
@@ -262,14 +237,48 @@ def by_stretching(ellipsoid: Placed, hull: Placed) -> tuple[Fraction, Fraction]:
     return volume * share, within * share
 
 
-def crossing(rng: np.random.Generator, one: Shape, other: Shape) -> tuple[Placed, Placed]:
+Make = Callable[[np.random.Generator], Shape]
+
+
+def crossing(one: Make, other: Make, how: Callable = by_slices) -> Callable[[np.random.Generator], Pair]:
     """A third of a metre apart, turned at random."""
-    at = directions(rng, 1)[0]
-    return Placed(one, at, quaternion(rng)), Placed(other, at + directions(rng, 1)[0] / 3, quaternion(rng))
+
+    def make(rng: np.random.Generator) -> Pair:
+        first, second = one(rng), other(rng)
+        at = directions(rng, 1)[0]
+        moved = Placed(first, at, quaternion(rng))
+        return Pair(moved, Placed(second, at + directions(rng, 1)[0] / 3, quaternion(rng)), how)
+
+    return make
 
 
-def ball_and_box(rng: np.random.Generator) -> Pair:
-    return Pair(*crossing(rng, Sphere(rng.uniform(0.4, 0.6)), Box(rng.uniform(0.3, 0.5, 3))), by_slices)
+def ball(rng: np.random.Generator) -> Sphere:
+    return Sphere(rng.uniform(0.4, 0.6))
+
+
+def box(rng: np.random.Generator) -> Box:
+    return Box(rng.uniform(0.3, 0.5, 3))
+
+
+def capsule(rng: np.random.Generator) -> Capsule:
+    return Capsule(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1))
+
+
+def cylinder(rng: np.random.Generator) -> Cylinder:
+    return Cylinder(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1))
+
+
+def hull(rng: np.random.Generator, corners: int = 20) -> Hull:
+    return Hull(directions(rng, corners) * rng.uniform(0.4, 0.6, 3))
+
+
+def rounded_hull(rng: np.random.Generator, corners: int = 12, radius: float = 0.05) -> RoundedHull:
+    return RoundedHull(hull(rng, corners).vertices, radius)
+
+
+def mesh_with_margin(rng: np.random.Generator) -> RoundedHull:
+    """As Bullet has convex meshes."""
+    return rounded_hull(rng, 40, 1e-3)
 
 
 def ball_over_edge(rng: np.random.Generator) -> Pair:
@@ -281,14 +290,6 @@ def ball_over_edge(rng: np.random.Generator) -> Pair:
     return Pair(Placed(Sphere(r), at + centre), Placed(Box(sides), at, tilt), by_slices)
 
 
-def capsule_and_box(rng: np.random.Generator) -> Pair:
-    return Pair(*crossing(rng, capsule(rng), Box(rng.uniform(0.3, 0.5, 3))), by_slices)
-
-
-def cylinder_and_hull(rng: np.random.Generator) -> Pair:
-    return Pair(*crossing(rng, Cylinder(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1)), hull(rng, 20)), by_slices)
-
-
 def capsule_on_ground(rng: np.random.Generator) -> Pair:
     """Lying 1e-3 m deep and not quite level, so that one end is out."""
     shape, tilt = capsule(rng), product(turn([0, 0.05, 0]), turn([0, np.pi / 2, 0]))
@@ -297,46 +298,17 @@ def capsule_on_ground(rng: np.random.Generator) -> Pair:
     return Pair(Placed(shape, at, tilt), Placed(HalfSpace([0, 0, 1], 0)), by_slices)
 
 
-def ball_and_capsule(rng: np.random.Generator) -> Pair:
-    return Pair(*crossing(rng, Sphere(rng.uniform(0.4, 0.6)), capsule(rng)), by_proof)
-
-
-def two_capsules(rng: np.random.Generator) -> Pair:
-    return Pair(*crossing(rng, capsule(rng), capsule(rng)), by_proof)
-
-
-def capsule_and_cylinder(rng: np.random.Generator) -> Pair:
-    return Pair(*crossing(rng, capsule(rng), Cylinder(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1))), by_proof)
-
-
 def ellipsoid_and_hull(rng: np.random.Generator) -> Pair:
     """Fit for by_stretching."""
     half = 2.0 ** -rng.permutation([0, 1, 2])
-    points = np.round(families.mapped(hull(rng, 20).vertices, rotation(quaternion(rng))) * 2**20) / 2**20
+    points = np.round(families.mapped(hull(rng).vertices, rotation(quaternion(rng))) * 2**20) / 2**20
     return Pair(Placed(Ellipsoid(half)), Placed(Hull(points)), by_stretching)
 
 
-def rounded_hull_and_box(rng: np.random.Generator) -> Pair:
-    return Pair(*crossing(rng, RoundedHull(hull(rng, 12).vertices, 0.05), Box(rng.uniform(0.3, 0.5, 3))), by_proof)
-
-
 def rounded_hull_on_ground(rng: np.random.Generator) -> Pair:
-    shape, turned = RoundedHull(hull(rng, 12).vertices, 0.05), quaternion(rng)
+    shape, turned = rounded_hull(rng), quaternion(rng)
     lowest = (shape.core.vertices @ rotation(turned).T)[:, 2].min() - shape.radius
     return Pair(Placed(shape, (0, 0, -lowest - 1e-3), turned), Placed(HalfSpace([0, 0, 1], 0)), by_proof)
-
-
-def meshes_with_margins(rng: np.random.Generator) -> Pair:
-    """As Bullet has convex meshes."""
-    return Pair(*crossing(rng, *(RoundedHull(hull(rng, 40).vertices, 1e-3) for _ in range(2))), by_proof)
-
-
-def capsule(rng: np.random.Generator) -> Capsule:
-    return Capsule(rng.uniform(0.2, 0.4), rng.uniform(0.5, 1))
-
-
-def hull(rng: np.random.Generator, corners: int) -> Hull:
-    return Hull(directions(rng, corners) * rng.uniform(0.4, 0.6, 3))
 
 
 FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Pair], int]] = {
@@ -360,18 +332,18 @@ FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Pair], int]] = {
     "ball at box corner": (ball_at_corner, 4),
     "crossing cylinders": (crossing_cylinders, 4),
     "cylinder wedge": (cylinder_wedge, 4),
-    "ball and box": (ball_and_box, 8),
+    "ball and box": (crossing(ball, box), 8),
     "ball over edge, 1 µm": (ball_over_edge, 8),
-    "capsule and box": (capsule_and_box, 8),
+    "capsule and box": (crossing(capsule, box), 8),
     "capsule on ground": (capsule_on_ground, 8),
-    "cylinder and hull": (cylinder_and_hull, 8),
-    "ball and capsule": (ball_and_capsule, 4),
-    "two capsules": (two_capsules, 4),
-    "capsule and cylinder": (capsule_and_cylinder, 4),
+    "cylinder and hull": (crossing(cylinder, hull), 8),
+    "ball and capsule": (crossing(ball, capsule, by_proof), 4),
+    "two capsules": (crossing(capsule, capsule, by_proof), 4),
+    "capsule and cylinder": (crossing(capsule, cylinder, by_proof), 4),
     "ellipsoid and hull": (ellipsoid_and_hull, 4),
-    "rounded hull and box": (rounded_hull_and_box, 4),
+    "rounded hull and box": (crossing(rounded_hull, box, by_proof), 4),
     "rounded hull on ground": (rounded_hull_on_ground, 4),
-    "meshes with margins": (meshes_with_margins, 2),
+    "meshes with margins": (crossing(mesh_with_margin, mesh_with_margin, by_proof), 2),
 }
 
 

@@ -50,16 +50,16 @@ def chart(
     common = [*([f"--out={out}"] if out else []), *["--page"] * page]
     code = _run_benchmark("chart", f"--seconds={seconds}", *chosen, *common)
     if not chosen:
-        code = code or _run_benchmark("round_bodies", *common) or _run_benchmark("scene_steps", *common)
+        code = code or _run_benchmark("round", *common) or _run_benchmark("steps", *common)
     raise typer.Exit(code)
 
 
 def _run_benchmark(name: str, *options: str) -> int:
     """Returns its exit code."""
-    script = Path(__file__).parents[2] / "benchmarks" / f"{name}.py"
-    if not script.is_file():
+    benchmarks = Path(__file__).parents[2] / "benchmarks"
+    if not (benchmarks / "__main__.py").is_file():
         raise Refused(f"{name} needs a checkout of overlapper, as its cases and peers are not installed")
     try:
-        return subprocess.run([sys.executable, str(script), *options]).returncode
+        return subprocess.run([sys.executable, str(benchmarks), name, *options]).returncode
     except OSError as error:
         raise Refused(f"{name} could not be started ({error.strerror})") from error

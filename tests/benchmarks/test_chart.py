@@ -1,7 +1,7 @@
 """The chart of speed: its truths, its peers, and that a wrong volume of ours ends it while one of a peer is shown."""
 
-import subprocess
-import sys
+import os
+import time
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,24 +11,13 @@ import numpy as np
 import pytest
 from strategies import directions
 
+from harness import bodies, command, peers, results, watched
 from overlapper import HalfSpace, Hull, Placed, Sphere, overlap, penetration_depth
 from overlapper.cli import bench
+from paper import claims as paper_claims
+from speed import chart, figures, page, truth, turns, workloads
 
 ROOT = Path(__file__).parents[2]
-
-import chart  # noqa: E402
-import interleaved  # noqa: E402
-import paper_claims  # noqa: E402
-import speed_figures  # noqa: E402
-import speed_page  # noqa: E402
-import timed_peers  # noqa: E402
-import truth  # noqa: E402
-import workloads  # noqa: E402
-
-
-def row(family, name, setting=""):
-    pairs = workloads.pairs_of(family)
-    return interleaved.Row(family, len(pairs), name, setting, timed_peers.METHODS[name].quantity), pairs
 
 
 def test_the_sum_over_parts_is_the_exact_volume():
@@ -70,10 +59,10 @@ def test_points_are_counted_inside_of_every_kind_of_shape():
     rng = np.random.default_rng(0)
     for family in ("balls", "ball on ground", "crossing cylinders", "tetra", "two capsules", "ellipsoid and hull"):
         pair = workloads.pairs_of(family)[0]
-        lower, upper = timed_peers.box_of_both(pair)
+        lower, upper = bodies.box_of_both(pair.bodies)
         where = lower[:, None] + (upper - lower)[:, None] * rng.random((3, 20))
         for body in pair.bodies:
-            kept = timed_peers.inside_test(body)(where)
+            kept = bodies.inside_test(body)(where)
             speck = Sphere(1e-9)
             assert kept.shape[1] == sum(bool(overlap(Placed(speck, point), body)) for point in where.T)
 
@@ -81,7 +70,7 @@ def test_points_are_counted_inside_of_every_kind_of_shape():
 @pytest.mark.parametrize("family", ["ball and box", "two capsules", "ellipsoid and hull", "meshes with margins"])
 def test_tessellations_come_near_from_below_with_segments(family):
     pair = workloads.pairs_of(family)[0]
-    volumes = [overlap(*(timed_peers.points(body, n) for body in pair.bodies)).volume for n in (8, 32)]
+    volumes = [overlap(*(bodies.points(body, n) for body in pair.bodies)).volume for n in (8, 32)]
     assert volumes[0] < volumes[1] < pair.volume
     assert volumes[1] == pytest.approx(float(pair.volume), rel=2e-2)
 
@@ -91,120 +80,157 @@ def test_strobl_s_package_gets_the_corners_in_its_own_order():
     elements = [families.TETRA, families.TETRA[[1, 0, 2, 3]]]
     pairs = [workloads.Pair(ball, Placed(Hull(some)), workloads.by_slices) for some in elements]
     for pair in pairs + workloads.pairs_of("ball and box")[:3]:
-        assert timed_peers.strobl(pair, None)() == pytest.approx(float(pair.volume), rel=1e-12)
+        assert peers.strobl(pair.bodies, None)() == pytest.approx(float(pair.volume), rel=1e-12)
 
 
 def test_estimates_come_near_with_samples_and_pitch():
     pair = workloads.pairs_of("box deep")[0]
     for name, setting in (("Monte Carlo", 100_000), ("voxels", 32)):
-        found = timed_peers.METHODS[name].prepare(pair, setting)()
+        found = peers.PEERS["volume"][name].prepare(pair.bodies, setting)()
         assert found == pytest.approx(float(pair.volume), rel=2e-2)
 
 
 @pytest.mark.parametrize("name", ["auto", "auto, batch", "auto, warm batch", "paper", "clipping", "scipy"])
 def test_exact_methods_are_exact_on_a_family_of_polyhedra(name):
-    line, pairs = row("tetra", name)
-    setting = timed_peers.METHODS[name].settings[0]
-    assert float(interleaved.prepared(line, pairs[:3], setting).row.error) < 1e-9
+    pairs = workloads.pairs_of("tetra")[:3]
+    _, count, error, _ = turns.first_answers(pairs, name, peers.TIMED[name].settings[0])
+    assert count == 3 and float(error) < 1e-9
 
 
 def test_a_peer_that_cannot_be_asked_says_why():
     slanted = workloads.Pair(Placed(Sphere(1)), Placed(HalfSpace([1, 1, 1], 0)), Fraction(1))
-    with pytest.raises(timed_peers.Unfit, match="slanted"):
-        timed_peers.ground_as_box(slanted.b)
-    with pytest.raises(timed_peers.Unfit, match="round"):
-        timed_peers.clipping(slanted, None)
+    with pytest.raises(bodies.Unfit, match="slanted"):
+        bodies.bounded(slanted.bodies)
+    with pytest.raises(bodies.Unfit, match="round"):
+        peers.clipping(slanted.bodies, None)
     margins = workloads.pairs_of("meshes with margins")[0]
-    for asked in (timed_peers.monte_carlo, timed_peers.paper):
-        with pytest.raises(timed_peers.Unfit, match="rounded hull"):
-            asked(margins, 10)
+    for asked in (peers.monte_carlo, peers.paper):
+        with pytest.raises(bodies.Unfit, match="rounded hull"):
+            asked(margins.bodies, 10)
 
 
 def test_strobl_s_package_is_asked_for_what_it_knows():
-    with pytest.raises(timed_peers.Unfit, match="balls with"):
-        timed_peers.strobl(workloads.pairs_of("two capsules")[0], None)
+    with pytest.raises(bodies.Unfit, match="balls with"):
+        peers.strobl(workloads.pairs_of("two capsules")[0].bodies, None)
 
 
 def test_threads_of_a_peer_s_own_are_timed_by_the_clock_in_a_process_that_has_all_processors():
     pairs = workloads.pairs_of("box deep")[:2]
-    rows = interleaved.rows_of("box deep", pairs, ["auto", "manifold3d, by the clock"], 0.1)
+    rows = turns.rows_of("box deep", pairs, ["auto", "manifold3d, by the clock"], 0.1)
     assert [row.method for row in rows] == ["auto"] * 3 + ["manifold3d, by the clock"]
     assert float(rows[-1].us) > 0 and float(rows[-1].error) < 1e-12
-    results = speed_page.Results("", ["here, 2 cores"], rows, [], False, False)
-    assert speed_page.clocks(results)["processors"] == "2"
+    found = page.Results("", ["here, 2 cores"], rows, [], False, False)
+    assert page.clocks(found)["processors"] == "2"
 
 
 def test_what_one_processor_costs_is_told_of_large_meshes():
     rows = [
-        interleaved.Row("i5120 deep", 1, "manifold3d", "prebuilt", "volume", us="9000"),
-        interleaved.Row("i5120 deep", 1, "manifold3d, by the clock", "prebuilt", "volume", us="6000"),
-        interleaved.Row("box deep", 1, "manifold3d", "prebuilt", "volume", us="300"),
-        interleaved.Row("box deep", 1, "manifold3d, by the clock", "prebuilt", "volume", us="100"),
+        turns.Row("i5120 deep", 1, "manifold3d", "prebuilt", "volume", us="9000"),
+        turns.Row("i5120 deep", 1, "manifold3d, by the clock", "prebuilt", "volume", us="6000"),
+        turns.Row("box deep", 1, "manifold3d", "prebuilt", "volume", us="300"),
+        turns.Row("box deep", 1, "manifold3d, by the clock", "prebuilt", "volume", us="100"),
     ]
-    said = speed_page.clocks(speed_page.Results("", ["here, 4 cores"], rows, [], False, False))
+    said = page.clocks(page.Results("", ["here, 4 cores"], rows, [], False, False))
     assert said == {"processors": "4", "slower": "1.5", "slower_at": "i5120 deep"}
 
 
 def test_a_wrong_volume_of_ours_is_noticed():
     pairs = workloads.pairs_of("box deep")[:1]
-    interleaved.check_ours("box deep", pairs)
+    turns.check_ours("box deep", pairs)
     pairs[0].__dict__["volume"] = pairs[0].volume * (1 + Fraction(1, 10**11))
-    with pytest.raises(interleaved.Wrong, match=r"box deep 0: .* truly"):
-        interleaved.check_ours("box deep", pairs)
+    with pytest.raises(command.Wrong, match=r"box deep 0: .* truly"):
+        turns.check_ours("box deep", pairs)
 
 
 def test_a_wrong_volume_of_ours_ends_the_run_and_what_was_measured_is_kept(tmp_path, monkeypatch, capsys):
     def rows_of(family, pairs, methods, seconds):
         if family == "tetra":
-            raise interleaved.Wrong("tetra 3: 1.0, truly 2.0")
-        return [interleaved.Row(family, len(pairs), "auto", "", "volume", us="1.5", error="0.00e+00")]
+            raise command.Wrong("tetra 3: 1.0, truly 2.0")
+        return [turns.Row(family, len(pairs), "auto", "", "volume", us="1.5", error="0.00e+00")]
 
     monkeypatch.setattr(chart, "rows_of", rows_of)
-    monkeypatch.setattr(sys, "argv", ["chart.py", "--family=box deep", "--family=tetra", f"--out={tmp_path}"])
-    with pytest.raises(SystemExit) as ended:
-        chart.main()
-    assert ended.value.code == 1
+    assert command.main(["chart", "--family=box deep", "--family=tetra", f"--out={tmp_path}"]) == 1
     assert capsys.readouterr().err.endswith("overlapper: wrong: tetra 3: 1.0, truly 2.0\n")
-    assert [row.family for row in chart.read(tmp_path / "speed.csv", interleaved.Row)[1]] == ["box deep"]
+    assert [row["family"] for row in results.read(tmp_path / "speed.csv")[1]] == ["box deep"]
 
 
-def test_a_wrong_volume_of_a_peer_is_its_error():
-    line, pairs = row("box deep", "paper")
+def test_a_wrong_volume_of_a_peer_is_its_error(monkeypatch):
+    pairs = workloads.pairs_of("box deep")
     pairs[0].__dict__["volume"] = pairs[0].volume * 2
-    assert interleaved.prepared(line, pairs, None).row.error == "5.00e-01"
+    monkeypatch.setattr(turns, "on_one_processor", lambda: None)
+    assert turns.first_answers(pairs, "paper", None)[2] == "5.00e-01"
+
+
+# Peers that fail; functions of this module, so that another process can import them.
+
+
+def is_not_installed(bodies, setting):
+    import a_package_that_nobody_has  # noqa: F401
+
+
+def raises(bodies, setting):
+    raise ZeroDivisionError
+
+
+def aborts(bodies, setting):
+    os.abort()
+
+
+class Here:
+    """In the place of a watched process: the peers of this process are asked."""
+
+    def __init__(self, function, *_):
+        self.function = function
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_): ...
+
+    def ask(self, *arguments):
+        try:
+            return self.function(*arguments)
+        except ZeroDivisionError as error:
+            return f"raises {type(error).__name__}"
 
 
 def test_missing_slow_and_failing_peers_are_named(monkeypatch):
-    def is_not_installed(pair, setting):
-        import a_package_that_nobody_has  # noqa: F401
-
-    def raises(pair, setting):
-        raise ZeroDivisionError
-
     for name, prepare in (("missing", is_not_installed), ("failing", raises)):
-        monkeypatch.setitem(timed_peers.METHODS, name, timed_peers.Method(prepare))
-    sent = []
-    pipe = type("Pipe", (), {"send": staticmethod(sent.append)})
+        monkeypatch.setitem(peers.TIMED, name, peers.Peer(prepare))
+    monkeypatch.setitem(peers.TIMED, "slow", peers.Peer(peers.auto, (1e-1, 1e-2)))
+    monkeypatch.setattr(turns, "Watched", Here)
+    monkeypatch.setattr(turns, "on_one_processor", lambda: None)
+    monkeypatch.setattr(turns, "DEAR", 0.0)
     pairs = workloads.pairs_of("box deep")[:1]
-    ended = {("paper", None): "crash SIGABRT"}
-    entries, rows = interleaved.first_answers(pipe, "box deep", pairs, ["missing", "failing", "paper", "auto"], ended)
-    notes = [row.note for row in rows if row.note]
-    assert notes == ["missing: a_package_that_nobody_has", "raises ZeroDivisionError", "crash SIGABRT"]
-    assert [entry.row.method for entry in entries] == ["auto"] * 3
+    rows = turns.rows_in_turn("box deep", pairs, [{}], ["missing", "failing", "paper", "slow"], 0.001)
+    assert [row.note for row in rows[:4]] == ["missing: a_package_that_nobody_has", "raises ZeroDivisionError", "", ""]
+    assert rows[4].note.startswith("not asked: 0.1 takes ")
+    assert [bool(row.us) for row in rows] == [False, False, True, True, False]
+
+
+def test_a_process_that_takes_too_long_is_named_by_its_processor_time():
+    with watched.Watched(busy, 0.2, (0.0,), patience=20.0) as process:
+        assert process.ask(60.0) == "not waited for beyond 0.2 s"
+
+
+def busy(seconds):
+    begin = time.perf_counter()
+    while time.perf_counter() < begin + seconds:
+        pass
 
 
 def test_the_command_writes_results_page_and_charts(tmp_path):
     methods = ["auto", "auto, batch", "paper", "manifold3d"]
-    command = [sys.executable, "-m", "overlapper", "chart", "--family=box deep", "--seconds=0.01", f"--out={tmp_path}"]
-    command += [f"--method={name}" for name in methods]
-    subprocess.run(command, check=True, capture_output=True, timeout=300)
-    notes, rows = chart.read(tmp_path / "speed.csv", interleaved.Row)
+    asked = [f"--method={name}" for name in methods]
+    assert command.main(["chart", "--family=box deep", "--seconds=0.01", f"--out={tmp_path}", *asked]) == 0
+    notes, rows = results.read(tmp_path / "speed.csv")
     assert "overlapper" in notes[0]
-    assert {row.method for row in rows} == set(methods)
-    assert all(row.us or row.note.startswith("missing: ") for row in rows)
-    assert all(float(row.us) > 0 and float(row.error) < 1e-12 for row in rows if row.method.startswith("auto"))
-    page = (tmp_path / "speed.md").read_text(encoding="utf-8")
-    assert "speed_families.png" in page
+    assert {row["method"] for row in rows} == set(methods)
+    assert all(row["us"] or row["note"].startswith("missing: ") for row in rows)
+    ours = [row for row in rows if row["method"].startswith("auto")]
+    assert all(float(row["us"]) > 0 and float(row["error"]) < 1e-12 for row in ours)
+    text = (tmp_path / "speed.md").read_text(encoding="utf-8")
+    assert "speed_families.png" in text
     hover = (tmp_path / "speed.html").read_text(encoding="utf-8")
     assert 'data-words="box deep: auto at 0.001' in hover
     assert "src=" not in hover and "@import" not in hover
@@ -212,14 +238,23 @@ def test_the_command_writes_results_page_and_charts(tmp_path):
     assert {"speed.png", "speed.svg", "speed_families.png", "speed_families.svg"} <= written
 
 
+def test_a_peer_is_one_line_for_all_charts(monkeypatch):
+    assert {"scipy", "overlap", "trimesh"} <= set(peers.hard_cases("volume")) & set(peers.TIMED)
+    assert "auto, batch" not in peers.hard_cases("volume") and "voxels" not in peers.hard_cases("volume")
+    monkeypatch.setitem(peers.PEERS["volume"], "new", peers.Peer(peers.paper))
+    assert "new" in peers.hard_cases("volume")
+    assert peers.HardCase("volume", "new")(families.CORNERS, families.CORNERS + 1.0) == 1.0
+    assert peers.HardCase("volume", "overlap")(families.CORNERS, families.CORNERS + 1.0) == peers.NOT_ASKED
+
+
 def test_time_over_size_names_its_power(tmp_path):
     times = {80: 1.0, 320: 4.0, 1280: 32.0, 5120: 256.0}
-    rows = [interleaved.Row(f"i{n} deep", 1, "auto", "0.001", "volume", us=str(us)) for n, us in times.items()]
-    rows += [interleaved.Row("i80 shallow", 1, "paper", "", "volume", us="3")]
-    deep, shallow = (speed_page.sizes(rows, way) for way in ("deep", "shallow"))
+    rows = [turns.Row(f"i{n} deep", 1, "auto", "0.001", "volume", us=str(us)) for n, us in times.items()]
+    rows += [turns.Row("i80 shallow", 1, "paper", "", "volume", us="3")]
+    deep, shallow = (page.sizes(rows, way) for way in ("deep", "shallow"))
     assert deep.powers["auto"] == pytest.approx(1.5)
     assert shallow.powers == {}
-    speed_figures.growth([deep, shallow], tmp_path / "sizes.png")
+    figures.growth([deep, shallow], tmp_path / "sizes.png")
     assert "auto, 1.50" in (tmp_path / "sizes.svg").read_text(encoding="utf-8")
 
 
@@ -227,18 +262,18 @@ def test_one_hull_and_the_tree_find_what_many_bodies_share():
     rng = np.random.default_rng(0)
     clouds = [directions(rng, 12) + 0.2 * directions(rng, 1) for _ in range(5)]
     volume = float(exact.common(*map(exact.hull, clouds)).volume)
-    bodies = [Placed(Hull(cloud)) for cloud in clouds]
-    walls, at = [timed_peers.planes(body) for body in bodies], paper_claims.middle(*bodies)
+    placed = [Placed(Hull(cloud)) for cloud in clouds]
+    walls, at = [bodies.planes(body) for body in placed], paper_claims.middle(*placed)
     assert paper_claims.by_one_hull(walls, at) == pytest.approx(volume, rel=1e-9)
     assert paper_claims.by_tree(walls, at) == pytest.approx(volume, rel=1e-9)
 
 
 def test_the_page_says_what_the_committed_results_say():
     (path,) = (ROOT / "benchmarks" / "results").glob("*/speed.csv")
-    results = speed_page.Results(str(path.parent.relative_to(ROOT)), *chart.results_in(path.parent))
-    assert len(results.rows) > 100
-    assert {row.method for row in results.rows} == set(timed_peers.METHODS)
-    assert (ROOT / "docs" / "speed.md").read_text(encoding="utf-8") == speed_page.text(results)
+    found = page.results_in(path.parent)
+    assert len(found.rows) > 100
+    assert {row.method for row in found.rows} == set(peers.TIMED)
+    assert (ROOT / "docs" / "speed.md").read_text(encoding="utf-8") == page.text(found)
 
 
 def test_the_page_says_what_the_claims_come_to():
@@ -249,7 +284,7 @@ def test_the_page_says_what_the_claims_come_to():
     claims = [claim("pair", way, n, 2, n**power) for way, power in ways.items() for n in (50, 100, 200)]
     claims += [claim("bodies", way, 32, m, m) for way in ("paper", "auto", "one hull", "tree") for m in (8, 16, 32)]
     claims += [claim("cores", way, 32, 8, us) for way, us in (("1 cores", 3000), ("2 cores", 2000))]
-    said = speed_page.claims_text(claims, speed_page.of_pairs(claims), speed_page.of_groups(claims))
+    said = page.claims_text(claims, page.of_pairs(claims), page.of_groups(claims))
     assert "grows with the power of 2.00" in said.replace("\n", " ")
     assert "| 8 bodies of 32 vertices | 3 ms | 2 ms | 1.50 |" in said
 

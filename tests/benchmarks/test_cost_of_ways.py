@@ -1,11 +1,12 @@
 """What each way costs is written into its page's table, or it is said why not, and then nothing is written."""
 
 import re
-import sys
 
 import pytest
-import ways
-from ways import TYPICAL, Typical
+
+from harness import command
+from speed import ways
+from speed.ways import TYPICAL, Typical
 
 
 @pytest.fixture
@@ -15,13 +16,12 @@ def page(monkeypatch, tmp_path):
     few = {name: TYPICAL[name] for name in ("two boxes", "a rounded hull of 80 facets and a box", "two boxes, apart")}
     monkeypatch.setattr(ways, "PAGE", copy)
     monkeypatch.setattr(ways, "TYPICAL", few)
-    monkeypatch.setattr(sys, "argv", ["ways.py", "--rounds", "1"])
     return copy
 
 
 def test_the_table_is_measured_anew_and_the_rest_of_the_page_stays(page):
     before = page.read_text(encoding="utf-8")
-    ways.main()
+    command.main(["ways", "--rounds=1"])
     after = page.read_text(encoding="utf-8")
     head, rows = before.split(f"| {' | '.join(ways.HEADING)} |\n|---|---|--:|--:|--:|\n")
     assert after.startswith(head)
@@ -34,19 +34,19 @@ def test_the_table_is_measured_anew_and_the_rest_of_the_page_stays(page):
 
 def test_a_status_that_the_article_has_wrong_is_not_timed():
     bodies = TYPICAL["a box resting on another, 1e-14 m deep"]
-    assert ways.clocks(bodies)[1:] == ["", "wrong"]
+    assert ways.questions(bodies)[1:] == ["", "wrong"]
 
 
 def test_a_way_that_is_not_the_one_of_the_page_is_named(page):
     ways.TYPICAL["two boxes"] = Typical(TYPICAL["two boxes"].bodies, "tracing")
     before = page.read_text(encoding="utf-8")
     with pytest.raises(SystemExit, match=r"^two boxes: the way is clipping, not tracing$"):
-        ways.main()
+        command.main(["ways", "--rounds=1"])
     assert page.read_text(encoding="utf-8") == before
 
 
 def test_a_page_without_the_table_is_named(page):
     page.write_text("# How\n", encoding="utf-8")
     with pytest.raises(SystemExit, match=r"how\.md has 0 such tables, not one$"):
-        ways.main()
+        command.main(["ways", "--rounds=1"])
     assert page.read_text(encoding="utf-8") == "# How\n"

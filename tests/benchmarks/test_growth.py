@@ -1,9 +1,11 @@
 """The search for inputs that take time out of proportion to their size."""
 
-import growth
 import numpy as np
 import pytest
-from growth import FAMILIES, QUESTIONS, Input, changed, main, searched, seconds
+
+from harness import command
+from speed import growth
+from speed.growth import FAMILIES, QUESTIONS, Input, changed, searched, seconds
 
 CONE = Input("cone", "hull")
 
@@ -56,10 +58,22 @@ def test_every_question_is_asked_of_every_family(family, ask):
 
 
 def test_the_command_prints_a_line_each_and_fails_if_one_is_too_steep(monkeypatch, capsys):
-    arguments = ["--family", "cone", "--family", "prism", "--ask", "hull", "--largest", "2000", "--rounds", "2"]
-    assert main(arguments) == 0
+    arguments = [
+        "growth",
+        "--family",
+        "cone",
+        "--family",
+        "prism",
+        "--ask",
+        "hull",
+        "--largest",
+        "2000",
+        "--rounds",
+        "2",
+    ]
+    assert command.main(arguments) == 0
     assert "0 of 2 grow faster" in capsys.readouterr().out
     monkeypatch.setattr(growth, "WORTH_TIMING", 0.0)
     monkeypatch.setattr(growth, "MOST_EXPONENT", 0.0)
-    assert main(arguments) == 1
+    assert command.main(arguments) == 1
     assert " grow faster than n^0.0:" in capsys.readouterr().out

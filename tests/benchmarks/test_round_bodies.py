@@ -1,10 +1,12 @@
 """The page of round bodies: it has all classes and scenes, its volumes are those of single calls or the run ends."""
 
 import pytest
-import round_bodies
 from round_exact import exactly
 
+from harness import command
 from overlapper import Box, Placed, Sphere, overlap
+from speed import round as round_bodies
+from speed import round_page
 
 
 @pytest.fixture
@@ -14,21 +16,20 @@ def small(monkeypatch):
     monkeypatch.setattr(round_bodies, "CLASSES", classes)
     monkeypatch.setattr(round_bodies, "on_one_processor", lambda: None)
     heaps = {
-        name: round_bodies.Heap(heap.build, heap.aim, 0, 2, heap.surface, heap.measures)
+        name: round_bodies.Heap(heap.build, 0, 2, heap.surface, heap.measures)
         for name, heap in round_bodies.heaps().items()
     }
     monkeypatch.setattr(round_bodies, "heaps", lambda: heaps)
 
 
 def test_classes_batches_margins_and_scenes_are_measured_and_their_page_is_drawn(small, tmp_path):
-    results = tmp_path / "round.csv"
-    round_bodies.write_results(round_bodies.measured(8, 1, round_bodies.heaps()), results)
-    figures = round_bodies.read(results)[1]
+    assert command.main(["round", "--pairs=8", "--rounds=1", f"--out={tmp_path}"]) == 0
+    figures = round_page.read(tmp_path / "round.csv")[1]
     assert set(figures["class"]) == {"box, box", "box, ball", "ball, ellipsoid", "capsule, rounded hull"}
     assert all(0 < each["median"] <= each["99 %"] for each in figures["class"].values())
     assert figures["class"]["ball, ellipsoid"]["dual hull"] == 100
-    assert set(figures["scene"]) == set(round_bodies.heaps())
-    page = round_bodies.write_page(results, tmp_path).read_text(encoding="utf-8")
+    assert set(figures["scene"]) == set(round_bodies.heaps()) == set(round_page.AIMS)
+    page = (tmp_path / "round.md").read_text(encoding="utf-8")
     assert "| capsule, rounded hull |" in page and "$" not in page
     assert "**Planes around ellipsoids.**" in page and "ball and ellipsoid" in " ".join(page.split())
     assert (tmp_path / "round.png").stat().st_size > 10_000 and (tmp_path / "round.svg").is_file()
@@ -42,9 +43,8 @@ def test_a_volume_of_a_batch_that_is_not_that_of_a_single_call_ends_the_run(smal
 
     true = round_bodies.overlap
     monkeypatch.setattr(round_bodies, "overlap", Half)
-    monkeypatch.setattr("sys.argv", ["round_bodies.py", "--pairs=4", "--rounds=1", f"--out={tmp_path}"])
-    with pytest.raises(SystemExit, match="wrong: box, box: volumes of a batch"):
-        round_bodies.main()
+    assert command.main(["round", "--pairs=4", "--rounds=1", f"--out={tmp_path}"]) == 1
+    assert "wrong: box, box: volumes of a batch" in capsys.readouterr().err
     assert not (tmp_path / "round.csv").exists()
 
 
@@ -56,5 +56,5 @@ def test_a_ball_over_an_edge_is_measured_as_by_slices_along_it():
 
 
 def test_bold_is_what_keeps_its_aim():
-    assert round_bodies.times(1.5, 1.5) == "**1.5**" and round_bodies.times(1.51, 1.5) == "1.5"
-    assert round_bodies.aim_of("fifty capsule humanoids", {"stepSimulation": 30.0}) == 15
+    assert round_page.times(1.5, 1.5) == "**1.5**" and round_page.times(1.51, 1.5) == "1.5"
+    assert round_page.aim_of("fifty capsule humanoids", {"stepSimulation": 30.0}) == 15

@@ -14,25 +14,23 @@ import families
 import numpy as np
 import pytest
 
+from harness import command, peers, results
+from harness.watched import Watched
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Placed, RoundedHull, Sphere, overlap
 from overlapper.cli import bench
+from paper import steps as paper_steps
+from stability import contacts, hard_cases, judging
+from stability import page as stability_page
 
 ROOT = Path(__file__).parents[2]
 
-import distance_peers  # noqa: E402
-import paper_steps  # noqa: E402
-import stability  # noqa: E402
-import stability_page  # noqa: E402
-import stability_results  # noqa: E402
-import stability_round  # noqa: E402
-from peers import clipping, paper, scipy_halfspaces  # noqa: E402
-from watched import Watched  # noqa: E402
-
 CUBE = families.CORNERS
+
+coal = peers.HardCase("distance", "coal")
 
 
 def question(*bodies):
-    return stability_results.Question(families.Case("", 0.0, bodies), bodies)
+    return judging.Question(families.Case("", 0.0, bodies), bodies)
 
 
 DEEP = question(CUBE, CUBE + [1.5, 0.25, 0.5])  # 0.5 x 1.75 x 1.5
@@ -67,14 +65,9 @@ def is_not_installed(a: np.ndarray, b: np.ndarray) -> bool:
 
 def test_right_answers_are_no_failures():
     volume = 0.5 * 1.75 * 1.5
-    assert stability_results.verdict(DEEP, volume * (1 + 1e-9)) == "1.0e-09"
-    assert not stability_results.failed("1.0e-09")
-    assert (
-        stability_results.verdict(DEEP, True)
-        == stability_results.verdict(APART, False)
-        == stability_results.verdict(APART, 0.0)
-        == "ok"
-    )
+    assert judging.verdict(DEEP, volume * (1 + 1e-9)) == "1.0e-09"
+    assert not judging.failed("1.0e-09")
+    assert judging.verdict(DEEP, True) == judging.verdict(APART, False) == judging.verdict(APART, 0.0) == "ok"
 
 
 @pytest.mark.parametrize(
@@ -92,12 +85,12 @@ def test_right_answers_are_no_failures():
     ],
 )
 def test_wrong_answers_are_failures(asked, answer, words):
-    assert stability_results.verdict(asked, answer) == words
-    assert stability_results.failed(words)
+    assert judging.verdict(asked, answer) == words
+    assert judging.failed(words)
 
 
 def test_bodies_that_touch_may_be_said_to_overlap_or_not():
-    assert [stability_results.verdict(TOUCHING, answer) for answer in (True, False, 0.0, 1e-13)] == ["ok"] * 4
+    assert [judging.verdict(TOUCHING, answer) for answer in (True, False, 0.0, 1e-13)] == ["ok"] * 4
 
 
 @pytest.mark.parametrize(("depth", "clear"), [(1e-11, True), (1e-13, False), (-1e-13, False), (-1e-10, True)])
@@ -116,8 +109,8 @@ def test_yes_and_no_are_judged_beyond_a_margin_of_the_size(depth, clear):
     ],
 )
 def test_right_depths_and_distances_are_no_failures(asked, answer, words):
-    assert stability_results.distance_verdict(asked, answer) == words
-    assert not stability_results.failed(words)
+    assert judging.distance_verdict(asked, answer) == words
+    assert not judging.failed(words)
 
 
 @pytest.mark.parametrize(
@@ -136,8 +129,8 @@ def test_right_depths_and_distances_are_no_failures(asked, answer, words):
     ],
 )
 def test_wrong_depths_and_distances_are_failures(asked, answer, words):
-    assert stability_results.distance_verdict(asked, answer) == words
-    assert stability_results.failed(words)
+    assert judging.distance_verdict(asked, answer) == words
+    assert judging.failed(words)
 
 
 # As much as pybullet can tell, which of all of these libraries asks with the least digits.
@@ -150,9 +143,9 @@ ROUND = [
 ]
 
 
-@pytest.mark.parametrize("name", [name for name in distance_peers.DISTANCE_PEERS if "coal" not in name])
+@pytest.mark.parametrize("name", [name for name in peers.PEERS["distance"] if "coal" not in name])
 def test_each_library_is_asked_for_depths_and_distances_of_every_kind_of_body(name):
-    answer = distance_peers.DISTANCE_PEERS[name]
+    answer = peers.HardCase("distance", name)
     assert answer(*DEEP.bodies) == pytest.approx(-0.5, abs=ROUGH)
     assert answer(*APART.bodies) == pytest.approx(0.5, abs=ROUGH)
     for body, distance in ROUND:
@@ -195,7 +188,7 @@ def test_coal_is_asked_with_the_shapes_and_the_tolerance_that_are_meant(monkeypa
     for name, tolerance in (("coal", 1e-6), ("coal, 1e-12", 1e-12)):
         given = coal_that_answers(monkeypatch, lambda request: request.epa_tolerance + request.gjk_tolerance)
         for body, _ in ROUND:
-            assert distance_peers.DISTANCE_PEERS[name](CUBE, body) == 2 * tolerance
+            assert peers.HardCase("distance", name)(CUBE, body) == 2 * tolerance
         kinds = [("sphere", 0.5), ("capsule", 0.5, 1), ("cylinder", 0.5, 1)]
         assert [each for each in given if each[0] != "hull"] == kinds
 
@@ -205,22 +198,22 @@ def test_coal_grows_the_core_of_a_rounded_hull(monkeypatch):
     radii = []
     grown = SimpleNamespace(setSweptSphereRadius=radii.append)
     monkeypatch.setattr(sys.modules["coal"].ConvexBase, "convexHull", lambda *_: grown)
-    assert distance_peers.coal(CUBE, Placed(RoundedHull(CUBE, 0.125))) == -0.5
+    assert coal(CUBE, Placed(RoundedHull(CUBE, 0.125))) == -0.5
     assert radii == [0.125]
 
 
 def test_an_answer_of_coal_that_more_iterations_change_is_none(monkeypatch):
     coal_that_answers(monkeypatch, lambda request: 1 / request.gjk_max_iterations)
-    assert distance_peers.coal(*DEEP.bodies) == "out of iterations"
+    assert coal(*DEEP.bodies) == "out of iterations"
     coal_that_answers(monkeypatch, lambda request: -np.finfo(float).max / request.gjk_max_iterations)
-    assert stability_results.distance_verdict(DEEP, distance_peers.coal(*DEEP.bodies)) == "no answer"
+    assert judging.distance_verdict(DEEP, coal(*DEEP.bodies)) == "no answer"
 
 
 def test_pybullet_that_finds_no_points_has_no_answer(monkeypatch):
     import pybullet
 
     monkeypatch.setattr(pybullet, "getClosestPoints", lambda *_: ())
-    assert distance_peers.pybullet(*DEEP.bodies) == "no answer"
+    assert peers.HardCase("distance", "pybullet")(*DEEP.bodies) == "no answer"
 
 
 TURNED = (0.5, 0.5, 0.5, 0.5)  # x to y, y to z, z to x
@@ -230,9 +223,9 @@ POSED = [
 ]
 
 
-@pytest.mark.parametrize("name", [name for name in distance_peers.DISTANCE_PEERS if "coal" not in name])
+@pytest.mark.parametrize("name", [name for name in peers.PEERS["distance"] if "coal" not in name])
 def test_each_library_is_asked_about_boxes_and_other_bodies_at_poses(name):
-    answer, box = distance_peers.DISTANCE_PEERS[name], Placed(Box([0.5, 1.0, 2.0]), (0, 0, 0), TURNED)
+    answer, box = peers.HardCase("distance", name), Placed(Box([0.5, 1.0, 2.0]), (0, 0, 0), TURNED)
     upright = Placed(Box([1, 1, 1]))
     for body, distance in POSED:
         assert answer(upright, body) == pytest.approx(distance, abs=ROUGH)
@@ -243,21 +236,21 @@ def test_libraries_that_lack_a_shape_are_not_asked():
     ball, hull = Placed(Sphere(1.0)), Placed(RoundedHull(CUBE, 0.1))
     for name in ("fcl", "pybullet"):
         for other in (Placed(HalfSpace([0, 0, 1], 0)), hull):
-            assert distance_peers.DISTANCE_PEERS[name](ball, other) == stability_results.NOT_ASKED
+            assert peers.HardCase("distance", name)(ball, other) == peers.NOT_ASKED
 
 
 def test_contacts_of_round_bodies_are_as_deep_as_they_are_said_to_be():
-    for contact in stability_round.contacts(1):
+    for contact in contacts.contacts(1):
         volume, within = contact.volume
-        assert float(contact.depth) == pytest.approx(stability_round.DEPTH, rel=1e-6)
+        assert float(contact.depth) == pytest.approx(contacts.DEPTH, rel=1e-6)
         assert 0 < within < 1e-12 * volume
         found = overlap(contact.a, contact.b)
         assert abs(Fraction(found.volume) - volume) <= volume / 10**12
 
 
 def test_a_depth_that_nobody_knows_is_none():
-    (contact,) = (each for each in stability_round.contacts(1) if each.kind == "cylinder's rim on a face")
-    beside = stability_round.Contact("", 0, contact.a, Placed(Cylinder(0.5, 1.0), contact.a.bounds[1]))
+    (contact,) = (each for each in contacts.contacts(1) if each.kind == "cylinder's rim on a face")
+    beside = contacts.Contact("", 0, contact.a, Placed(Cylinder(0.5, 1.0), contact.a.bounds[1]))
     with pytest.raises(ValueError, match="meets an edge"):
         _ = beside.depth
 
@@ -267,7 +260,7 @@ def test_a_depth_that_nobody_knows_is_none():
     [(-1.0, "1.0e-03"), (-1.5, "5.0e-01"), (0.0, "apart"), (1.0, "apart"), (float("nan"), "no answer"), ("-", "-")],
 )
 def test_what_is_told_of_a_contact(answer, words):
-    assert stability_round.told(Fraction(-1), Fraction(1, 1000), answer) == words
+    assert contacts.told(Fraction(-1), Fraction(1, 1000), answer) == words
 
 
 def test_a_cell_of_the_page_has_the_largest_error_and_what_is_no_answer():
@@ -276,14 +269,14 @@ def test_a_cell_of_the_page_has_the_largest_error_and_what_is_no_answer():
 
 
 def test_round_contacts_are_put_to_all_who_are_installed(tmp_path):
-    path = tmp_path / "round.csv"
-    stability_round.run(1, path)
-    notes, rows = stability_results.read(path)
-    assert [row["contact"] for row in rows] == list(stability_round.CONTACTS)
+    path = tmp_path / "stability_round.csv"
+    assert command.main(["contacts", "--cases=1", f"--out={tmp_path}"]) == 0
+    notes, rows = results.read(path)
+    assert [row["contact"] for row in rows] == list(contacts.CONTACTS)
     missing = {note.removeprefix("missing: ").partition(" (")[0] for note in notes[1:]}
     for column in (name for name in rows[0] if ": " in name):
-        assert any(row[column] != stability_results.NOT_ASKED for row in rows) is (column not in missing)
-    assert all(float(row["auto: volume"]) <= float(row[stability_round.STATED]) for row in rows)
+        assert any(row[column] != peers.NOT_ASKED for row in rows) is (column not in missing)
+    assert all(float(row["auto: volume"]) <= float(row[contacts.STATED]) for row in rows)
 
 
 def test_kinds_of_failures_are_told_apart():
@@ -294,15 +287,15 @@ def test_kinds_of_failures_are_told_apart():
 
 def test_a_crash_and_a_hang_are_answers_and_the_next_case_is_asked_again():
     for answer, end in ((aborts_when_apart, "crash SIGABRT"), (hangs_when_apart, "hang")):
-        with Watched(answer, 2.0, stability.FIRST) as peer:
+        with Watched(answer, 2.0, hard_cases.FIRST) as peer:
             assert [peer.ask(*asked.bodies) for asked in (DEEP, APART, TOUCHING)] == [True, end, True]
 
 
 def test_an_exception_is_an_answer_and_a_missing_package_is_not():
-    with Watched(raises, 2.0, stability.FIRST) as peer:
+    with Watched(raises, 2.0, hard_cases.FIRST) as peer:
         assert peer.ask(*DEEP.bodies) == "raises ZeroDivisionError"
     missing = pytest.raises(ImportError, match="a_package_that_nobody_has")
-    with Watched(is_not_installed, 2.0, stability.FIRST) as peer, missing:
+    with Watched(is_not_installed, 2.0, hard_cases.FIRST) as peer, missing:
         peer.ask(*DEEP.bodies)
 
 
@@ -310,15 +303,15 @@ def test_clipping_and_halfspaces_find_the_volume_of_hulls_in_general_position():
     for seed in range(5):
         bodies = families.make("general", seed).bodies
         truth = float(question(*bodies).volume)
-        assert clipping(*bodies) == pytest.approx(truth, rel=1e-12)
-        assert scipy_halfspaces(*bodies) == pytest.approx(truth, rel=1e-9)
+        assert peers.HardCase("volume", "clipping")(*bodies) == pytest.approx(truth, rel=1e-12)
+        assert peers.HardCase("volume", "scipy")(*bodies) == pytest.approx(truth, rel=1e-9)
 
 
 def test_the_replay_names_the_step_that_loses_an_overlap():
     below, above = CUBE - [0, 0, 1], 0.5 * families.TETRA + [0.1, 0.2, 0.5]
     assert paper_steps.lost_at(below, above - [0, 0, 1e-3]) == "not reproduced"
     thin = question(below, above - [0, 0, 1e-9])
-    assert paper(*thin.bodies) == 0.0
+    assert peers.HardCase("volume", "paper")(*thin.bodies) == 0.0
     assert paper_steps.lost_at(*thin.bodies) == "2 shifts"
     assert paper_steps.lost_given_a_point(thin.bodies, thin.common) is None
 
@@ -333,9 +326,9 @@ def test_planes_beside_the_true_ones_are_found_to_lose_the_overlap():
 
 
 def test_the_page_says_what_the_committed_results_say():
-    notes, rows = stability_results.read(stability.RESULTS)
+    notes, rows = results.read(hard_cases.RESULTS)
     assert len(rows) > 800
-    assert {*stability.PEERS, *stability_page.DISTANCES, "way"} <= set(rows[0])
+    assert {*stability_page.peers_of(rows), *stability_page.DISTANCES, "way"} <= set(rows[0])
     page = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
     # Which of the failing cases is drawn depends on their geometry, to the last bit: it is as the page has it.
     drawn = re.findall(r"stability_(\w+)\.png\)\n\nThe case is `(\w+)` (\d+) ", page)
@@ -348,16 +341,15 @@ def test_the_page_says_what_the_committed_results_say():
 
 
 def test_the_command_writes_results_page_and_pictures(tmp_path):
-    command = [sys.executable, "-m", "overlapper", "stability", "--seed=3", "--count=1", f"--out={tmp_path}"]
-    subprocess.run(command, check=True, capture_output=True, timeout=300)
-    notes, rows = stability_results.read(tmp_path / "stability.csv")
+    assert command.main(["stability", "--seed=3", "--count=1", f"--out={tmp_path}"]) == 0
+    notes, rows = results.read(tmp_path / "stability.csv")
     assert notes[0].startswith("seed 3; overlapper")
     missing = {note.removeprefix("missing: ").partition(" (")[0] for note in notes[1:]}
-    for peer in [*stability.PEERS, *map(stability_results.distance_column, stability.DISTANCE_PEERS)]:
-        asked = [row for row in rows if row[peer] != stability_results.NOT_ASKED]
+    for peer in [*stability_page.peers_of(rows), *stability_page.DISTANCES]:
+        asked = [row for row in rows if row[peer] != peers.NOT_ASKED]
         assert bool(asked) is (peer not in missing)
-    rounds = [row for row in rows if row["family"] in stability.ROUND]
-    assert {row["auto"] for row in rounds} == {stability_results.NOT_ASKED}
+    rounds = [row for row in rows if row["family"] in hard_cases.ROUND]
+    assert {row["auto"] for row in rounds} == {peers.NOT_ASKED}
     assert "separation" in {row["way"] for row in rows}
     pictures = {f"stability{name}.png" for name in ("", "_degeneracy", "_distances", "_distances_degeneracy")}
     assert {"stability.md", *pictures} <= {path.name for path in tmp_path.iterdir()}
@@ -379,8 +371,9 @@ def test_without_another_process_the_command_says_so(monkeypatch):
 
 
 def test_a_missing_package_is_named_in_one_sentence():
-    script = str(ROOT / "benchmarks" / "stability.py")
-    program = f"import sys, runpy; sys.modules['hypothesis'] = None; runpy.run_path({script!r}, run_name='__main__')"
+    benchmarks = str(ROOT / "benchmarks")
+    program = "import sys, runpy; sys.modules['hypothesis'] = None; sys.argv = ['benchmarks', 'stability']; "
+    program += f"sys.path.insert(0, {benchmarks!r}); runpy.run_path({benchmarks!r}, run_name='__main__')"
     alone = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     assert alone.returncode == 2
-    assert alone.stderr == "overlapper: the stability chart needs hypothesis: pip install '.[bench]'\n"
+    assert alone.stderr == "overlapper: stability needs hypothesis: pip install '.[bench]'\n"

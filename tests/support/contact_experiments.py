@@ -1,6 +1,6 @@
 """Experiments with contact whose outcome textbooks foretell, by volumetric contact and by Bullet's own.
 
-Tests compare what comes out with the formula; benchmarks/forces_physics.py does the same for docs/forces.md.
+Tests compare what comes out with the formula; `python benchmarks physics` does the same for docs/forces.md.
 """
 
 from __future__ import annotations

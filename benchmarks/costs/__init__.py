@@ -1,0 +1,1 @@
+"""What single features of the package cost, and what they survive."""

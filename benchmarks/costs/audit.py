@@ -1,0 +1,220 @@
+"""`overlapper audit` beside pinocchio and coal, and on every robot of example-robot-data.
+
+    python benchmarks audit speed [ROUNDS]           configurations a second of a Franka, on one core
+    python benchmarks audit agree [CONFIGURATIONS]   the same pairs of shapes in the same configurations of ten robots
+    python benchmarks audit robots [CONFIGURATIONS]  the table of docs/audit.md
+
+The first two need `pip install pin`, which is pinocchio with coal. Both sides have the same convex shapes: those that
+pybullet has made. Pinocchio has its own kinematics, of the URDF, which are compared with ours by the way. Ours looks at
+blocks as in an audit, with volumes and depths; theirs says yes or no for the same pairs of shapes, one configuration
+after the other, with and without a tree of boxes. Figures are medians of rounds in which all take turns.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections import Counter
+from importlib.metadata import distribution
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from harness.bodies import of_coal
+from harness.page import table
+from harness.timing import timed
+from overlapper import Batch, Overlaps, Placed, overlap
+from overlapper.audit.audit import audit
+from overlapper.audit.examiner import Examiner
+from overlapper.audit.robot import read_robot
+from overlapper.audit.sampling import Sampling
+from overlapper.simulation.bullet.model_file import NotRead
+
+ROBOTS = Path(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots"))
+FRANKA = "panda_description/urdf/panda.urdf"
+TEN = [
+    FRANKA,
+    "ur_description/urdf/ur5_robot.urdf",
+    "xarm_description/urdf/xarm7.urdf",
+    "kinova_description/robots/kinova.urdf",
+    "z1_description/urdf/z1.urdf",
+    "so_arm_description/urdf/so101.urdf",
+    "a1_description/urdf/a1.urdf",
+    "anymal_b_simple_description/robots/anymal.urdf",
+    "solo_description/robots/solo12.urdf",
+    "talos_data/robots/talos_full_v2.urdf",
+]
+
+
+class Peer:
+    """Pinocchio and coal on the shapes of an examiner, for the pairs that are asked for in every configuration."""
+
+    def __init__(self, path: Path, examiner: Examiner) -> None:
+        import pinocchio
+
+        self.pin, self.examiner = pinocchio, examiner
+        self.model = pinocchio.buildModelFromUrdf(str(path))
+        self.data = self.model.createData()
+        self.geometry = pinocchio.GeometryModel()
+        tree = examiner.robot.tree
+        pinocchio.framesForwardKinematics(self.model, self.data, pinocchio.neutral(self.model))
+        neutral = np.array([degree_at_0 for degree in examiner.robot.degrees for degree_at_0 in at_0(degree)])
+        (positions,), (orientations,) = examiner.kinematics.poses(neutral[None])
+        for number, (shape, position, turn) in enumerate(zip(tree.shapes, positions, orientations)):
+            frame = self.model.getFrameId(tree.links[shape.link].name, pinocchio.FrameType.BODY)
+            parent = self.model.frames[frame].parentJoint
+            where = pinocchio.XYZQUATToSE3(np.concatenate([position, turn]))
+            placement = self.data.oMi[parent].actInv(where)
+            self.geometry.addGeometryObject(
+                pinocchio.GeometryObject(str(number), parent, frame, placement, of_coal(Placed(shape.shape))[0])
+            )
+        asked = [pair for pair in examiner.pairs if not (pair.rigid or pair.adjacent)]
+        self.pairs = examiner.shape_pairs(*asked)
+        for a, b in self.pairs.tolist():
+            self.geometry.addCollisionPair(pinocchio.CollisionPair(a, b))
+        self.geometry_data = self.geometry.createData()
+        self.tree = pinocchio.BroadPhaseManager_DynamicAABBTreeCollisionManager(
+            self.model, self.geometry, self.geometry_data
+        )
+
+    def positions(self, configuration: np.ndarray) -> np.ndarray:
+        """Pinocchio's configuration vector."""
+        robot, q = self.examiner.robot, self.pin.neutral(self.model)
+        values = {degree.name: configuration[degree.column] for degree in robot.degrees}
+        for name, mimic in robot.mimics.items():
+            values[name] = values[mimic.leader] * mimic.multiplier + mimic.offset
+        for name, value in values.items():
+            joint = self.model.joints[self.model.getJointId(name)]
+            q[joint.idx_q : joint.idx_q + joint.nq] = value if joint.nq == 1 else [np.cos(value), np.sin(value)]
+        return q
+
+    def placements(self, q: np.ndarray) -> np.ndarray:
+        """(k, 4, 4) of the shapes."""
+        self.pin.updateGeometryPlacements(self.model, self.data, self.geometry, self.geometry_data, q)
+        return np.array([each.homogeneous for each in self.geometry_data.oMg])
+
+    def one_by_one(self, q: np.ndarray) -> None:
+        self.pin.computeCollisions(self.model, self.data, self.geometry, self.geometry_data, q, False)
+
+    def by_tree(self, q: np.ndarray) -> None:
+        self.pin.computeCollisions(self.model, self.data, self.tree, q, False)
+
+    def answers(self, q: np.ndarray) -> list[bool]:
+        """Of each pair of `pairs`, each asked for by itself."""
+        self.one_by_one(q)
+        return [result.isCollision() for result in self.geometry_data.collisionResults]
+
+
+def at_0(degree) -> tuple[float, ...]:
+    return (0.0, 0.0, 0.0, 1.0) if degree.range == "spherical" else (0.0,)
+
+
+def speed(rounds: int = 5) -> None:
+    """Processor time per configuration, of blocks that nobody has looked at before."""
+    count = 2000
+    robot = read_robot(ROBOTS / FRANKA)
+    sampling = Sampling(robot, 4096 * (rounds + 3), seed=0)
+    examiner = Examiner(robot, sampling)
+    peer = Peer(ROBOTS / FRANKA, examiner)
+    print(f"{FRANKA}: {len(robot.tree.shapes)} shapes, {len(peer.pairs)} pairs of them asked for")
+    taken = {"overlapper: volume and depth": [], "kinematics of these": [], "coal: yes or no": [], "by its tree": []}
+    for block in range(2, rounds + 2):
+        configurations = sampling.block(block)
+        qs = [peer.positions(each) for each in configurations[:count]]
+        ways = {
+            "overlapper: volume and depth": (lambda: examiner(block), len(configurations)),  # noqa: B023
+            "kinematics of these": (lambda: examiner.kinematics.poses(configurations), len(configurations)),  # noqa: B023
+            "coal: yes or no": (lambda: [peer.one_by_one(q) for q in qs], len(qs)),  # noqa: B023
+            "by its tree": (lambda: [peer.by_tree(q) for q in qs], len(qs)),  # noqa: B023
+        }
+        for way, (work, done) in ways.items():
+            taken[way].append(timed(work) / done)
+    for way, seconds in taken.items():
+        middle = median(seconds)
+        print(f"{way:30}{1e6 * middle:8.1f} µs{1 / middle:12,.0f} configurations a second")
+
+
+def agree(count: int = 1000) -> None:
+    """All pairs of shapes that are asked for in every configuration, by both; what differs is judged by a proof."""
+    total: Counter[str] = Counter()
+    for name in TEN:
+        robot = read_robot(ROBOTS / name)
+        sampling = Sampling(robot, count, seed=0)
+        examiner = Examiner(robot, sampling)
+        peer = Peer(ROBOTS / name, examiner)
+        configurations = np.concatenate([sampling.block(block) for block in range(len(sampling.blocks))])
+        positions, orientations = examiner.kinematics.poses(configurations)
+        said: Counter[str] = Counter()
+        off, differing = 0.0, []
+        links = np.array([shape.link for shape in robot.tree.shapes])[peer.pairs]
+        owners, owner = np.unique(links, axis=0, return_inverse=True)
+        met = np.zeros((2, len(owners)), dtype=int)
+        batch = Batch([each.shape for each in robot.tree.shapes])
+        for row, configuration in enumerate(configurations):
+            q = peer.positions(configuration)
+            off = max(off, np.abs(peer.placements(q)[:, :3, 3] - positions[row]).max())
+            found = batch.overlaps(positions[row], orientations[row], peer.pairs)
+            ours = found.status == Overlaps.OVERLAPPING
+            theirs = np.array(peer.answers(q))
+            said["both yes"] += int((ours & theirs).sum())
+            said["both no"] += int((~ours & ~theirs).sum())
+            for side, answers in enumerate((ours, theirs)):
+                met[side, np.unique(owner[answers])] += 1
+            for at in np.flatnonzero(ours != theirs):
+                differing.append((row, int(at), bool(ours[at])))
+        for row, at, ours in differing:
+            placed = [
+                Placed(robot.tree.shapes[k].shape, positions[row, k], orientations[row, k]) for k in peer.pairs[at]
+            ]
+            said[judged(placed, ours)] += 1
+        total += said
+        classes = np.where(met == 0, "never", np.where(met == count, "always", "sometimes"))
+        same = int((classes[0] == classes[1]).sum())
+        for pair in np.flatnonzero(classes[0] != classes[1]):
+            names = " and ".join(robot.link_names[link] for link in owners[pair])
+            print(f"{names}: {classes[0, pair]} by ours, {met[0, pair]}, {classes[1, pair]} by coal, {met[1, pair]}")
+        rest = ", ".join(f"{number:,} {what}" for what, number in said.items())
+        print(f"{name}: {same} of {len(owners)} pairs of links alike, places {off:.0e} m apart: {rest}", flush=True)
+    print(f"in all: {', '.join(f'{number:,} {what}' for what, number in total.items())}")
+
+
+def judged(placed: list[Placed], ours: bool) -> str:
+    """Who is right of two that differ, and how near to touching the pair is."""
+    found = overlap(*placed)
+    lower, upper = found.certificate().verify()
+    proved = "overlap" if lower > 0 else "share nothing" if upper == 0 else "are not told apart"
+    how = f"{found.depth:.0e} m deep" if found else f"{found.distance:.0e} m apart"
+    return f"{'yes' if ours else 'no'} by ours alone, which by proof {proved} ({how})"
+
+
+def robots(count: int = 2000) -> None:
+    """A row for each robot, by `audit` in this process; seconds are of a processor."""
+    heading = ["robot", "joints", "links", "pairs", "adjacent", "never", "sometimes", "always", "s"]
+    paths = sorted(ROBOTS.rglob("*.urdf"), key=lambda path: path.stem.lower())
+    print(table(heading, (row_of(path, count) for path in paths)))
+
+
+def row_of(path: Path, count: int) -> list[str]:
+    try:
+        robot = read_robot(path)
+    except NotRead as error:
+        return [path.stem, str(error).rpartition(": ")[2], *[""] * 7]
+    found = []
+    seconds = timed(lambda: found.append(audit(robot, count)))
+    counts = [len(found[0].of_status(status)) for status in ("never", "sometimes", "always")]
+    links = len({shape.link for shape in robot.tree.shapes})
+    pairs = len(found[0].pairs)
+    cells = [path.stem, len(robot.degrees), links, pairs, pairs - sum(counts), *counts, f"{seconds:.1f}"]
+    return list(map(str, cells))
+
+
+WHAT = {"speed": speed, "agree": agree, "robots": robots}
+
+
+def options(parser: ArgumentParser) -> None:
+    parser.add_argument("what", choices=WHAT)
+    parser.add_argument("number", nargs="?", type=int, help="of rounds or configurations")
+
+
+def main(chosen: Namespace) -> None:
+    WHAT[chosen.what](*[chosen.number] * (chosen.number is not None))

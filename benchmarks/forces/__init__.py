@@ -1,0 +1,1 @@
+"""Volumetric contact beside textbooks and beside Bullet's own contact."""

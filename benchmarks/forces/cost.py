@@ -1,0 +1,177 @@
+"""Where the time of volumetric contact goes: by parts of a substep, and of a pile beside Bullet's own step.
+
+    python benchmarks forces          all scenes, a minute or two, then the page
+    python benchmarks forces --page   only the page, from the results there are
+
+The scenes with ten contacts take turns, and so do the pile and its twin, which Bullet steps; times are those of the
+processor, medians over steps. Writes forces_cost.csv, a line per scene and part, to benchmarks/results/MACHINE, and the
+page docs/forces.md.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from argparse import Namespace
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import pybullet as p
+
+from forces import physics
+from harness import results
+from harness.timing import Stopwatch, on_one_processor, timed
+from overlapper import _core
+from overlapper.simulation import Bodies, VolumetricContact
+from overlapper.simulation.bullet.dynamics import BulletDynamics
+
+RESULTS = results.of_machine("forces_cost.csv")
+G = 9.81
+COLUMNS = ("scene", "part", "us")
+PILE = "pile of 200 boxes"
+STEPS = 120
+
+# What is called in a substep, by the part that its time counts for; what is called within it counts for its own.
+CALLS: dict[tuple[Any, str], str] = {
+    (Bodies, "update"): "poses",
+    (Bodies, "follow"): "poses",
+    (BulletDynamics, "frames"): "poses",
+    (VolumetricContact, "_coming"): "what comes",
+    (Bodies, "overlaps"): "overlaps",
+    (_core.ContactSolver, "place"): "patches",
+    (BulletDynamics, "velocity"): "velocities",
+    (_core.ContactSolver, "solve"): "solve",
+    (BulletDynamics, "apply"): "apply",
+    (p, "stepSimulation"): "stepSimulation",
+}
+PARTS = tuple(dict.fromkeys(CALLS.values()))
+
+
+@contextmanager
+def parts_timed() -> Iterator[Stopwatch]:
+    """The time of each part, while all that is called in a substep goes through the watch."""
+    watch, originals = Stopwatch(), {(owner, name): getattr(owner, name) for owner, name in CALLS}
+
+    def through_watch(call: Callable[..., Any], part: str) -> Callable[..., Any]:
+        return lambda *args, **kwargs: watch(part, call, *args, **kwargs)
+
+    try:
+        for (owner, name), call in originals.items():
+            setattr(owner, name, through_watch(call, CALLS[owner, name]))
+        yield watch
+    finally:
+        for (owner, name), call in originals.items():
+            setattr(owner, name, call)
+
+
+def ground(client: int) -> None:
+    p.setGravity(0, 0, -G, physicsClientId=client)
+    plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=client)
+    p.createMultiBody(0, plane, physicsClientId=client)
+
+
+def ten(kind: int, place: Callable[[int], list[float]], **figures: Any) -> Callable[[int], None]:
+    def build(client: int) -> None:
+        ground(client)
+        shape = p.createCollisionShape(kind, physicsClientId=client, **figures)
+        for k in range(10):
+            p.createMultiBody(1, shape, -1, place(k), physicsClientId=client)
+
+    return build
+
+
+def pile(client: int) -> None:
+    """200 boxes at random in a well, on a heap that Bullet has let come to rest."""
+    ground(client)
+    chance = random.Random(0)
+    box = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
+    wall = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.02, 0.5, 0.5], physicsClientId=client)
+    for k in range(4):
+        at = [0.42 * math.cos(k * math.pi / 2), 0.42 * math.sin(k * math.pi / 2), 0.5]
+        turned = p.getQuaternionFromEuler([0, 0, k * math.pi / 2])
+        p.createMultiBody(0, wall, -1, at, turned, physicsClientId=client)
+    for k in range(200):
+        at = [chance.uniform(-0.3, 0.3), chance.uniform(-0.3, 0.3), 0.1 + 0.02 * k]
+        turned = p.getQuaternionFromEuler([chance.uniform(-3, 3) for _ in range(3)])
+        p.createMultiBody(1, box, -1, at, turned, physicsClientId=client)
+    for _ in range(480):
+        p.stepSimulation(client)
+
+
+BOX = {"halfExtents": [0.05] * 3}
+SCENES: dict[str, Callable[[int], None]] = {
+    "ten cubes on a plane": ten(p.GEOM_BOX, lambda k: [0.3 * k, 0, 0.0499], **BOX),
+    "a tower of ten cubes": ten(p.GEOM_BOX, lambda k: [0.001 * (k % 2), 0, 0.0499 + 0.0999 * k], **BOX),
+    "ten cylinders on a plane": ten(p.GEOM_CYLINDER, lambda k: [0.3 * k, 0, 0.0499], radius=0.05, height=0.1),
+    "ten balls on a plane": ten(p.GEOM_SPHERE, lambda k: [0.3 * k, 0, 0.049], radius=0.05),
+}
+
+
+class Scene:
+    """A scene that is stepped with volumetric contact, and how long each part of a substep took."""
+
+    def __init__(self, build: Callable[[int], None], stack: ExitStack) -> None:
+        self.client = p.connect(p.DIRECT)
+        stack.callback(p.disconnect, self.client)
+        build(self.client)
+        self.contact = stack.enter_context(VolumetricContact(Bodies(self.client)))
+        self.taken: dict[str, list[float]] = {}
+        self.deepest = 0.0
+
+    def step(self, watch: Stopwatch) -> None:
+        watch.take()
+        watch("rest", self.contact.step)
+        us, substeps = watch.take(), self.contact.substeps
+        step = sum(us.values())
+        figures = {part: us.get(part, 0.0) / substeps for part in (*PARTS, "rest")}
+        figures |= {"substep": step / substeps, "step": step}
+        figures |= {"substeps": substeps, "contacts": len(self.contact), "sweeps": self.contact.sweeps}
+        for part, value in figures.items():
+            self.taken.setdefault(part, []).append(value)
+        self.deepest = max(self.deepest, float(self.contact.contacts.overlaps.depth.max(initial=0)))
+
+    def rows(self, name: str) -> Iterator[tuple[str, str, float]]:
+        for part, values in self.taken.items():
+            yield name, part, median(values)
+
+
+def measured() -> Iterator[tuple[str, str, float]]:
+    with parts_timed() as watch, ExitStack() as stack:
+        scenes = {name: Scene(build, stack) for name, build in SCENES.items()}
+        for step in range(STEPS + 20):
+            for scene in scenes.values():
+                scene.step(watch)
+                if step < 20:
+                    scene.taken.clear()
+        for name, scene in scenes.items():
+            yield from scene.rows(name)
+    with parts_timed() as watch, ExitStack() as stack:
+        twin = p.connect(p.DIRECT)
+        stack.callback(p.disconnect, twin)
+        pile(twin)
+        ours, bullet = Scene(pile, stack), []
+        for step in range(STEPS + 60):
+            ours.step(watch)
+            bullet.append(1e6 * timed(lambda: p.stepSimulation(twin)))
+            if step < 60:
+                ours.taken.clear()
+                bullet.clear()
+        yield from ours.rows(PILE)
+        yield PILE, "bullet", median(bullet)
+        yield PILE, "deepest", ours.deepest
+
+
+def measure(_: Namespace, path: Path) -> None:
+    on_one_processor()
+    rows = [(scene, part, f"{us:.4g}") for scene, part, us in measured()]
+    with results.writing(path, COLUMNS, results.today()) as write:
+        write(rows)
+
+
+def write_page(path: Path, folder: Path) -> Path:
+    from forces import page
+
+    return page.write_page(physics.RESULTS, folder, path)

@@ -1,0 +1,1 @@
+"""What all benchmarks share: commands, result files, clocks, processes, peers, pages and figures."""

@@ -1,0 +1,1 @@
+"""The article's method: what it claims, and the step at which it loses an overlap."""

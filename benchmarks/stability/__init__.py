@@ -1,0 +1,1 @@
+"""Who fails where: hard cases with exact answers."""

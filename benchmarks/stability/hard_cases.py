@@ -1,0 +1,156 @@
+"""Who fails where: hard cases with exact answers, put to each peer in a process of its own.
+
+    python benchmarks stability                   all cases again, then the page and its pictures
+    python benchmarks stability --page            only the page and its pictures, from the results there are
+
+Writes benchmarks/results/stability.csv (a case a line), and the page stability.md with its pictures to docs. The cases
+are those of tests/support/families.py made of vertices alone, so that every peer can be given them, and contacts of
+round bodies, of which only depths and distances are asked. The truth is exact: rational arithmetic on the doubles that
+the peers get.
+"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import exact
+import families
+import numpy as np
+
+from harness import results
+from harness.peers import NOT_ASKED, HardCase, hard_cases
+from harness.watched import Watched
+from overlapper import Placed, overlap
+from paper.steps import lost_at, lost_given_a_point, volume_without_exact_signs
+from stability.judging import RIGHT, Question, distance_column, distance_verdict, failed, verdict
+
+RESULTS = results.FOLDER / "stability.csv"
+
+TIME_LIMIT = 10.0  # s, for a question
+
+# Vertices of one body, so that the exact truth stays a matter of seconds.
+LARGEST = 170
+
+# Families whose parameter runs over many decades get more cases, so that each decade has some.
+DECADES = ("slivers", "tilted_slivers", "nearly_touching", "needles_and_plates", "far_away", "scaled", "round_contacts")
+SHARE = dict.fromkeys(DECADES, 3)
+
+# Families with round bodies whose signed distance is known.
+ROUND = ("round_contacts",)
+
+# A question without difficulty, asked before time counts.
+FIRST = (families.CORNERS, families.CORNERS + 1.0)
+
+Rows = list[dict[str, str]]
+
+
+def options(parser: ArgumentParser) -> None:
+    parser.add_argument("--seed", type=int, default=0, help="of the first case of each family")
+    parser.add_argument("--count", type=int, default=2000, help="about so many cases")
+
+
+def measure(chosen: Namespace, path: Path) -> None:
+    asked = questions(chosen.seed, chosen.count)
+    rows = [described(question) for question in asked]
+    missing: list[str] = []
+    bodies = [question.bodies for question in asked]
+    for kind in ("volume", "overlaps"):
+        for name in hard_cases(kind):
+            given = [None if question.round else question.bodies for question in asked]
+            answers = put(name, HardCase(kind, name), given, missing)
+            # A peer that knows none of the bodies has no column.
+            if set(answers) != {NOT_ASKED} or any(line.startswith(f"missing: {name} ") for line in missing):
+                fill(rows, name, [verdict(*each) for each in zip(asked, answers)])
+    for name in hard_cases("distance"):
+        given = [None if question.signed_distance is None else question.bodies for question in asked]
+        answers = put(distance_column(name), HardCase("distance", name), given, missing)
+        fill(rows, distance_column(name), [distance_verdict(*each) for each in zip(asked, answers)])
+    fill(rows, "way", put("way", way, bodies, missing))
+    fill(
+        rows,
+        "paper lost at",
+        [lost_at(*q.bodies) if failed(row["paper"]) else NOT_ASKED for q, row in zip(asked, rows)],
+    )
+    solid = [not q.round and q.clear and q.common.dimension == 3 for q in asked]
+    for name, step in (("given a point", given_a_point), ("and by qhull", by_qhull)):
+        fill(rows, name, [step(question) if fit else NOT_ASKED for question, fit in zip(asked, solid)])
+    with results.writing(path, list(rows[0]), f"seed {chosen.seed}; {results.packages()}", *missing) as write:
+        write(row.values() for row in rows)
+
+
+def write_page(path: Path, folder: Path) -> Path:
+    from stability.page import write_page
+
+    return write_page(path, folder)
+
+
+def questions(seed: int, count: int) -> list[Question]:
+    """About so many, from every family that is made of vertices, and from ROUND."""
+    asked = [name for name in families.FAMILIES if families_of_vertices(name) or name in ROUND]
+    unit = count / sum(SHARE.get(name, 1) for name in asked)
+    found = []
+    for name in asked:
+        for i in range(max(1, round(unit * SHARE.get(name, 1)))):
+            case = families.make(name, seed + i)
+            bodies = tuple(
+                body if isinstance(body, Placed) else np.array(families.points_of(body), float) for body in case.bodies
+            )
+            if all(isinstance(body, Placed) or len(body) <= LARGEST for body in bodies):
+                found.append(Question(case, bodies))
+    return found
+
+
+def families_of_vertices(name: str) -> bool:
+    return not any(isinstance(body, (families.Below, Placed)) for body in families.make(name, 0).bodies)
+
+
+def put(
+    name: str, answer: Callable[..., Any], asked: list[tuple | None], missing: list[str], first: tuple = FIRST
+) -> list[Any]:
+    """The answers of a peer in a process of its own; NOT_ASKED for None, and for all if its package is missing."""
+    with Watched(answer, TIME_LIMIT, first) as peer:
+        try:
+            return [NOT_ASKED if bodies is None else peer.ask(*bodies) for bodies in asked]
+        except ImportError as error:
+            missing.append(f"missing: {name} ({error.name} is not installed)")
+            print(missing[-1])
+            return [NOT_ASKED] * len(asked)
+
+
+def fill(rows: Rows, column: str, cells: list[str]) -> None:
+    for row, cell in zip(rows, cells):
+        row[column] = cell
+
+
+def way(*bodies: np.ndarray | Placed) -> str:
+    """By which way the package itself answers."""
+    return overlap(*bodies).way
+
+
+def given_a_point(question: Question) -> str:
+    return lost_given_a_point(question.bodies, question.common) or RIGHT
+
+
+def by_qhull(question: Question) -> str:
+    try:
+        return verdict(question, volume_without_exact_signs(question.bodies, question.common))
+    except Exception as error:
+        return f"raises {type(error).__name__}"
+
+
+def described(question: Question) -> dict[str, str]:
+    case, distance = question.case, question.signed_distance
+    return {
+        "family": case.family,
+        "seed": str(case.seed),
+        "detail": case.detail,
+        "parameter": f"{case.parameter:.3g}",
+        "bodies": str(len(question.bodies)),
+        "common": NOT_ASKED if question.round else exact.NAMES[question.common.dimension],
+        "clear": NOT_ASKED if question.round else "yes" if question.clear else "no",
+        "volume": NOT_ASKED if question.round else f"{float(question.volume):.6g}",
+        "signed distance": NOT_ASKED if distance is None else f"{float(distance):.6g}",
+    }
