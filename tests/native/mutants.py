@@ -212,6 +212,8 @@ class Bench:
         for name in names:
             (self.tree / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, self.tree / name)
+        # As they are now: others may change them while they are built and shown.
+        self.texts = {mutant.file: (self.native / mutant.file).read_text() for mutant in mutants.values()}
         if not self.python.exists():
             venv.create(folder / "venv", symlinks=True)
         # What a .pth names is on the path, but its own .pth are not read: so the tree comes before an editable package.
@@ -236,7 +238,7 @@ class Bench:
             lines = {}
             for file in sorted({mutant.file for mutant in self.mutants.values()}):
                 of_file = {number: mutant for number, mutant in self.mutants.items() if mutant.file == file}
-                text, lines[file] = switched((ROOT / "overlapper" / "native" / file).read_text(), of_file)
+                text, lines[file] = switched(self.texts[file], of_file)
                 if text != (self.native / file).read_text():
                     (self.native / file).write_text(text)
             command = ["cmake", "--build", str(self.build), "--target", "_core", "--parallel", f"{os.cpu_count()}"]
@@ -256,7 +258,7 @@ class Bench:
                 file, line = self.mutants[number].file, self.mutants[number].line
                 del self.mutants[number]
                 if not any(mutant.file == file for mutant in self.mutants.values()):
-                    shutil.copy2(ROOT / "overlapper" / "native" / file, self.native / file)
+                    (self.native / file).write_text(self.texts[file])
         for module in self.build.glob("_core*.so"):
             shutil.copyfile(module, self.tree / "overlapper" / module.name)
         for tests in ([QUICK], OF_FORCES):
