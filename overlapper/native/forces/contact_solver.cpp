@@ -8,10 +8,10 @@
 namespace overlapper {
 namespace {
 
-/// Sweeps end when no slip changes by more than this fraction of the largest that there was.
+/// Sweeps end when no slip changes by more than this fraction of the largest slip without forces.
 constexpr double kSettled = 1e-8;
 
-/// Patches visited in all sweeps of a step, but so many sweeps at least and at most.
+/// The most visits of patches in a step; the number of sweeps stays between kFewest and kMost.
 constexpr int kVisits = 10000;
 constexpr int kFewest = 10;
 constexpr int kMost = 2000;
@@ -60,7 +60,7 @@ std::vector<double> ContactSolver::place(std::span<const Pose> frames, std::vect
   rows_.reserve(patches_.size());
   std::vector<double> of_body(bodies_.bodies().size());
   for (ElasticPatch& patch : patches_) {
-    // What has no direction now is pushed where it was pushed last.
+    // A patch that has no direction now is pushed in its last direction.
     if (const Known* last = patch.area > 0 ? nullptr : known(patch.key)) patch.normal = last->normal;
     Row& row = rows_.emplace_back(patch);
     add_sides(row, patch);
@@ -101,7 +101,7 @@ void ContactSolver::add_sides(Row& row, const ElasticPatch& patch) {
   }
 }
 
-/// How the point of a body of one link is moved by a wrench at that point; times the sign, as are both.
+/// The motion that a wrench gives to its point of application on a body of one link. Both have the sign of the side.
 ContactSolver::Screw ContactSolver::answer(const Side& side, const Screw& wrench) const {
   const Mobility& mobility = mobilities_[side.body];
   return {mobility.linear * wrench.along, mobility.angular * (wrench.about + cross(side.arm, wrench.along))};
@@ -203,7 +203,7 @@ ContactSolver::Six ContactSolver::known_wrench(size_t patch) const {
   return last ? rows_[patch].local(last->wrench) : Six{{std::max(0.0, patches_[patch].force), 0, 0}, {}};
 }
 
-/// Pressures first, then friction, whose limit they are. The answer is how much they have changed the slip.
+/// Updates pressures first, then friction, whose limit is the pressures. Returns by how much the slip has changed.
 double ContactSolver::visit(size_t patch, Laws& laws, double duration, std::span<double> velocity) const {
   const Row& row = rows_[patch];
   const Six slip = slip_of(row, velocity), last = laws.wrench;
@@ -241,7 +241,7 @@ ContactSolver::Solution ContactSolver::solve(const Step& step) {
   for (int i = 0; i < count; ++i) push(rows_[i], laws[i].wrench, h, velocity);
   int sweeps = 0;
   for (const int most = std::clamp(kVisits / std::max(1, count), kFewest, kMost); sweeps < most && count > 0;) {
-    // There and back, so that what is pressed at one end is soon felt at the other.
+    // Sweeps go there and back, so that a push at one end of a stack soon reaches the other end.
     double changed = 0;
     for (int k = 0; k < count; ++k) {
       const int i = sweeps % 2 ? count - 1 - k : k;

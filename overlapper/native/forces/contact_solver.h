@@ -27,8 +27,8 @@ class ContactSolver {
   const Multibodies& bodies() const { return bodies_; }
   std::span<const ElasticPatch> patches() const { return patches_; }
 
-  /// Puts links and patches where they are. The answer is by patch: the square of the frequency (rad/s)² that no way of
-  /// swinging of the bodies of a patch on all of their patches exceeds.
+  /// Takes the places of links and patches. Returns for each patch the square of a frequency, in (rad/s)²: no swing of
+  /// the patch's bodies on all of their patches is faster.
   std::vector<double> place(std::span<const Pose> frames, std::vector<ElasticPatch> patches);
 
   struct Step {
@@ -46,30 +46,30 @@ class ContactSolver {
     int sweeps = 0;
   };
 
-  /// Of the patches as they were placed.
+  /// Solves a step with the patches as they were placed.
   Solution solve(const Step& step);
 
  private:
-  /// A force or a velocity, with the torque or the angular velocity about the same point, in the world.
+  /// A force with the torque, or a velocity with the angular velocity, about the same point, in the world.
   struct Screw {
     Vec3 along, about;
   };
 
-  /// The same in the frame of a patch: of pressures, along the normal and about two axes in the plane, and of friction,
-  /// along these and about the normal.
+  /// A screw in the frame of a patch. The part of pressures is along the normal and about two axes in the plane; the
+  /// part of friction is along these axes and about the normal.
   struct Six {
     Three normal{}, tangential{};
   };
 
-  /// The part of one body in the velocity of a over b, and what a wrench does to its coordinates.
+  /// The part of one body in the velocity of a over b, and the answers of its coordinates to a wrench.
   struct Side {
     int body, first, coordinates;
     bool moves;
-    bool single;     ///< a body of one link, for which the next two suffice; what follows them is of others
+    bool single;     ///< a body of one link: it has a sign and an arm, other bodies have rows and answers
     double sign;     ///< 1 of a, -1 of b
     Vec3 arm;        ///< m, from its centre of mass to the centroid
     size_t rows;     ///< in `pool_`: 6 rows of so many coordinates
-    size_t answers;  ///< in `pool_`: so many rows of 6; none of what does not move
+    size_t answers;  ///< in `pool_`: so many rows of 6; unused if the body does not move
   };
 
   struct Row {
@@ -82,11 +82,11 @@ class ContactSolver {
     PlaneArea area;
     std::array<Side, 2> sides{};
     int sides_used = 0;
-    /// What wrenches do to the slip in 1 s: the normal part to the normal part, and so on.
+    /// The change of the slip by a wrench in 1 s: of the normal part by the normal part, and so on.
     ThreeByThree normal_by_normal{}, normal_by_tangential{}, tangential_by_normal{}, tangential_by_tangential{};
   };
 
-  /// Of a body of one link.
+  /// The inverse of the mass and of the inertia of a body of one link.
   struct Mobility {
     double linear = 0;  ///< 1/kg
     Mat3 angular;       ///< 1/(kg m²), in the world
@@ -106,7 +106,7 @@ class ContactSolver {
   Solution solved(std::span<const Laws> laws, std::span<const double> velocity) const;
   void remember(const Solution& solution);
 
-  /// What is left of a patch for the next step.
+  /// The solution of a patch, with which the next step begins.
   struct Known {
     std::int64_t key;
     Vec3 normal;

@@ -7,17 +7,17 @@
 
 namespace overlapper {
 
-/// What two links share, as an elastic foundation (Winkler): a pressure of `stiffness` times the depth.
+/// The overlap of two links as an elastic foundation (Winkler): the pressure is `stiffness` times the depth.
 struct ElasticPatch {
-  std::int64_t key = 0;  ///< the same in the next step, so that its solution begins with that of this one
+  std::int64_t key = 0;  ///< the same in every step, so that a step begins with the solution of the last one
   int link_a = 0, link_b = 0;
   Vec3 normal;               ///< unit, from b to a
-  Vec3 centroid;             ///< m, of the volume: what the force at rest goes through
+  Vec3 centroid;             ///< m, of the volume: the force at rest goes through it
   double force = 0;          ///< N, at rest
   double stiffness = 0;      ///< Pa/m
   double dissipation = 0;    ///< s
   double friction = 0;       ///< coefficient of
-  double area = 0;           ///< m², 0 of what has no direction: its force does not change with the depth
+  double area = 0;           ///< m²; 0 of a patch without direction, whose force does not change with the depth
   Vec3 centre;               ///< m, of that area
   Mat3 moments{{}, {}, {}};  ///< m⁴, of that area about its centre
   double distance = 0;       ///< m, mean, of that area's points from the centroid
@@ -29,10 +29,10 @@ struct PlaneArea {
 
   double area;        ///< m²
   double u, v;        ///< m: its centre
-  double uu, uv, vv;  ///< m²: of its points, mean products of what they are off the centre
-  double distance;    ///< m: of its points, the mean distance from the centroid
+  double uu, uv, vv;  ///< m²: the mean products of the coordinates of its points about the centre
+  double distance;    ///< m: the mean distance of its points from the centroid
 
-  /// N/m, N and N m: what a foundation of that stiffness answers to a motion along the normal and about both axes.
+  /// The answer of a foundation of that stiffness to a motion along the normal and about both axes, in N/m, N and N m.
   ThreeByThree foundation(double stiffness) const;
 };
 

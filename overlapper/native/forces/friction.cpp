@@ -29,19 +29,26 @@ struct Factor {
   double a, b, c, d, e, f;  ///< by columns, the diagonal inverted
 };
 
-/// Points that stand for a patch: Gauss and Legendre's of a rectangle with its area moments.
+/// The points of a patch are those of Gauss and Legendre in a rectangle that has the area moments of the patch.
 constexpr std::array<double, 4> kNodes{-0.8611363115940526, -0.3399810435848563, 0.3399810435848563,
                                        0.8611363115940526};
 constexpr std::array<double, 4> kWeights{0.1739274225687269, 0.3260725774312731, 0.3260725774312731,
                                          0.1739274225687269};
+static_assert(
+    [] {
+      double sum = 0, square = 0;
+      for (size_t i = 0; i < kNodes.size(); ++i) sum += kWeights[i], square += kWeights[i] * kNodes[i] * kNodes[i];
+      return sum > 1 - 1e-15 && sum < 1 + 1e-15 && 3 * square > 1 - 1e-15 && 3 * square < 1 + 1e-15;
+    }(),
+    "means over an interval from -1 to 1, whose mean square is 1 / 3");
 
 }  // namespace
 
 Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, double& shift) {
   if (!(limit > 0) || dot(slip, slip) == 0) return {};
   if (!(mobility[0][0] + mobility[1][1] + mobility[2][2] > 0)) return (-limit / std::sqrt(dot(slip, slip))) * slip;
-  // The force is -(mobility + shift)⁻¹ slip: what is left of the slip is then -shift times the force. Newton's method
-  // on the inverse of its size finds the shift, if any (Moré and Sorensen 1983).
+  // The force is -(mobility + shift)⁻¹ slip, and the slip that is left is -shift times the force. Newton's method on
+  // the inverse of the force's size finds the shift, if any (Moré and Sorensen 1983).
   constexpr double kClose = 1e-12;
   Three force{};
   double size = 0;
@@ -78,9 +85,9 @@ void PatchFriction::spread(const PlaneArea& area) {
       points_.push_back({c * x - s * y, s * x + c * y, share});
       reach += share * std::hypot(area.u + points_.back().u, area.v + points_.back().v);
     }
-  // As far from the centroid as the area is in the mean, so that what resists a spin is right.
+  // The mean distance of the points is stretched to that of the area, which makes the resistance to a spin right.
   const double stretch = distance_ > 0 && reach > 0 ? distance_ / reach : 1;
-  // Pressures that lead to the centroid: linear over the patch, and none below zero.
+  // The pressure is linear over the patch, its centre is the centroid, and it is nowhere below zero.
   const double least = 1e-9 * mean, uu = area.uu + least, vv = area.vv + least, square = uu * vv - area.uv * area.uv;
   const double slope_u = square > 0 ? (area.uv * area.v - vv * area.u) / square : 0;
   const double slope_v = square > 0 ? (area.uv * area.u - uu * area.v) / square : 0;
@@ -115,7 +122,7 @@ Three PatchFriction::answer(const Three& slip, const Three& last, double force) 
 Three PatchFriction::at_points(Three slip, double limit) {
   Three sum{};
   for (Point& point : points_) {
-    // The slip there by the patch's, and what forces there do to that.
+    // The slip at the point, from that of the patch, and the change of that slip by forces at the point.
     const auto there = [&](const Three& of) { return Three{of[0] - point.v * of[2], of[1] + point.u * of[2], 0}; };
     const Three by_u = mobility_ * Three{1, 0, -point.v}, by_v = mobility_ * Three{0, 1, point.u};
     const Three uu = there(by_u), vv = there(by_v);

@@ -8,26 +8,27 @@
 
 namespace overlapper {
 
-/// How friction resists: by one law for the slip and the spin of a patch, or at points that are spread over it.
+/// The law of friction: one law for the slip and the spin of a patch together, or Coulomb's at points spread over it.
 enum class Friction { kEllipsoid, kDistributed };
 
-/// The force of at most `limit` that ends the slip, or where that does not suffice the one of that size that opposes
-/// what slip is left (Coulomb's law: of all forces within the limit, it takes away the most energy). Without it the
-/// slip is `slip`, and `mobility` of the force, symmetric and positive, is added to that. What slip is left is `shift`
-/// times the force: as a guess it may be of a problem like this, and is then that of this one.
+/// The force of at most `limit` that ends the slip. If no such force does, the force has that size and opposes the slip
+/// that is left: it takes away the most energy of all forces within the limit (Coulomb's law). The slip is `slip`
+/// without the force; `mobility`, symmetric and positive, times the force is added to it. The slip that is left is
+/// -`shift` times the force. A guess of `shift`, as from a similar problem, is replaced by the answer.
 Three opposing(const ThreeByThree& mobility, const Three& slip, double limit, double& shift);
 
-/// The friction of a patch in a step: its forces along two axes in the plane and its torque about the normal, through
-/// the centroid of the volume.
+/// The friction of a patch in a step: forces along two axes in the plane, and a torque about the normal through the
+/// centroid of the volume.
 class PatchFriction {
  public:
-  /// `mobility` is what such forces do to the slip within the step.
+  /// `mobility` times such forces is the change of the slip within the step.
   PatchFriction(double coefficient, const PlaneArea& area, const ThreeByThree& mobility, Friction kind);
 
-  /// Begins with forces like those known: what they are here.
+  /// Begins with known forces, as far as this law can have them, and returns them.
   Three begin(const Three& known);
 
-  /// Of the slip at the end of the step as it is with the forces of the last answer, if pressures push with `force`.
+  /// The forces at the end of the step. `slip` includes the effect of `last`, the last answer; pressures push with
+  /// `force`.
   Three answer(const Three& slip, const Three& last, double force);
 
  private:

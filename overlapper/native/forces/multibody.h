@@ -16,14 +16,14 @@ struct Link {
   int parent = -1;  ///< its place among all links, before this one; -1 of a base, with which a body begins
   Joint joint = Joint::kHeld;
   Vec3 axis;   ///< unit, in the frame of the parent; a spherical joint turns about the axes of the link's own frame
-  Vec3 pivot;  ///< m, in the frame of the parent: a point that the joint leaves where it is
+  Vec3 pivot;  ///< m, in the frame of the parent: a point that the joint does not move
   double mass = 0;  ///< kg; of a base, 0 if nothing moves it
   Vec3 inertia;     ///< kg m², principal
 };
 
-/// Bodies of links, each with so many coordinates of velocity: of its base, linear at the centre of mass and angular,
-/// in the world, and of its joints in the order of their links. A base that is held has the six, too: it may be moved
-/// by hand.
+/// Bodies of links, and their coordinates of velocity. A body has six coordinates of its base, linear at the centre of
+/// mass and angular, in the world; then those of its joints, in the order of their links. A base that is held has its
+/// six, too, as it may be moved by hand.
 class Multibodies {
  public:
   struct Body {
@@ -39,7 +39,7 @@ class Multibodies {
   int body_of(int link) const { return body_[link]; }
   int coordinates() const { return coordinates_; }
 
-  /// Puts the links where they are, and finds the inverse mass matrices there.
+  /// Takes the places of the links, and finds the inverse mass matrices there.
   void place(std::span<const Pose> frames);
 
   Vec3 centre(int link) const { return frames_[link].translation; }
@@ -50,7 +50,7 @@ class Multibodies {
   /// The linear velocity of the centre of mass of a link, and its angular velocity, by the velocity of all coordinates.
   std::array<Vec3, 2> twist(int link, std::span<const double> velocity) const;
 
-  /// By rows, as many as the body has coordinates; zeros for what forces do not move.
+  /// The inverse mass matrix by rows; zeros for coordinates that forces do not move.
   std::span<const double> inverse_mass(int body) const { return inverse_mass_[body]; }
 
  private:
@@ -68,7 +68,7 @@ class Multibodies {
   std::vector<std::vector<int>> moved_;  ///< of each link: the coordinates of the joints between it and its base
   int coordinates_ = 0;
   std::vector<Pose> frames_;
-  std::vector<Moving> moving_;  ///< per coordinate of all bodies; those of bases are not used
+  std::vector<Moving> moving_;  ///< per coordinate of all bodies; coordinates of bases are not used
   std::vector<std::vector<double>> inverse_mass_;
 };
 

@@ -5,19 +5,20 @@
 
 namespace overlapper {
 
-/// How pressures follow the depth within a step: kKeeping keeps the energy of a swing and is stable whatever the step,
-/// kDamping is backward Euler.
+/// The rule by which pressures follow the depth within a step. kKeeping keeps the energy of a swing and is stable for
+/// steps of any length; kDamping is backward Euler.
 enum class Rule { kKeeping, kDamping };
 
-/// The pressures of a patch in a step: their force along the normal and their torques about two axes in the plane,
-/// through the centroid of the volume.
+/// The pressures of a patch in a step: a force along the normal, and torques about two axes in the plane through the
+/// centroid of the volume.
 class Pressure {
  public:
-  /// `before` is the slip at the beginning of the step, `mobility` what a force and torques do to the slip in 1 s.
+  /// `before` is the slip at the beginning of the step; `mobility` times pressures is the change of the slip in 1 s.
   Pressure(const ElasticPatch& patch, const PlaneArea& area, const ThreeByThree& mobility, const Three& before,
            double duration, Rule rule);
 
-  /// Of the slip at the end of the step without these pressures. They only push, and their centre stays on the area.
+  /// The pressures, if `slip` is the slip at the end of the step without them. They push, and their centre stays on the
+  /// area.
   Three answer(const Three& slip) const;
 
  private:

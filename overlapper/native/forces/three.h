@@ -4,8 +4,8 @@
 
 namespace overlapper {
 
-/// Forces and velocities of a patch are threes: along its normal and about two axes in its plane, or along these axes
-/// and about the normal.
+/// Three coordinates of a force or a velocity of a patch: along its normal and about two axes in its plane, or along
+/// these axes and about the normal.
 using Three = std::array<double, 3>;
 using ThreeByThree = std::array<Three, 3>;
 
@@ -26,10 +26,10 @@ inline ThreeByThree operator*(const ThreeByThree& a, const ThreeByThree& b) {
 
 inline ThreeByThree operator*(double s, const ThreeByThree& m) { return {s * m[0], s * m[1], s * m[2]}; }
 
-/// Of a matrix that has one.
+/// The inverse of a regular matrix.
 ThreeByThree inverse(const ThreeByThree& m);
 
-/// Of the product of two symmetric matrices without negative eigenvalues.
+/// The largest eigenvalue of the product of two symmetric matrices that have no negative eigenvalues.
 double largest_eigenvalue(const ThreeByThree& a, const ThreeByThree& b);
 
 }  // namespace overlapper

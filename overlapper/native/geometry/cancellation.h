@@ -12,18 +12,18 @@ struct Cancelled {};
 
 namespace cancellation {
 
-/// Whether whoever waits on this thread for an answer still wants it. Set once, by what knows: without it, answers are
-/// always wanted.
+/// Answers whether the caller that waits on this thread still wants its answer. The bindings set this once; without it,
+/// answers are always wanted.
 inline bool (*still_wanted)() = nullptr;
 
-/// On a thread that helps another: what tells that the other's answer is not wanted any more.
+/// On a thread that helps another: a flag that is true once the other's answer is not wanted any more.
 inline constinit thread_local const std::atomic<bool>* given_up = nullptr;
 
 inline constexpr int kPointsBetween = 64;  ///< which take a millisecond at most
 inline constexpr std::chrono::milliseconds kPatience(50);
 inline constinit thread_local int points_left = kPointsBetween;
 
-/// Throws Cancelled if, every 50 ms, the answer turns out not to be wanted any more.
+/// Asks once in kPatience whether the answer is still wanted, and throws Cancelled if it is not.
 inline void look_at_clock() {
   using Clock = std::chrono::steady_clock;
   thread_local Clock::time_point due;
@@ -40,14 +40,14 @@ inline void look_at_clock() {
 
 }  // namespace cancellation
 
-/// Where a computation may end early: in each loop that may go on for a tenth of a second and more. As what is asked
-/// may be a signal handler that computes something itself, there are none where a thread_local of ours is in use, but
-/// for what a Scratch has lent.
+/// A place where a computation may end early: one in each loop that may take a tenth of a second and more. The question
+/// may run a signal handler that computes something itself. So no place is where a thread_local of the core is in use,
+/// but for the memory that a Scratch has lent.
 inline void cancellation_point() {
   if (--cancellation::points_left <= 0) cancellation::look_at_clock();
 }
 
-/// In a loop of which each round looks at so many elements.
+/// The same in a loop whose rounds look at so many elements each.
 inline void cancellation_point(size_t elements) {
   cancellation::points_left -= static_cast<int>(std::min<size_t>(elements / 256, cancellation::kPointsBetween));
   cancellation_point();

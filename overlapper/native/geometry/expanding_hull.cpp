@@ -162,7 +162,7 @@ bool ExpandingHull::assemble(std::span<const std::array<int, 3>> triangles) {
     g.neighbour[t.number] = s.facet;
     if (sees(s.facet, g.vertex[(t.number + 2) % 3]) || sees(t.facet, f.vertex[(s.number + 2) % 3])) return false;
   }
-  // Of surfaces in one piece, only a sphere's has Euler's characteristic 2, and only that bounds a convex solid.
+  // A convex solid has the surface of a sphere, the only surface in one piece whose Euler characteristic is 2.
   std::vector<char> met(facets.size(), false), used(points.size(), false);
   std::vector<int> stack{0};
   met[0] = true;
@@ -321,7 +321,7 @@ int ExpandingHull::cone_facet_that_sees(int p) const {
   const int facet = fan_facet_that_sees(p, 0);
   assert(facet >= 0 || first_that_sees(cone_, p) < 0);
   if (facet < 0) return -1;
-  // With which of several a point waits decides the numbers of facets: the first of all but very large cones, as above.
+  // The facet that a point waits with decides the numbers of later facets: it is the first of all but very large cones.
   constexpr size_t kMostInOrder = 512;
   const int first = first_that_sees(std::span(cone_).first(std::min(cone_.size(), kMostInOrder)), p);
   return first < 0 ? facet : first;
@@ -383,7 +383,7 @@ bool ExpandingHull::build(std::span<const double> negligible) {
     insert(apex, facet);
     hand_on_to_cone(apex);
     vacate_removed();
-    // A number of a facet that is gone may wait for its turn still, and have become another's: that has had its own.
+    // The number of a removed facet may still wait for its turn. A new facet that has the number has had a turn itself.
     pending.insert(pending.end(), cone_.begin(), cone_.end());
   }
   order_by_birth();

@@ -21,7 +21,7 @@ class ExpandingHull {
     std::array<int, 3> vertex{-1, -1, -1};
     std::array<int, 3> neighbour{-1, -1, -1};
     Vec3 normal;           ///< outward, of length twice the facet's area, rounded
-    Vec3 normal_rounding;  ///< sums of the absolute products in `normal`: what its rounding error is measured by
+    Vec3 normal_rounding;  ///< sums of the absolute products in `normal`, which its rounding error is a fraction of
     int first_conflict = -1, farthest_conflict = -1;
     double farthest_height = 0;
 
@@ -44,8 +44,8 @@ class ExpandingHull {
   int add(Vec3 point);
 
   /// Starts, then inserts every point. Each point outside waits with one facet that it sees (its conflict), and the
-  /// farthest of a facet's conflicts is inserted next: the paper's conflict graph, of which one edge per point is
-  /// enough because the facets that see a point are connected. O(n log n) expected.
+  /// farthest of a facet's conflicts is inserted next. One edge per point of the paper's conflict graph is enough,
+  /// because the facets that see a point are connected. O(n log n) expected.
   ///
   /// With `negligible`, the origin must be inside, and a point p is left out if it rises above each facet that it sees
   /// by no more than the fraction negligible[p] of that facet's distance from the origin: a plane that cuts nothing but
@@ -55,7 +55,7 @@ class ExpandingHull {
   /// True if point `p` lies strictly outside the plane of the facet. Exact.
   bool sees(int facet, int p) const;
 
-  /// Replaces all facets that see `p`, of which `seen` is one, by the cone from the horizon to `p`.
+  /// Replaces all facets that see `p`, among them `seen`, by the cone from the horizon to `p`.
   void insert(int p, int seen);
 
   std::span<const int> cone() const { return cone_; }        ///< the facets made by the last insert()
@@ -86,9 +86,9 @@ class ExpandingHull {
   bool rises_above(int facet, int p, double fraction);
   void collect_visible(int p, int seen);
   void link_cone(int p);
-  /// Lets the facets removed by the last insert() be others, which no one outside may notice.
+  /// Reuses the facets that the last insert() removed. Callers must not see the difference.
   void vacate_removed();
-  /// If others have taken the place of facets: as if none had, but without gaps.
+  /// Restores the order of facets as if none had been reused, but without gaps.
   void order_by_birth();
 
   static constexpr size_t kLeastReused = 1024;  ///< facets, before which caches hold the removed ones as well

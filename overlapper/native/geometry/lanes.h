@@ -47,7 +47,7 @@ struct LanesOf {
   constexpr const T& operator[](int i) const { return lane[i]; }
 };
 
-/// Of each lane, or of each and the same number; as in a vector, what is true has all bits set.
+/// Operations go lane by lane, or take the same number for every lane. As in a vector, true is all bits set.
 template <class T, int count, class Operation>
 constexpr auto each_of(const LanesOf<T, count>& a, const LanesOf<T, count>& b, Operation operation) {
   LanesOf<decltype(operation(T{}, T{})), count> row{};
@@ -118,8 +118,8 @@ constexpr void choose(const LanesOf<std::int64_t, count>& which, const LanesOf<d
 
 #endif
 
-// What is OVERLAPPER_WIDER is compiled, with all that it calls, for machines that have more than the rest is compiled
-// for, and called if is_wider(). Where there is no such thing, all is compiled for one machine, which has what it has.
+// A function that is OVERLAPPER_WIDER is compiled, with all that it calls, for AVX2 and FMA, and called if is_wider().
+// Where the macro is not defined, all functions are compiled for one and the same machine.
 #if defined(OVERLAPPER_VECTORS) && defined(__x86_64__)
 #define OVERLAPPER_FUSING __attribute__((target("avx2,fma")))
 #if !(defined(__AVX2__) && defined(__FMA__))

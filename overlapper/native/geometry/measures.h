@@ -32,7 +32,7 @@ inline const char* name(Way way) { return kWayNames[static_cast<size_t>(way)]; }
 /// Doubles were not enough for the volume, and it was computed again in wider arithmetic.
 inline bool widened(Way way) { return way == Way::kWideClipping || way == Way::kWideDual; }
 
-/// What the common volume changes by as a body moves.
+/// The slopes of the common volume as a body moves.
 template <class Vector>
 struct PullOf {
   Vector force;   ///< d volume / d translation: the area vector of the facets that the body owns
@@ -57,8 +57,8 @@ inline std::array<double, 6> gradient_row(const Pull& pull) {
   return {force.x, force.y, force.z, moment.x, moment.y, moment.z};
 }
 
-/// What an edge adds to the pull of the patch that it borders on its left, about the origin: the area vector of a
-/// patch, and the integral of x × n over it, are integrals along its border (Stokes).
+/// The part of an edge in the pull, about the origin, of the patch on the left of the edge. The area vector of a patch
+/// and the integral of x × n over the patch are integrals along its border (Stokes).
 template <class Vector>
 inline PullOf<Vector> pull_along_border(const Vector& from, const Vector& to) {
   return {cross(from, to) / 2.0, (norm2(from) + dot(from, to) + norm2(to)) / 6.0 * (from - to)};
@@ -67,12 +67,12 @@ inline PullOf<Vector> pull_along_border(const Vector& from, const Vector& to) {
 /// The relative error of a volume beyond which it is worth computing in another way.
 inline constexpr double kEnough = 1e-12;
 
-/// The same of a round body by a formula, which slices take ten times as long as: they state up to as much themselves.
+/// The same for a formula of round bodies: slices take ten times as long, and state errors up to this themselves.
 inline constexpr double kEnoughOfRound = 1e-11;
 /// Relative error of a volume up to which a formula is believed where slices found no answer.
 inline constexpr double kSureOfFormula = 1e-9;
 
-/// What is known of the common set of some bodies, in world coordinates and SI units; zeros unless overlapping.
+/// The measures of the common set of some bodies, in world coordinates and SI units; zeros unless overlapping.
 struct Measures {
   Status status = Status::kSeparated;
   Way way = Way::kSeparation;

@@ -6,8 +6,8 @@
 
 namespace overlapper {
 
-/// Integrals over a solid of 1, of coordinates, and of their squares and products, about some point, which whoever has
-/// them names.
+/// Integrals over a solid of 1, of coordinates, and of their squares and products, about a point that the caller
+/// knows.
 struct Moments {
   double volume = 0;       ///< m³
   Vec3 first;              ///< ∫ x dV
@@ -26,7 +26,7 @@ struct Moments {
                             f.x * o.y + f.y * o.x + volume * o.x * o.y}};
   }
 
-  /// Of coordinates along three axes, in those that the axes are given in.
+  /// These moments, of coordinates along three axes, in the coordinates that the axes are given in.
   Moments along(const std::array<Vec3, 3>& axes) const {
     const double second[3][3] = {
         {squares.x, products.z, products.y}, {products.z, squares.y, products.x}, {products.y, products.x, squares.z}};
@@ -49,7 +49,7 @@ struct Moments {
     return {{s.y + s.z, -p.z, -p.y}, {-p.z, s.z + s.x, -p.x}, {-p.y, -p.x, s.x + s.y}};
   }
 
-  /// How many times as far from the point as it is wide, as squares: so many digits second moments lose.
+  /// The square of the distance from the point over the width: the factor by which second moments lose digits.
   double remoteness() const {
     const Vec3 c = first / volume, q = squares / volume;
     return norm2(c) / (q.x + q.y + q.z - norm2(c));

@@ -16,7 +16,7 @@ struct Angle {
   double cosine, sine, weight;
 };
 
-/// Gauss's eight nodes. All weights of four quarters are 2 / 3 in sum.
+/// Gauss's eight nodes in a quarter. The weights of all four quarters sum to 2 / 3.
 // clang-format off
 constexpr std::array<Angle, 8> kQuarter{{
     {0.99951368521159, 0.031183217838231473, 0.008435711357531421},
@@ -29,11 +29,18 @@ constexpr std::array<Angle, 8> kQuarter{{
     {0.031183217838231487, 0.99951368521159, 0.008435711357531421},
 }};
 // clang-format on
+static_assert(
+    [] {
+      double sum = 0;
+      for (const Angle& angle : kQuarter) sum += 4 * angle.weight;
+      return sum > 2.0 / 3 - 1e-15 && sum < 2.0 / 3 + 1e-15;
+    }(),
+    "the weights of all four quarters sum to 2 / 3");
 
-/// Of an ellipse about the origin, of half axes a and b along the coordinates, the mean distance from (p, q): a third
-/// of the integral of |y| y × dy along its border, seen from there, per area.
+/// The mean distance from (p, q) of the points of an ellipse about the origin, with half axes a and b along the
+/// coordinates. It is a third of the integral of |y| y × dy along the border, seen from (p, q), per area.
 double mean_distance(double a, double b, double p, double q) {
-  // Of what is as narrow as that, the width does not matter, but it divides.
+  // The width of an ellipse as narrow as this does not matter, but the width divides.
   const double least = 1e-6 * (a + b + std::abs(p) + std::abs(q)) + DBL_MIN;
   a = std::max(a, least), b = std::max(b, least);
   const double along = p / a, across = q / b;
@@ -45,18 +52,19 @@ double mean_distance(double a, double b, double p, double q) {
   return mean;
 }
 
-/// The mean distance from the origin of the points of the ellipse about (u, v) that has these second moments, per area.
+/// The mean distance from the origin of the points of the ellipse about (u, v) with these second moments per area.
 double distance_in_ellipse(double u, double v, double uu, double uv, double vv) {
   const double middle = (uu + vv) / 2, half = (uu - vv) / 2, off = length(half, uv);
   const double turn = std::atan2(uv, half) / 2, cosine = std::cos(turn), sine = std::sin(turn);
-  // What is seen from behind counts less than nothing, and may leave such moments.
+  // Parts that are seen from behind count as negative, and may leave negative moments.
   const double a = 2 * std::sqrt(std::max(0.0, middle + off)), b = 2 * std::sqrt(std::max(0.0, middle - off));
   return mean_distance(a, b, -cosine * u - sine * v, sine * u - cosine * v);
 }
 
 }  // namespace
 
-/// With h the distance of the edge's line, and s how far along it points are: h / 6 (s √(h² + s²) + h² asinh(s / h)).
+/// h / 6 (s √(h² + s²) + h² asinh(s / h)) between the ends: h is the distance of the edge's line, and s the place of an
+/// end along the line.
 double distance_over_edge(double a, double b, double c, double d) {
   const double twice = a * d - b * c, p = length(a, b), q = length(c, d);
   // The line of the edge passes through the origin, but for rounding.
@@ -73,14 +81,14 @@ double distance_over_edge(double a, double b, double c, double d) {
 Patch PatchSums::patch() const {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   Patch result{area_, {kNone, kNone, kNone}, {{}, {}, {}}, kNone};
-  // What is nothing but rounding is another area each time that it is summed.
+  // An area that is only rounding differs each time that it is summed.
   if (!(size_ > 0 && one_ > size_ / 2 && one_ < 2 * size_)) return result;
   const double u = u1_ / one_, v = v1_ / one_;
   result.centre = origin_ + (u * u_ + v * v_);
   const double uu = uu_ - u * u1_, uv = uv_ - u * v1_, vv = vv_ - v * v1_;
   const Vec3 along_u = uu * u_ + uv * v_, along_v = uv * u_ + vv * v_;
   result.moments = {u_.x * along_u + v_.x * along_v, u_.y * along_u + v_.y * along_v, u_.z * along_u + v_.z * along_v};
-  // Of what is seen from behind, distances count less than nothing as well.
+  // Distances of parts that are seen from behind count as negative, too.
   result.distance =
       edges_alone_ ? std::max(0.0, distance_ / one_) : distance_in_ellipse(u, v, uu / one_, uv / one_, vv / one_);
   return result;

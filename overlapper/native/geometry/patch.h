@@ -4,8 +4,8 @@
 
 namespace overlapper {
 
-/// What lies within the line where the surfaces of two bodies cross, seen along the area vector of either's part: every
-/// surface within that line has the same integrals of functions that do not change along that direction (Gauss).
+/// The area within the line where the surfaces of two bodies cross, seen along the area vector of that line. Integrals
+/// of functions that do not change along this direction are the same over every surface within the line (Gauss).
 struct Patch {
   Vec3 area;    ///< m²: the area vector of the second body's part of the surface, so that it points to the first
   Vec3 centre;  ///< of that area, in the plane through the centroid of the volume; not a number without an area
@@ -22,9 +22,9 @@ inline Patch turned(const Patch& patch, const Mat3& rotation, Vec3 translation) 
 /// ∫ |x| dA over the triangle from the origin to the edge from (a, b) to (c, d), negative where that goes clockwise.
 double distance_over_edge(double a, double b, double c, double d);
 
-/// The plane that a patch is seen in, with integrals over it of 1, u, v, u², uv and v², right-handed coordinates there
-/// about the centroid. Where edges alone bound the patch, that of the distance from there is summed, too; parts of
-/// either body's surface differ, so that a patch of parts counts as an ellipse, which is the same for both.
+/// The plane that a patch is seen in, with integrals over the patch of 1, u, v, u², uv and v². The coordinates u and v
+/// are right-handed, about the centroid. The mean distance is exact if edges alone bound the patch. Otherwise the patch
+/// counts as an ellipse, as the parts of both surfaces have the same ellipse, but not the same mean distance.
 class PatchSums {
  public:
   PatchSums(Vec3 centroid, Vec3 area) : origin_(centroid), area_(area), size_(norm(area)) {
@@ -53,7 +53,7 @@ class PatchSums {
     distance_ += distance_over_edge(a, b, c, d);
   }
 
-  /// A triangle of which that is the area vector.
+  /// Adds a triangle with its area vector.
   void add_triangle(Vec3 p, Vec3 q, Vec3 r, Vec3 area) {
     const double w = dot(area, normal_);
     double au[3], av[3];

@@ -10,7 +10,7 @@ namespace overlapper {
 
 /// A bounded polytope about the origin, as dual of a hull of dual points. Facet f is the polygon
 /// ring[ring_start[f] .. ring_start[f + 1]) of vertices, counter-clockwise from outside, in the plane dot(dual[f], x) =
-/// 1, that is plane number plane[f] of those that were dualised. Every vertex lies on exactly three facets: where more
+/// 1, which is number plane[f] of the planes that were dualised. Every vertex lies on exactly three facets: where more
 /// than three planes meet, vertices coincide and some ridges have no length.
 struct Polytope {
   std::vector<Vec3> vertices;
@@ -24,7 +24,7 @@ struct Polytope {
   }
 };
 
-/// How far the vertex is from the origin that is farthest from it.
+/// The distance of the farthest vertex from the origin.
 double farthest_vertex(const Polytope& polytope);
 
 /// The dual point normal / (offset - dot(normal, origin)) of a plane that has `origin` strictly inside.

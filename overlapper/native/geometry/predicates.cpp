@@ -73,8 +73,8 @@ int orientation(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   const double det = dot(normal, w);
   const Vec3 bound{std::abs(u.y * v.z) + std::abs(u.z * v.y), std::abs(u.z * v.x) + std::abs(u.x * v.z),
                    std::abs(u.x * v.y) + std::abs(u.y * v.x)};
-  // Shewchuk's static bound for orient3d is (7 + 56 eps) eps with eps = 2^-53; 8 covers it.
-  constexpr double kRounding = 8 * 0x1p-53;
+  constexpr double kHalfUlp = 0x1p-53, kRounding = 8 * kHalfUlp;
+  static_assert(kRounding > (7 + 56 * kHalfUlp) * kHalfUlp, "the static bound of orient3d (Shewchuk 1997)");
   const double error = kRounding * dot(bound, abs(w));
   if (det > error) return 1;
   if (det < -error) return -1;
@@ -86,8 +86,9 @@ Vec3 accurate_normal(Vec3 a, Vec3 b, Vec3 c) { return rounded(wide_normal(a, b, 
 Vec3 polar_vertex(Vec3 a, Vec3 b, Vec3 c) {
   const Vec3 u = b - a, v = c - a;
   const Vec3 normal = cross(u, v);
-  // The differences and products lose about eps |u| |v|. Where the normal is less than a hundredth of that, the points
-  // are nearly collinear (three planes nearly share a line), and more digits are needed to place the vertex.
+  // The differences and products lose about 2^-53 |u| |v|. A normal shorter than kWellShaped |u| |v| has lost more than
+  // two digits: the points are nearly collinear, as three planes nearly share a line.
+  static_assert(kWellShaped == 1e-2, "the comment says two digits");
   if (!(norm2(normal) > kWellShaped * kWellShaped * norm2(u) * norm2(v))) return wide_polar_vertex(a, b, c);
   // All three have the same product with the normal; the shortest loses least to cancellation.
   const double aa = norm2(a), bb = norm2(b), cc = norm2(c);

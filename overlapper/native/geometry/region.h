@@ -19,7 +19,7 @@ using Frame = FrameAbout<Vec3>;
 /// frame.axes y. For polyhedra it is the common set; for smooth shapes it contains it, and shrinks to fit inside vertex
 /// by vertex.
 struct Region {
-  /// What is known of a facet besides its polygon.
+  /// A facet's plane and owner; its polygon is in the polytope.
   struct Facet {
     Vec3 normal;      ///< unit, outward
     double slack;     ///< m: distance of the plane from the frame's origin

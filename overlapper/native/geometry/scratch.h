@@ -6,8 +6,8 @@
 
 namespace overlapper {
 
-/// Memory that a thread uses again and again. Whoever asks for it while it is in use, as a signal handler may that
-/// computes something itself at a cancellation point, has other memory; what an exception left half done is forgotten.
+/// Memory that a thread uses again and again. A signal handler that computes something itself at a cancellation point
+/// may ask for memory that is in use, and gets other memory. Contents that an exception left half done are dropped.
 template <class T>
 class Scratch {
  public:
