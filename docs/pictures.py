@@ -37,7 +37,7 @@ def of_results(command: str, results: str, *pictures: str, by: tuple[str, ...]) 
 
 MAKERS = (
     Maker("docs/picture.py", ("picture.webp",), (*PAGE, "scenes/franka_grasp.py")),
-    Maker("docs/why.py", ("why.png",), ("overlapper/viewer/picture.py",)),
+    Maker("docs/why.py", ("why.png",), ("overlapper/viewer/*.py",)),
     Maker("docs/view.py", ("view.png",), (*PAGE, "scenes/franka_grasp.py")),
     Maker("docs/grip.py", ("grip.png",), (*PAGE, "scenes/franka_grasp.py")),
     Maker("docs/concave.py", ("concave.png",), (*PAGE, "examples/chain_links.py")),
@@ -45,7 +45,7 @@ MAKERS = (
     Maker("docs/meshes.py", ("meshes.png",), PAGE),
     Maker("docs/extraction.py", ("extraction.png",), ("overlapper/viewer/tessellation.py",)),
     Maker("docs/how.py", ("how.png", "how_frame.png", "how_slices.png", "how_ways.png")),
-    Maker("docs/polytopes.py", ("polytopes.png",), ("overlapper/viewer/picture.py",)),
+    Maker("docs/polytopes.py", ("polytopes.png",), ("overlapper/viewer/*.py",)),
     Maker("docs/results.py", ("results.png",), ("scenes/franka_grasp.py",)),
     of_results(
         "physics",

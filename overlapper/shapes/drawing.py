@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 SMOOTH = np.cos(np.deg2rad(40))  # of the angle between two facets: more is an edge to be seen
-Facets = Sequence[NDArray[np.integer[Any]]]
+Facets = Sequence[NDArray[np.integer[Any]]] | NDArray[np.integer[Any]]
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,8 @@ def polylines(points: Array) -> Array:
 
 def triangles(facets: Facets) -> NDArray[np.integer[Any]]:
     """Convex facets, rings of indices, cut into len(ring) - 2 triangles each: (k, 3), in the order of the facets."""
+    if isinstance(facets, np.ndarray) and facets.shape[1:] == (3,):
+        return facets
     return np.array([(ring[0], ring[i], ring[i + 1]) for ring in facets for i in range(1, len(ring) - 1)])
 
 

@@ -23,7 +23,7 @@ from overlapper.viewer.labels import Bodies, Contact, body_paths, labelled
 from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, volume_text
 from overlapper.viewer.pressure import DrawnForces, Forces, Scale, force_text, key_of
 from overlapper.viewer.recording import Recording
-from overlapper.viewer.stage import Stage, matrix
+from overlapper.viewer.stage import Stage, matrix, set_room
 
 import meshcat  # isort: skip  # after the stage, which says what to install
 from overlapper.viewer.server import Window, must_be_here, serve  # isort: skip
@@ -82,7 +82,7 @@ class Viewer:
             self._stage = Stage(self._framing, *self._looks)
             if self._server:
                 self._framing.see(bodies, contacts)
-                self._stage.set(self.visualizer, self._framing.whole())  # what will move is not known yet
+                set_room(self.visualizer, self._framing.whole())  # what will move is not known yet
         seen = self._seen(self._stage, self._framing, bodies, contacts, forces)
         self._show_bodies(self._stage, bodies)
         self._show_overlaps(self._stage, bodies, contacts, seen)

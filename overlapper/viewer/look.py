@@ -9,6 +9,7 @@ for in many models everything is white or grey.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +34,8 @@ LINE = (0.91, 0.92, 0.94)  # edges and vertices of overlaps
 TOP, BOTTOM = (0.20, 0.23, 0.28), (0.09, 0.10, 0.13)  # of the background
 GROUND, GRID = (0.36, 0.40, 0.47), (0.62, 0.68, 0.77)  # of a ground: its face and its lines, calm
 GROUND_OPACITY, GRID_OPACITY = 0.5, 0.45  # in its middle; it fades out from there
-LIGHT = np.array([0.5, -0.8, 1.4]) / np.linalg.norm([0.5, -0.8, 1.4])  # the way to it
+LIGHT = np.array([0.5, -0.8, 1.4]) / np.linalg.norm([0.5, -0.8, 1.4])  # the direction to the light
+AMBIENT, DIFFUSE = 0.45, 0.55  # of the light: what comes from all sides, what comes from that direction
 FIELD_OF_VIEW = 35.0  # degrees, from bottom to top
 PARTS = ("faces", "edges", "vertices", "marks", "forces")  # what a Look may show
 MANY_FACETS = 100  # more than that are only of what is round
@@ -75,6 +77,16 @@ OVERLAPS = Look(edges=False)
 def channels(color: str) -> Array:
     """(3,) red, green and blue in 0..1 of a colour #rrggbb."""
     return np.array([int(color[k : k + 2], 16) for k in (1, 3, 5)]) / 255
+
+
+def owner_color(number: int) -> Array:
+    """(3,) the colour of what the surface of that shape of a pair or more owns."""
+    return np.array(OWNER_COLORS[number % len(OWNER_COLORS)])
+
+
+def hexadecimal(color: Sequence[float] | Array) -> str:
+    """#rrggbb of red, green and blue in 0..1."""
+    return "#" + "".join(f"{round(255 * each):02x}" for each in color)
 
 
 def to_draw(overlap: Overlap, size: float) -> Overlap:

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from overlapper import Overlap
-from overlapper.viewer.look import OWNER_COLORS, Array, volume_text
-from overlapper.viewer.turning import HEIGHT, WIDTH, hexadecimal, turning
+from overlapper.viewer.look import Array, hexadecimal, owner_color, volume_text
+from overlapper.viewer.turning import HEIGHT, WIDTH, turning
 
 
 def overlap_html(overlap: Overlap) -> str:
@@ -33,7 +33,7 @@ def _told(overlap: Overlap) -> str:
 
 def _numbers(overlap: Overlap) -> Iterator[tuple[str, str]]:
     """Names and values, with units; where there is no volume, how far bodies are apart."""
-    colors = [hexadecimal(OWNER_COLORS[k % len(OWNER_COLORS)]) for k in range(len(overlap.shapes))]
+    colors = [hexadecimal(owner_color(k)) for k in range(len(overlap.shapes))]
     kinds = [
         f'<span style="color:{color}">\u25a0</span> {type(placed.shape).__name__}'
         for color, placed in zip(colors, overlap.shapes)

@@ -1,8 +1,7 @@
 """A picture of bodies and their overlaps as a PNG, drawn without a browser or a display.
 
-The camera, the light and the colours are those of a recording. Bodies are painted first, from far to near, each as a
-whole, as the faces that a convex body turns to the camera never hide each other; then overlaps in the same way; then
-what shines through everything. Pillow paints the faces, matplotlib draws lines and letters.
+The camera, the light and the colours are those of a recording. Faces are painted with the nearest in front at every
+pixel: bodies first, then overlaps, then arrows. matplotlib draws lines and letters.
 """
 
 from __future__ import annotations
@@ -14,64 +13,45 @@ from typing import Any
 
 import numpy as np
 
-from overlapper import Overlap, Placed
+from overlapper import Overlap
 from overlapper.install import hint
 from overlapper.quaternion import rotated
-from overlapper.shapes.drawing import polytope_edges
+from overlapper.shapes.drawing import triangles
 from overlapper.viewer.framing import Framing, View
 from overlapper.viewer.labels import Bodies, Contact, Pair, labelled
 from overlapper.viewer.look import (
     BODIES,
     BOTTOM,
     FIELD_OF_VIEW,
-    GRID,
-    GRID_OPACITY,
-    GROUND,
-    GROUND_OPACITY,
-    INK,
-    LIGHT,
     LINE,
     OVERLAPS,
     OWNER_COLORS,
     TOP,
     Array,
     Look,
-    arrow_length,
-    channels,
     to_draw,
     volume_text,
 )
-from overlapper.viewer.pressure import (
-    FORCE,
-    FRICTION,
-    Arrow,
-    DrawnForces,
-    Forces,
-    Press,
-    Scale,
-    colors,
-    force_text,
-    key_of,
-    pressures,
-)
-from overlapper.viewer.tessellation import Ground, ground, tessellation
+from overlapper.viewer.pressure import FORCE, FRICTION, DrawnForces, Forces, Press, Scale, colors, force_text, key_of
+from overlapper.viewer.primitives import BACK, BOTH, Dots, Drawing, Faces, Primitive
+from overlapper.viewer.raster import painted
 from overlapper.whole_file import beside
 
 try:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
     from matplotlib.offsetbox import AnchoredOffsetbox, DrawingArea, HPacker, TextArea, VPacker
     from matplotlib.patches import Polygon, Rectangle
-    from PIL import Image, ImageDraw
 except ImportError as missing:
     raise ImportError(f"overlapper.viewer.picture needs {hint('matplotlib')}") from missing
 
 WIDTH, HEIGHT = 1200, 900  # pixels
-FINER = 2  # times: so much larger are faces painted, to be smooth when made smaller
 ROWS = 8  # of the table: the largest
-BEHIND, BEFORE = 2, 4  # overlaps: where lines are drawn
 NEAR = 4.0  # times its size: from how far an overlap is looked at
+SLOPE = float(np.tan(np.deg2rad(FIELD_OF_VIEW) / 2))
+UNTURNED = np.array([0.0, 0.0, 0.0, 1.0])
+SOLID, SHARED, SHINING = range(3)  # layers: a later one hides an earlier one
 
 _Row = tuple[Pair, Overlap, "Press | None"]
 
@@ -94,260 +74,128 @@ def save(
     contacts = list(contacts)
     here = Framing(bodies)
     here.see(bodies, contacts)
+    framing = framing or here
     shared = sorted(labelled(bodies, contacts), key=lambda item: -item[2].overlap.volume)
     near = np.asarray(shared[0][2].overlap.bounds) if close and shared else None
-    picture = _Picture(framing or here, here.side(), near)
-    seen = None
+    picture = _Picture(_Camera.of(framing, here.side(), near))
+    drawing = Drawing(framing.center, framing.size, framing.is_ground, *looks)
+    height = 2 * picture.camera.distance * SLOPE  # m, seen where the camera looks at
+    drawn = None
     if forces is not None and looks[1].forces:
-        seen = DrawnForces.of(bodies, contacts, forces, picture.height / 4, framing or here)
+        drawn = DrawnForces.of(bodies, contacts, forces, height / 4, framing)
     for key, placed in zip(bodies.keys, bodies.placed, strict=True):
-        picture.add_body(placed, np.array(bodies.colors[key[:2]][:3]), looks[0])
+        picture.add(drawing.body(placed, bodies.colors[key[:2]]), SOLID, placed.position, placed.orientation)
     table = []
     for pair, _, contact in shared:
-        press = seen.pressed.get(key_of(contact)) if seen else None
-        picture.add_overlap(to_draw(contact.overlap, picture.size), looks[1], press, seen.scale if seen else None)
+        press = drawn.pressed.get(key_of(contact)) if drawn else None
+        coarse = to_draw(contact.overlap, framing.size)
+        primitives = drawing.overlap(coarse, press, drawn.scale if drawn else None)
+        picture.add(primitives, SHARED, np.asarray(coarse.centroid))
         table.append((pair, contact.overlap, press))
-    if seen:
-        for arrow in seen.arrows:
-            picture.add_force(arrow, seen.scale)
-    picture.save(Path(path), title, table, seen.scale if seen else None)
+    if drawn:
+        for arrow in drawn.arrows:
+            picture.add(drawing.force(arrow, drawn.scale, 2 * height), SHINING, arrow.start)
+    picture.save(Path(path), title, table, drawn.scale if drawn else None)
     return Path(path)
 
 
-@dataclass
-class _Side:
-    """What is seen of a convex body from outside, or from inside: polygons on the screen, and their colours.
+@dataclass(frozen=True)
+class _Camera:
+    """It looks at a point, m, from that `distance`; `axes` (3, 3) point right, up and back to the camera."""
 
-    The opacity is that of all, or there is one of each polygon.
-    """
+    at: Array
+    axes: Array
+    distance: float
 
-    depth: float
-    opacity: float | Sequence[float]
-    polygons: list[Array]
-    colors: list[Array]
+    @classmethod
+    def of(cls, framing: Framing, back: Array, near: Array | None) -> _Camera:
+        """As far off as the framing asks for; with a box `near` (2, 3), a few times the size of that box."""
+        view = View.of([near] if near is not None else framing.opening().framed, back)
+        right = np.array([-back[1], back[0], 0.0]) / np.hypot(back[0], back[1])
+        distance = view.distance(WIDTH / HEIGHT) if near is None else NEAR * float(np.linalg.norm(near[1] - near[0]))
+        return cls(view.at, np.array([right, np.cross(back, right), back]), distance)
 
-    def paint(self, canvas: Image.Image) -> None:
-        opacities = np.broadcast_to(self.opacity, len(self.polygons))
-        if not opacities.any():
-            return
-        scale = FINER * HEIGHT / 2
-        middle = np.array(canvas.size) / 2
-        polygons = [np.clip(middle + points * [scale, -scale], -1e7, 1e7) for points in self.polygons]
-        corners = np.concatenate(polygons)
-        left, top = np.clip(np.floor(corners.min(axis=0)), 0, canvas.size).astype(int)
-        right, bottom = np.clip(np.ceil(corners.max(axis=0)) + 1, 0, canvas.size).astype(int)
-        if left >= right or top >= bottom:
-            return
-        paint = Image.new("RGB", (right - left, bottom - top))
-        mask = Image.new("L", paint.size)
-        for points, color, opacity in zip(polygons, self.colors, opacities, strict=True):
-            outline = list(map(tuple, points - [left, top]))
-            ImageDraw.Draw(paint).polygon(outline, fill=tuple((255 * color).round().astype(int)))
-            ImageDraw.Draw(mask).polygon(outline, fill=round(255 * float(opacity)))
-        paint.putalpha(mask)
-        canvas.alpha_composite(paint, (int(left), int(top)))
+    def seen(self, points: Array) -> Array:
+        """World points (..., 3) in the camera's frame, where it looks along -z from the origin."""
+        seen: Array = (points - self.at) @ self.axes.T - [0, 0, self.distance]
+        return seen
+
+    def on_screen(self, seen: Array) -> Array:
+        """Where points (..., 3) in the camera's frame are on the screen, (..., 2), in half heights from its middle."""
+        screen: Array = seen[..., :2] / (SLOPE * np.maximum(-seen[..., 2:], 1e-3 * self.distance))
+        return screen
 
 
 class _Picture:
-    def __init__(self, framing: Framing, back: Array, near: Array | None) -> None:
-        view = View.of([near] if near is not None else framing.opening().framed, back)
-        self.center, self.size, self._is_ground = framing.center, framing.size, framing.is_ground
-        self.target, self.back, self.distance = view.at, view.back, view.distance(WIDTH / HEIGHT)
-        if near is not None:
-            self.distance = NEAR * float(np.linalg.norm(near[1] - near[0]))
-        right = np.array([-self.back[1], self.back[0], 0.0]) / np.hypot(self.back[0], self.back[1])
-        self.axes = np.array([right, np.cross(self.back, right), self.back])
-        self.bodies: list[_Side] = []
-        self.overlaps: list[_Side] = []
-        self.lines: list[tuple[Array, Array, int]] = []  # (k, 2, 2) segments, (k, 4) colours, BEHIND or BEFORE
-        self.heads: list[Array] = []
-        self.dots: list[tuple[Array, Array, float]] = []
-        self.pushes: list[tuple[Array, Any]] = []  # polygons, and their colours
-        self.height = 2 * self.distance * float(np.tan(np.deg2rad(FIELD_OF_VIEW) / 2))  # m, seen where it looks at
+    def __init__(self, camera: _Camera) -> None:
+        self.camera = camera
+        self._faces: list[list[tuple[Array, Array]]] = [[], [], []]  # triangles and colours, by layer
+        self._lines: list[tuple[Array, Array, int]] = []  # segments on the screen, colours, layer
+        self._dots: list[tuple[Array, Dots, int]] = []
 
-    def seen(self, points: Array) -> tuple[Array, Array]:
-        """Where world points (n, 3) are on the screen, (n, 2), in half heights from its middle, and how far off, m."""
-        view = (points - self.target) @ self.axes.T
-        depth = np.maximum(self.distance - view[:, 2], 1e-3 * self.distance)
-        return view[:, :2] / (depth * np.tan(np.deg2rad(FIELD_OF_VIEW) / 2))[:, None], depth
-
-    def _before_camera(self, ring: Array) -> Array:
-        """What of a polygon (n, 3) is before the camera: (m, 3), of which there may be none."""
-        ahead = 0.99 * self.distance - (ring - self.target) @ self.back
-        if (ahead >= 0).all():
-            return ring
-        kept = []
-        for here, there, a, b in zip(ring, np.roll(ring, -1, axis=0), ahead, np.roll(ahead, -1), strict=True):
-            if a >= 0:
-                kept.append(here)
-            if (a >= 0) != (b >= 0):
-                kept.append(here + a / (a - b) * (there - here))
-        return np.array(kept).reshape(-1, 3)
-
-    def add_body(self, placed: Placed, color: Array, look: Look) -> None:
-        if self._is_ground(placed) and (drawn := self._ground(placed)):
-            self._add_ground(placed, drawn, look)
-            return
-        outlined = tessellation(placed.shape)
-        vertices = _in_world(placed, outlined.vertices)
-        if look.faces:
-            front = channels(look.front) if look.front else color
-            back = channels(look.back) if look.back else None
-            rings = list(outlined.faces)
-            self._add_sides([vertices[ring] for ring in rings], [front] * len(rings), back, look.opacity, self.bodies)
-        segments = outlined.edges if look.faces else outlined.wires
-        if look.edges:
-            shade = np.append(color, 0.35 if look.faces else 0.8)
-            self._add_lines(_in_world(placed, segments), shade, BEHIND)
-        if look.vertices:
-            self.dots.append((self.seen(vertices)[0], color, 4.0))
-
-    def _ground(self, placed: Placed) -> Ground | None:
-        back = np.append(-placed.orientation[:3], placed.orientation[3])
-        return ground(placed.shape, rotated(back, self.center - placed.position), self.size)
-
-    def _add_ground(self, placed: Placed, drawn: Ground, look: Look) -> None:
-        """The plane, which fades out from its middle, behind all that stands on it."""
-        if look.faces:
-            triangles = drawn.vertices[drawn.faces]
-            strength = GROUND_OPACITY * drawn.strength(triangles.mean(axis=1))
-            cells = [self._before_camera(_in_world(placed, each)) for each in triangles]
-            seen = [(cell, each) for cell, each in zip(cells, strength, strict=True) if len(cell)]
-            polygons = [self.seen(cell)[0] for cell, _ in seen]
-            opacities = [float(each) for _, each in seen]
-            self.bodies.append(_Side(np.inf, opacities, polygons, [np.array(GROUND)] * len(polygons)))
-        if look.edges:
-            strength = GRID_OPACITY * drawn.strength(drawn.edges.mean(axis=1))
-            colors = np.column_stack([np.tile(GRID, (len(strength), 1)), strength])
-            self._add_lines(_in_world(placed, drawn.edges), colors, BEHIND)
-
-    def add_overlap(self, overlap: Overlap, look: Look, press: Press | None = None, scale: Scale | None = None) -> None:
-        vertices, centroid = overlap.vertices, np.asarray(overlap.centroid)
-        if look.faces and press and scale:
-            corners, found = pressures(overlap, press, scale.top)
-            shades = list(colors(found.mean(axis=1), scale.top))
-            self._add_sides(list(corners), shades, None, look.opacity, self.overlaps, lit=False)
-        elif look.faces:
-            own = [np.array(OWNER_COLORS[owner % len(OWNER_COLORS)]) for owner in overlap.owner]
-            fronts = [channels(look.front)] * len(own) if look.front else own
-            back = channels(look.back) if look.back else np.array([0.3, 0.3, 0.3])
-            self._add_sides([vertices[ring] for ring in overlap.facets], fronts, back, look.opacity, self.overlaps)
-        if look.edges:
-            self._add_lines(vertices[polytope_edges(overlap.facets)], np.append(LINE, 1.0), BEFORE)
-        if look.vertices:
-            self.dots.append((self.seen(vertices)[0], np.array(LINE), 5.0))
-        if look.marks:
-            self._add_marks(overlap, centroid, arrow=press is None)
-        if np.ptp(vertices, axis=0).max() < 0.015 * self.size:
-            self.dots.append((self.seen(centroid[None])[0], np.array(INK), 6.0))
-
-    def add_force(self, arrow: Arrow, scale: Scale) -> None:
-        """The force of a pair of links, and what of it is friction."""
-        for force, color, thick in ((arrow.force, FORCE, 0.007), (arrow.friction, FRICTION, 0.009)):
-            (start, end), _ = self.seen(np.array([arrow.start, arrow.start + scale.arrow(force)]))
-            along = end - start
-            length = float(np.linalg.norm(along))
-            if length < 0.008:
+    def add(self, primitives: Sequence[Primitive], layer: int, position: Array, turn: Array = UNTURNED) -> None:
+        """Primitives in a frame that is turned and placed so in the world."""
+        for each in primitives:
+            if not each.visible:
                 continue
-            along /= length
-            aside, head = np.array([-along[1], along[0]]), min(0.06, 0.6 * length)
-            wide = min(3.2 * thick, 0.4 * head)
-            outline = [(0, thick), (length - head, thick), (length - head, wide), (length, 0)]
-            outline += [(length - head, -wide), (length - head, -thick), (0, -thick)]
-            self.pushes.append((np.array([start + far * along + off * aside for far, off in outline]), color))
-
-    def _add_marks(self, overlap: Overlap, centroid: Array, arrow: bool) -> None:
-        ink = np.append(INK, 1.0)
-        for ring in overlap.patch:
-            self._add_lines(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1), ink, BEFORE)
-        if overlap.normal is None or not arrow:
-            return
-        tip = centroid + arrow_length(overlap.area, self.size) * overlap.normal
-        self._add_lines(np.array([[centroid, tip]]), ink, BEFORE)
-        (start, end), _ = self.seen(np.array([centroid, tip]))
-        along = end - start
-        aside = 0.3 * np.array([-along[1], along[0]])
-        self.heads.append(np.array([end, end - 0.2 * along + 0.25 * aside, end - 0.2 * along - 0.25 * aside]))
-
-    def _add_sides(
-        self,
-        faces: Sequence[Array],
-        fronts: Sequence[Array],
-        back: Array | None,
-        opacity: float,
-        to: list[_Side],
-        lit: bool = True,
-    ) -> None:
-        """Faces, counter-clockwise from outside, flat and matt; first those seen from inside, if they have a colour.
-
-        Those that are not `lit` have their colour from all sides.
-        """
-        outside, inside = _Side(0.0, opacity, [], []), _Side(0.0, opacity, [], [])
-        eye = self.target + self.distance * self.back
-        for corners, front in zip(faces, fronts, strict=True):
-            normal = np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
-            normal /= np.linalg.norm(normal) or 1.0
-            light = 0.4 + 0.7 * (0.45 + 0.55 * max(0.0, float(normal @ LIGHT))) if lit else 1.0
-            if normal @ (eye - corners[0]) > 0:
-                side, color = outside, front * light
-            elif back is not None:
-                side, color = inside, back
+            points = rotated(turn, each.points) + position
+            on = SHINING if each.through else layer
+            if isinstance(each, Faces):
+                self._faces[on].append(self._seen_faces(each, points))
+            elif isinstance(each, Dots):
+                self._dots.append((self.camera.on_screen(self.camera.seen(points)), each, on))
             else:
-                continue
-            before = self._before_camera(corners)
-            if not len(before):
-                continue
-            side.polygons.append(self.seen(before)[0])
-            side.colors.append(np.minimum(color, 1.0))
-        # Of two bodies, the one whose middle is nearer is taken for the one in front.
-        depth = float(self.seen(np.mean([face.mean(axis=0) for face in faces], axis=0)[None])[1][0])
-        outside.depth, inside.depth = depth, depth + 1e-6 * self.size
-        to += [outside, inside]
+                self._add_lines(each, self.camera.seen(points), on)
 
-    def _add_lines(self, segments: Array, colors: Array, order: int) -> None:
-        """Segments (k, 2, 3) in the world; a colour with its opacity, (4,), or one of each, (k, 4)."""
-        ahead = 0.99 * self.distance - (segments - self.target) @ self.back  # (k, 2)
+    def _seen_faces(self, faces: Faces, points: Array) -> tuple[Array, Array]:
+        """Triangles (k, 3, 3) in the camera's frame, and their colours (k, 4); those that are seen from their side."""
+        facets = triangles(faces.facets)
+        corners = points[facets]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+        eye = self.camera.at + self.camera.distance * self.camera.axes[2]
+        turned = ((eye - corners[:, 0]) * normals).sum(axis=1) <= 0
+        normals[turned] *= -1
+        color = faces.color if faces.color.ndim == 1 else faces.color[facets].mean(axis=1)
+        opacity = faces.opacity * (1.0 if faces.strength is None else faces.strength[facets].mean(axis=1))
+        shaded = np.minimum(faces.shade(normals)[:, None] * color, 1)
+        kept = np.full(len(facets), True) if faces.side == BOTH else turned == (faces.side == BACK)
+        rgba = np.column_stack([shaded, np.broadcast_to(opacity, len(shaded))])
+        return self.camera.seen(corners[kept]), rgba[kept]
+
+    def _add_lines(self, lines: Primitive, ends: Array, layer: int) -> None:
+        """Segments (k, 2, 3) in the camera's frame, cut off where they come too near to the camera."""
+        opacity = lines.opacity * (np.ones(len(ends)) if lines.strength is None else lines.strength.mean(axis=1))
+        ahead = -ends[..., 2] - 0.01 * self.camera.distance  # (k, 2)
         seen = (ahead > 0).any(axis=1)
-        ends, ahead = segments[seen], ahead[seen]
-        cut = np.clip(ahead / np.where(ahead == ahead[:, ::-1], 1, ahead - ahead[:, ::-1]), None, 1)
-        behind = ahead < 0
-        ends = np.where(behind[..., None], ends + cut[..., None] * (ends[:, ::-1] - ends), ends)
-        colors = np.broadcast_to(colors, (len(segments), 4))[seen]
-        self.lines.append((self.seen(ends.reshape(-1, 3))[0].reshape(-1, 2, 2), colors, order))
+        ends, ahead = ends[seen], ahead[seen]
+        part = np.clip(ahead / np.where(ahead == ahead[:, ::-1], 1, ahead - ahead[:, ::-1]), None, 1)
+        ends = np.where((ahead < 0)[..., None], ends + part[..., None] * (ends[:, ::-1] - ends), ends)
+        colors = np.column_stack([np.tile(lines.color, (len(ends), 1)), opacity[seen]])
+        self._lines.append((self.camera.on_screen(ends), colors, layer))
 
     def save(self, path: Path, title: str, table: Sequence[_Row], scale: Scale | None) -> None:
         figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100, facecolor=BOTTOM)
-        axes = figure.add_axes((0, 0, 1, 1), xlim=(-WIDTH / HEIGHT, WIDTH / HEIGHT), ylim=(-1, 1))
+        aspect = WIDTH / HEIGHT
+        axes = figure.add_axes((0, 0, 1, 1), xlim=(-aspect, aspect), ylim=(-1, 1))
         axes.set_axis_off()
         axes.set_autoscale_on(False)
         shades = np.linspace(TOP, BOTTOM, HEIGHT)[:, None].repeat(WIDTH, axis=1)
-        for order, layer in ((0, shades), (1, _painted(self.bodies)), (3, _painted(self.overlaps))):
-            axes.imshow(layer, extent=(-WIDTH / HEIGHT, WIDTH / HEIGHT, -1, 1), aspect="auto", zorder=order)
-        for segments, color, order in self.lines:
-            axes.add_collection(LineCollection(list(segments), colors=color, linewidths=1.0, zorder=order))
-        axes.add_collection(PolyCollection(self.heads, facecolors=[INK], zorder=BEFORE))
-        for points, color, size in self.dots:
-            axes.plot(*points.T, ".", color=tuple(color), markersize=size, zorder=BEFORE + 1)
-        for polygon, color in self.pushes:
-            patch = Polygon(polygon, facecolor=color, edgecolor=BOTTOM, linewidth=0.8, zorder=BEFORE + 2)
-            axes.add_patch(patch)
+        axes.imshow(shades, extent=(-aspect, aspect, -1, 1), aspect="auto", zorder=0)
+        for layer, faces in enumerate(self._faces):
+            if faces:
+                corners, paint = (np.concatenate(each) for each in zip(*faces, strict=True))
+                image = painted(corners, paint, SLOPE, WIDTH, HEIGHT)
+                axes.imshow(image, extent=(-aspect, aspect, -1, 1), aspect="auto", zorder=layer + 1)
+        for segments, color, layer in self._lines:
+            axes.add_collection(LineCollection(list(segments), colors=color, linewidths=1.0, zorder=layer + 1.3))
+        for points, dots, layer in self._dots:
+            axes.plot(*points.T, ".", color=tuple(dots.color), markersize=dots.size + 1, zorder=layer + 1.6)
         axes.add_artist(_table(title, table))
         if scale:
             axes.add_artist(_legend(scale))
         with beside(path) as file:
             FigureCanvasAgg(figure).print_png(str(file))  # type: ignore[no-untyped-call]
-
-
-def _in_world(placed: Placed, points: Array) -> Array:
-    return rotated(placed.orientation, points) + placed.position
-
-
-def _painted(sides: Sequence[_Side]) -> Any:
-    """(HEIGHT, WIDTH, 4), from far to near."""
-    canvas = Image.new("RGBA", (FINER * WIDTH, FINER * HEIGHT))
-    for side in sorted(sides, key=lambda side: -side.depth):
-        side.paint(canvas)
-    return np.asarray(canvas.resize((WIDTH, HEIGHT), Image.Resampling.BOX))
 
 
 def _text(words: str, color: Any = LINE) -> TextArea:

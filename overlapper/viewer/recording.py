@@ -52,7 +52,7 @@ from overlapper.viewer.pressure import (
     usual,
     usual_force,
 )
-from overlapper.viewer.stage import Stage, rgb
+from overlapper.viewer.stage import Stage, rgb, set_room
 from overlapper.whole_file import beside
 
 from meshcat import Visualizer  # isort: skip  # after the stage, which says what to install
@@ -176,7 +176,7 @@ class Recording:
         if self._stage is None or self._framing is None:
             raise ValueError("there is nothing to save: add at least one frame first")
         tape = _Tape(list(self._tape.commands))
-        self._stage.set(Visualizer(window=tape), self._framing.opening())
+        set_room(Visualizer(window=tape), self._framing.opening())
         folder = Path(__file__).with_name("page")
         texts = {
             "script": "\n".join((folder / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS),
@@ -253,7 +253,7 @@ class Recording:
             self._visualizer[node].set_object(stage.body(placed, color))
             self._bodies[path] = shape, node
             self._nodes[node] = len(self._nodes)
-            if stage.ground(placed):
+            if stage.drawing.ground(placed):
                 self._grounds.append(self._nodes[node])
         return node
 

@@ -1,4 +1,4 @@
-"""What bodies and overlaps are in meshcat: geometries, materials, lights and a camera. Lengths in metres, z is up."""
+"""What is drawn, as objects of meshcat, and the room around them. Lengths are in metres, z is up."""
 
 from __future__ import annotations
 
@@ -11,27 +11,11 @@ from numpy.typing import NDArray
 
 from overlapper import Overlap, Placed
 from overlapper.install import hint
-from overlapper.shapes.drawing import polytope_edges, triangles
+from overlapper.shapes.drawing import triangles
 from overlapper.viewer.framing import Framing, View
-from overlapper.viewer.look import (
-    BOTTOM,
-    FIELD_OF_VIEW,
-    GRID,
-    GRID_OPACITY,
-    GROUND,
-    GROUND_OPACITY,
-    INK,
-    LIGHT,
-    LINE,
-    OWNER_COLORS,
-    TOP,
-    Look,
-    arrow_length,
-    channels,
-    to_draw,
-)
-from overlapper.viewer.pressure import FORCE, FRICTION, Arrow, Press, Scale, colors, pressures
-from overlapper.viewer.tessellation import Ground, cone, ground, rotation_from_z, tessellation
+from overlapper.viewer.look import AMBIENT, BOTTOM, DIFFUSE, FIELD_OF_VIEW, LIGHT, TOP, Array, Look, to_draw
+from overlapper.viewer.pressure import Arrow, Press, Scale
+from overlapper.viewer.primitives import Dots, Drawing, Faces, Lines, Primitive
 
 try:
     from meshcat import geometry
@@ -39,192 +23,56 @@ try:
 except ImportError as missing:
     raise ImportError(f"overlapper.viewer needs {hint('meshcat')}") from missing
 
-Array = NDArray[np.float64]
-FRONT, BACK, BOTH = 0, 1, 2  # three.js: the sides from which a face is seen
-
 
 class Stage:
-    """Background, lights, camera, and the sizes that follow the scene; fixed by the first bodies seen."""
+    """A drawing as objects of meshcat. Its centre and size are those of the first bodies seen."""
 
     def __init__(self, framing: Framing, bodies: Look, overlaps: Look) -> None:
         self.center, self.size = framing.center, framing.size
-        self._is_ground = framing.is_ground
-        self._bodies, self._overlaps = bodies, overlaps
-        self._known: dict[bytes, tuple[bool, _Mesh, geometry.PointsGeometry, geometry.PointsGeometry]] = {}
-        fronts = [channels(overlaps.front)] if overlaps.front else [np.array(color) for color in OWNER_COLORS]
-        # Mostly of their own light, so that an owner is known from the shaded side, too.
-        fade = {"opacity": overlaps.opacity, "depthWrite": overlaps.opacity == 1}
-        self._fronts = [_skin(rgb(0.7 * color), flat=True, emissive=rgb(0.4 * color), **fade) for color in fronts]
-        backs = [channels(overlaps.back)] if overlaps.back else [0.5 * color for color in fronts]
-        self._backs = [
-            geometry.MeshBasicMaterial(color=rgb(each), transparent=True, side=BACK, **fade) for each in backs
-        ]
-        self._lines = geometry.LineBasicMaterial(color=rgb(LINE), transparent=True)
-        self._corners = _DotMaterial(color=rgb(LINE), size=4, sizeAttenuation=False, transparent=True)
-        through_everything = {"color": rgb(INK), "transparent": True, "depthTest": False}
-        self._shining = geometry.LineBasicMaterial(**through_everything)
-        self._dot = geometry.Points(
-            _points(np.zeros((1, 3))), _DotMaterial(size=5, sizeAttenuation=False, **through_everything)
-        )
-        self._pressures = geometry.MeshBasicMaterial(vertexColors=True, transparent=True, **fade)
-        self._pushes = [
-            geometry.MeshBasicMaterial(**through_everything | {"color": rgb(color)}) for color in (FORCE, FRICTION)
-        ]
-        head = cone(radius=0.05, bottom=0.8, top=1.0)
-        self._arrowhead = geometry.Mesh(
-            _Mesh(head.vertices, head.faces), geometry.MeshBasicMaterial(**through_everything)
-        )
-
-    def ground(self, placed: Placed) -> Ground | None:
-        """What is drawn, in its own frame, of a shape that is a ground; None of another."""
-        if not self._is_ground(placed):
-            return None
-        center = np.linalg.inv(matrix(placed)) @ [*self.center, 1]
-        return ground(placed.shape, center[:3], self.size)
+        self.drawing = Drawing(framing.center, framing.size, framing.is_ground, bodies, overlaps)
+        self._known: dict[bytes, list[_Buffers]] = {}
 
     def body(self, placed: Placed, color: Sequence[float]) -> Group:
-        """A shape in its own frame. What is not to be seen is there, too, so that a page can show it."""
-        if seen := self.ground(placed):
-            return self._plane(seen)
-        look = self._bodies
-        flat, mesh, edges, wires = self._geometries(placed)
-        front = _skin(
-            rgb(channels(look.front) if look.front else color), flat, opacity=look.opacity, depthWrite=look.opacity == 1
-        )
-        line = geometry.LineBasicMaterial(color=rgb(color), opacity=0.35, transparent=True, depthWrite=False)
-        wire = geometry.LineBasicMaterial(color=rgb(color), transparent=True)
-        dots = _DotMaterial(color=rgb(color), size=4, sizeAttenuation=False, transparent=True)
-        return Group(
-            (geometry.Mesh(mesh, front), {"name": "faces", "visible": look.faces}),
-            *self._inside(mesh, look),
-            (geometry.LineSegments(edges, line), {"name": "edges", "visible": look.edges and look.faces}),
-            (
-                geometry.LineSegments(wires, wire),
-                {"name": "wires", "visible": look.edges and not look.faces},
-            ),
-            (geometry.Points(mesh, dots), {"name": "vertices", "visible": look.vertices}),
-        )
-
-    def _plane(self, seen: Ground) -> Group:
-        """A ground, in colours of its own, before all that stands on it."""
-        lines = seen.edges.reshape(-1, 3)
-        faded = {"transparent": True, "depthWrite": False, "vertexColors": True}
-        face = geometry.MeshBasicMaterial(color=rgb(GROUND), side=BOTH, opacity=GROUND_OPACITY, **faded)
-        line = geometry.LineBasicMaterial(color=rgb(GRID), opacity=GRID_OPACITY, **faded)
-        mesh = _Mesh(seen.vertices, seen.faces, strength=seen.strength(seen.vertices))
-        return Group(
-            (geometry.Mesh(mesh, face), {"name": "faces", "visible": self._bodies.faces, "renderOrder": -2}),
-            (
-                geometry.LineSegments(_points(lines, seen.strength(lines)), line),
-                {"name": "edges", "visible": self._bodies.edges, "renderOrder": -1},
-            ),
-        )
-
-    def _geometries(self, placed: Placed) -> tuple[bool, _Mesh, geometry.PointsGeometry, geometry.PointsGeometry]:
-        """Whether faces are flat; faces, edges and wires, which are the same for the same shape."""
+        """A shape in its own frame. Equal shapes share their geometries, which a page keeps once."""
+        primitives = self.drawing.body(placed, color)
+        if self.drawing.ground(placed):
+            return _group(primitives, _buffers(primitives))
         shape = pickle.dumps(placed.shape)
         if shape not in self._known:
-            drawn = tessellation(placed.shape)
-            mesh = _Mesh(drawn.vertices, drawn.faces, drawn.normals)
-            self._known[shape] = drawn.normals is None, mesh, _lines(drawn.edges), _lines(drawn.wires)
-        return self._known[shape]
-
-    def _inside(self, mesh: _Mesh, look: Look) -> list[tuple[geometry.Object, dict[str, Any]]]:
-        if look.back is None:
-            return []
-        skin = _skin(rgb(channels(look.back)), True, side=BACK, opacity=look.opacity, depthWrite=look.opacity == 1)
-        return [(geometry.Mesh(mesh, skin), {"name": "inside", "visible": look.faces})]
+            self._known[shape] = _buffers(primitives)
+        return _group(primitives, self._known[shape])
 
     def overlap(self, overlap: Overlap, press: Press | None = None, scale: Scale | None = None) -> Group:
-        """Facets by owner, patch outline and normal; about the centroid, where float32 is fine enough.
-
-        With what the two do to each other and a scale, facets are by pressure, and there is no normal.
-        """
-        overlap, look = to_draw(overlap, self.size), self._overlaps
-        centroid = np.asarray(overlap.centroid)
-        vertices = overlap.vertices - centroid
-        parts: list[tuple[geometry.Object, dict[str, Any]]] = []
-        if look.faces and press and scale:
-            corners, found = (each.reshape(-1, *each.shape[2:]) for each in pressures(overlap, press, scale.top))
-            faces = np.arange(len(corners)).reshape(-1, 3)
-            mesh = _Mesh(corners - centroid, faces, paint=colors(found, scale.top))
-            parts.append((geometry.Mesh(mesh, self._pressures), {"renderOrder": 1}))
-        elif look.faces:
-            parts = self._facets(overlap, vertices)
-        if look.edges:
-            segments = vertices[polytope_edges(overlap.facets)]
-            parts.append((geometry.LineSegments(_lines(segments), self._lines), {"renderOrder": 1}))
-        if look.vertices:
-            parts.append((geometry.Points(_points(vertices), self._corners), {"renderOrder": 1}))
-        if look.marks:
-            parts += self._marks(overlap, centroid, arrow=press is None)
-        if np.ptp(vertices, axis=0).max() < 0.015 * self.size:
-            parts.append((self._dot, {"renderOrder": 3}))
-        return Group((Group(*parts), {"position": centroid.tolist()}))
+        """An overlap by its owners; with the forces of the pair and a scale, by its pressures."""
+        coarse = to_draw(overlap, self.size)
+        return _placed(self.drawing.overlap(coarse, press, scale), np.asarray(coarse.centroid))
 
     def force(self, arrow: Arrow, scale: Scale) -> Group:
-        """The force of a pair of links, and what of it is friction."""
-        parts: list[tuple[geometry.Object, dict[str, Any]]] = []
-        for vector, material, thick in zip((arrow.force, arrow.friction), self._pushes, (1.0, 1.2), strict=True):
-            drawn = scale.arrow(vector)
-            length = float(np.linalg.norm(drawn))
-            if length < 0.002 * self.size:
-                continue
-            tip = min(0.02 * self.size, 0.6 * length)
-            wide = min(0.005 * thick * self.size, 0.4 * tip)
-            shaft, head = cone(wide / 3, 0.0, length - tip, wide / 3), cone(wide, length - tip, length)
-            faces = np.concatenate([shaft.faces, head.faces + len(shaft.vertices)])
-            vertices = np.concatenate([shaft.vertices, head.vertices]) @ rotation_from_z(drawn / length).T
-            parts.append((geometry.Mesh(_Mesh(vertices, faces), material), {"renderOrder": 2.5}))
-        return Group((Group(*parts), {"position": arrow.start.tolist()}))
+        """The force of a pair of links."""
+        return _placed(self.drawing.force(arrow, scale, self.size), arrow.start)
 
-    def _marks(self, overlap: Overlap, centroid: Array, arrow: bool) -> list[tuple[geometry.Object, dict[str, Any]]]:
-        parts: list[tuple[geometry.Object, dict[str, Any]]] = []
-        lines = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) - centroid for ring in overlap.patch]
-        if arrow and overlap.normal is not None:
-            length = arrow_length(overlap.area, self.size)
-            lines.append(np.array([[np.zeros(3), length * overlap.normal]]))
-            pose = np.eye(4)
-            pose[:3, :3] = length * rotation_from_z(overlap.normal)
-            parts.append((self._arrowhead, {"renderOrder": 2, "matrix": pose.T.ravel().tolist()}))
-        if lines:
-            parts.append((geometry.LineSegments(_lines(np.concatenate(lines)), self._shining), {"renderOrder": 2}))
-        return parts
 
-    def _facets(self, overlap: Overlap, vertices: Array) -> list[tuple[geometry.Object, dict[str, Any]]]:
-        """A mesh for each owner, and for what is seen of it from inside if faces are seen through."""
-        faces = triangles(overlap.facets)
-        owners = np.repeat(overlap.owner, [len(facet) - 2 for facet in overlap.facets])
-        parts: list[tuple[geometry.Object, dict[str, Any]]] = []
-        for owner in np.unique(owners):
-            used, renumbered = np.unique(faces[owners == owner], return_inverse=True)
-            mesh = _Mesh(vertices[used], renumbered.reshape(-1, 3))
-            if self._overlaps.opacity < 1:
-                parts.append((geometry.Mesh(mesh, self._backs[owner % len(self._backs)]), {"renderOrder": 0.5}))
-            parts.append((geometry.Mesh(mesh, self._fronts[owner % len(self._fronts)]), {"renderOrder": 1}))
-        return parts
-
-    def set(self, visualizer: Any, view: View) -> None:
-        """A dark room, plain light, and the camera of a view."""
-        for name in ("Grid", "Axes", "Lights/PointLightNegativeX", "Lights/PointLightPositiveX"):
-            visualizer[f"/{name}"].set_property("visible", False)
-        visualizer["/Background"].set_property("top_color", list(TOP))
-        visualizer["/Background"].set_property("bottom_color", list(BOTTOM))
-        center, distance = view.at, view.distance()
-        # meshcat's camera circles about the page's origin; so the scene is moved there, and the camera moved with it.
-        z_up = rotation_matrix(-np.pi / 2, (1, 0, 0))
-        visualizer["/"].set_transform(z_up @ translation_matrix(-center))
-        visualizer["/Cameras/default"].set_transform(translation_matrix(center))
-        lens = visualizer["/Cameras/default/rotated/<object>"]
-        x, y, z = (distance * view.back).tolist()
-        lens.set_property("position", [x, z, -y])
-        lens.set_property("fov", FIELD_OF_VIEW)
-        lens.set_property("near", distance / 500)
-        lens.set_property("far", distance * 100)
-        light = visualizer["/Lights/FillLight/<object>"]
-        light.set_property("position", (center + LIGHT).tolist())
-        light.set_property("intensity", 0.55)
-        visualizer["/Lights/AmbientLight/<object>"].set_property("intensity", 0.45)
+def set_room(visualizer: Any, view: View) -> None:
+    """A dark room, plain light, and the camera of a view."""
+    for name in ("Grid", "Axes", "Lights/PointLightNegativeX", "Lights/PointLightPositiveX"):
+        visualizer[f"/{name}"].set_property("visible", False)
+    visualizer["/Background"].set_property("top_color", list(TOP))
+    visualizer["/Background"].set_property("bottom_color", list(BOTTOM))
+    center, distance = view.at, view.distance()
+    # meshcat's camera circles about the page's origin; so the scene is moved there, and the camera moved with it.
+    z_up = rotation_matrix(-np.pi / 2, (1, 0, 0))
+    visualizer["/"].set_transform(z_up @ translation_matrix(-center))
+    visualizer["/Cameras/default"].set_transform(translation_matrix(center))
+    lens = visualizer["/Cameras/default/rotated/<object>"]
+    x, y, z = (distance * view.back).tolist()
+    lens.set_property("position", [x, z, -y])
+    lens.set_property("fov", FIELD_OF_VIEW)
+    lens.set_property("near", distance / 500)
+    lens.set_property("far", distance * 100)
+    light = visualizer["/Lights/FillLight/<object>"]
+    light.set_property("position", (center + LIGHT).tolist())
+    light.set_property("intensity", DIFFUSE)
+    visualizer["/Lights/AmbientLight/<object>"].set_property("intensity", AMBIENT)
 
 
 class Group(geometry.Object):  # type: ignore[misc]
@@ -243,14 +91,12 @@ class Group(geometry.Object):  # type: ignore[misc]
             "object": {
                 "uuid": self.uuid,
                 "type": "Group",
-                "children": [
-                    _placed(part["object"], more) for part, (_, more) in zip(lowered, self.parts, strict=True)
-                ],
+                "children": [_with(part["object"], more) for part, (_, more) in zip(lowered, self.parts, strict=True)],
             },
         }
 
 
-def _placed(child: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
+def _with(child: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
     """meshcat gives every object a matrix, the identity for these, that would win over a position."""
     return {key: value for key, value in child.items() if key != "matrix"} | more
 
@@ -259,55 +105,81 @@ def _once(elements: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     return list({each["uuid"]: each for each in elements}.values())
 
 
+def _placed(primitives: Sequence[Primitive], position: Array) -> Group:
+    return Group((_group(primitives, _buffers(primitives)), {"position": position.tolist()}))
+
+
+def _group(primitives: Sequence[Primitive], buffers: Sequence[_Buffers]) -> Group:
+    parts: list[tuple[geometry.Object, dict[str, Any]]] = []
+    for each, shape in zip(primitives, buffers, strict=True):
+        solid, lined = isinstance(each, Faces), isinstance(each, Lines)
+        kind = geometry.Mesh if solid else geometry.LineSegments if lined else geometry.Points
+        more = {"name": each.name, "visible": each.visible, "renderOrder": each.order}
+        parts.append((kind(shape, _material(each)), more))
+    return Group(*parts)
+
+
+def _material(primitive: Primitive) -> geometry.Material:
+    """It is "transparent" even if opaque: three.js draws what is so called last, and in the order asked for."""
+    painted = primitive.color.ndim > 1
+    properties: dict[str, Any] = {
+        "transparent": True,
+        "opacity": primitive.opacity,
+        "vertexColors": painted or primitive.strength is not None,
+        "depthTest": not primitive.through,
+        "depthWrite": primitive.opacity == 1,
+    }
+    color = np.ones(3) if painted else primitive.color
+    if not isinstance(primitive, Faces):
+        if isinstance(primitive, Dots):
+            return _DotMaterial(color=rgb(color), size=primitive.size, sizeAttenuation=False, **properties)
+        return geometry.LineBasicMaterial(color=rgb(color), **properties)
+    properties["side"] = primitive.side
+    if not primitive.lit:
+        return geometry.MeshBasicMaterial(color=rgb(primitive.glow * color), **properties)
+    properties |= {"flatShading": primitive.normals is None, "specular": 0, "emissive": rgb(primitive.glow * color)}
+    return geometry.MeshPhongMaterial(color=rgb(primitive.lit * color), **properties)
+
+
 class _DotMaterial(geometry.GenericMaterial):  # type: ignore[misc]
     _type = "PointsMaterial"
 
 
-class _Mesh(geometry.TriangularMeshGeometry):  # type: ignore[misc]
-    """meshcat's triangles, with normals; with how much is seen of each vertex, from 0 to 1; or with their colours."""
+def _buffers(primitives: Sequence[Primitive]) -> list[_Buffers]:
+    """A geometry for each primitive; those of the same points share one."""
+    known: dict[int, _Buffers] = {}
+    return [known.setdefault(id(each.points), _Buffers(each)) for each in primitives]
 
-    def __init__(
-        self,
-        vertices: Array,
-        faces: NDArray[Any],
-        normals: Array | None = None,
-        strength: Array | None = None,
-        paint: Array | None = None,
-    ) -> None:
-        super().__init__(vertices, faces)
-        self.normals, self.strength, self.paint = normals, strength, paint
+
+class _Buffers(geometry.Geometry):  # type: ignore[misc]
+    """Points, and what else three.js wants to know of each; triangles, if it is of faces."""
+
+    def __init__(self, primitive: Primitive) -> None:
+        super().__init__()
+        points = primitive.points.reshape(-1, 3)
+        self._of_points = {"position": points}
+        self._triangles: NDArray[np.integer[Any]] | None = None
+        if primitive.strength is not None:
+            # three.js takes an opacity from a colour of four numbers.
+            self._of_points["color"] = np.column_stack([np.ones((len(points), 3)), primitive.strength.ravel()])
+        elif primitive.color.ndim > 1:
+            self._of_points["color"] = primitive.color
+        if isinstance(primitive, Faces):
+            self._triangles = triangles(primitive.facets)
+            if primitive.normals is not None:
+                self._of_points["normal"] = primitive.normals
 
     def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
-        lowered: dict[str, Any] = super().lower(object_data)
-        if self.normals is not None:
-            lowered["data"]["attributes"]["normal"] = geometry.pack_numpy_array(self.normals.T)
-        if self.strength is not None:
-            lowered["data"]["attributes"]["color"] = geometry.pack_numpy_array(_faded(self.strength))
-        if self.paint is not None:
-            lowered["data"]["attributes"]["color"] = geometry.pack_numpy_array(self.paint.T)
-        return lowered
+        packed = {name: _packed(array, np.float32) for name, array in self._of_points.items()}
+        data: dict[str, Any] = {"attributes": packed}
+        if self._triangles is not None:
+            data["index"] = _packed(self._triangles, np.uint32)
+        return {"uuid": self.uuid, "type": "BufferGeometry", "data": data}
 
 
-def _skin(paint: int, flat: bool, **properties: Any) -> geometry.MeshPhongMaterial:
-    """Matt, and "transparent" even if opaque: three.js draws what is so called last, and in the order asked for."""
-    properties = {"color": paint, "transparent": True, "flatShading": flat, "specular": 0, "side": FRONT} | properties
-    return geometry.MeshPhongMaterial(**properties)
-
-
-def _lines(segments: Array) -> geometry.PointsGeometry:
-    """Segments (k, 2, 3), from and to."""
-    return _points(segments.reshape(-1, 3))
-
-
-def _points(points: Array, strength: Array | None = None) -> geometry.PointsGeometry:
-    """`strength` (n,) says how much is seen of each."""
-    faded = None if strength is None else _faded(strength)
-    return geometry.PointsGeometry(np.ascontiguousarray(points.T, dtype=np.float32), faded)
-
-
-def _faded(strength: Array) -> NDArray[np.float32]:
-    """(4, n): the material's colour, and an opacity, which three.js takes from a colour of four parts."""
-    return np.stack([*np.ones((3, len(strength))), strength]).astype(np.float32)
+def _packed(array: NDArray[Any], kind: type) -> dict[str, Any]:
+    packed: dict[str, Any] = geometry.pack_numpy_array(np.ascontiguousarray(array.T, dtype=kind))
+    return packed
 
 
 def matrix(placed: Placed) -> Array:

@@ -17,8 +17,8 @@ from scipy.spatial import ConvexHull
 from overlapper import Box, Capsule, HalfSpace, Hull, Placed, Sphere, overlap
 from overlapper.simulation import Bodies, link_contacts
 from overlapper.viewer import Recording
-from overlapper.viewer.look import INK
-from overlapper.viewer.turning import hexadecimal, turning
+from overlapper.viewer.look import INK, hexadecimal
+from overlapper.viewer.turning import turning
 
 SVG = "{http://www.w3.org/2000/svg}"
 BOX = Placed(Box((0.5, 0.5, 0.5)))
@@ -71,7 +71,7 @@ def test_a_turn_ends_where_it_began_and_bodies_hold_what_they_share():
 
 def test_bodies_that_are_apart_have_the_line_between_them():
     picture = turning(overlap(BOX, Placed(Sphere(0.3), (1.2, 0, 0.3))))
-    assert f'<polyline fill="none" stroke="{hexadecimal(INK)}"' in picture and "visibility" not in picture
+    assert f'<path fill="none" stroke="{hexadecimal(INK)}"' in picture and "visibility" not in picture
 
 
 def test_an_overlap_is_a_picture_and_numbers():
