@@ -1,4 +1,4 @@
-"""What bodies share, drawn: live in a browser, recorded as a page that needs no network, or in a notebook."""
+"""Views of bodies and overlaps: live in a browser, recorded as a page that needs no network, or in a notebook."""
 
 from typing import TYPE_CHECKING
 
@@ -11,5 +11,5 @@ if TYPE_CHECKING:
 
 __all__ = ["Look", "Recording", "Viewer"]
 
-# Imported when asked for: what a notebook shows of an overlap needs numpy alone.
+# Imported on first use, as an overlap in a notebook needs numpy alone.
 __getattr__ = _lazily(__name__, {"live": ("Viewer",), "look": ("Look",), "recording": ("Recording",)})

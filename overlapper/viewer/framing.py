@@ -1,6 +1,6 @@
-"""What a view shows of a scene: what moves and what overlaps, from the side where most of the largest overlap is seen.
+"""Cameras that show what moves and what overlaps, from the side where most of the largest overlap is seen.
 
-Grounds are seen, but no view is made to fit them: half-spaces, and bodies of one link that dwarf all others.
+Half-spaces, and bodies of one link that are far larger than all others, are grounds. No view is made to fit a ground.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from overlapper.shapes.table import facts
 from overlapper.viewer.labels import Bodies, Contact
 from overlapper.viewer.look import FIELD_OF_VIEW, Array
 
-GROUND = 30.0  # times as large as every other body: a ground. The plane of pybullet is that beside what is under 9 m.
+GROUND = 30.0  # times as large as all other bodies: a ground. The plane of pybullet is a ground for bodies under 9 m.
 BACK = np.array([0.60, -0.68, 0.42]) / np.linalg.norm([0.60, -0.68, 0.42])  # the usual way to the camera
-TURNS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180])  # of it about z, the usual ones first
+TURNS = np.deg2rad([0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180])  # of BACK about z
 NOWHERE = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
-STILL = 1e-3  # of the scene's size: less is no motion
+STILL = 1e-3  # of the scene's size: a smaller motion is none
 
 
 @dataclass(frozen=True)
 class View:
-    """Where a camera is: it looks at a point, m, and lies in the unit direction `back` from it."""
+    """A camera looks at the point `at`, m, from the unit direction `back`. It sees the boxes `framed`, each (2, 3)."""
 
     at: Array
     back: Array
@@ -35,11 +35,11 @@ class View:
 
     @classmethod
     def of(cls, framed: Sequence[Array], back: Array = BACK) -> View:
-        """Of boxes, each (2, 3): lower and upper corner."""
+        """The view of boxes, each (2, 3): lower and upper corner."""
         return cls(around(framed).mean(axis=0), back, framed)
 
     def distance(self, aspect: float = 4 / 3) -> float:
-        """How far off the camera sees all that is framed, in m; `aspect` is the picture's width over its height."""
+        """The distance, m, from which all that is framed is seen; `aspect` is the picture's width over its height."""
         corners = np.array(self.framed)
         corners = np.array([corners[:, list(pick), range(3)] for pick in np.ndindex(2, 2, 2)]).reshape(-1, 3) - self.at
         right = np.array([-self.back[1], self.back[0], 0.0]) / np.hypot(self.back[0], self.back[1])
@@ -49,9 +49,9 @@ class View:
 
 
 class Framing:
-    """Of all the moments that are seen of bodies; the first of them says which are grounds, and how large the rest is.
+    """The views of all moments seen so far. The first moment says which bodies are grounds, and the size of the others.
 
-    `center` and `size` are those of the box around the rest, in m; `largest` is the largest overlap that was seen, and
+    `center` and `size` are those of the box around all others, m; `largest` is the largest overlap that was seen, and
     `moment` says when, counted from 0: -1 without any.
     """
 
@@ -62,25 +62,25 @@ class Framing:
         self.largest: Overlap | None = None
         self.moment = -1
         self._moments = 0
-        self._first: dict[tuple[int, int, int], Array] = {}  # boxes, as they were seen first
-        self._then: list[tuple[int, Array]] = []  # bodies and their boxes, at that moment
-        self._taking_part: set[int] = set()  # in an overlap at that moment
+        self._first: dict[tuple[int, int, int], Array] = {}  # the boxes in the first moment that had them
+        self._then: list[tuple[int, Array]] = []  # bodies and their boxes at the moment of the largest overlap
+        self._taking_part: set[int] = set()  # bodies in an overlap at that moment
         self._moved: set[int] = set()
         self._met: set[int] = set()
         self._shared: dict[tuple[int, ...], Array] = {}
 
     def is_ground(self, placed: Placed) -> bool:
-        """True of a half-space, and of what is as large as a body that is a ground."""
+        """True for a half-space, and for a shape as large as a body that is a ground."""
         return not facts(placed.shape).bounded or _extent(placed.bounds) >= self._ground_size
 
     def pushed_second(self, contact: Contact) -> bool:
-        """True if the second is what a force is seen on: the first is a ground, or stays where it is beside it."""
+        """True if a force is drawn on the second body: the first is a ground, or rests while the second moves."""
         if self.is_ground(contact.overlap.shapes[0]):
             return True
         return contact.bodyA not in self._moved and contact.bodyB in self._moved
 
     def see(self, bodies: Bodies, contacts: Iterable[Contact]) -> None:
-        """The bodies as they are at one more moment, and what they share."""
+        """Add a moment: the bodies where they are now, and their contacts."""
         bounded = self._bounded(bodies)
         for key, box in bounded:
             if np.abs(box - self._first.setdefault(key, box)).max() > STILL * self.size:
@@ -90,7 +90,7 @@ class Framing:
         for each in overlapping:
             box = np.asarray(each.overlap.bounds)
             if _extent(box) >= self._ground_size:
-                continue  # of two grounds
+                continue  # both are grounds
             pair = each.bodyA, each.linkA, each.shapeA, each.bodyB, each.linkB, each.shapeB
             self._met |= {each.bodyA, each.bodyB}
             self._shared[pair] = around([self._shared.get(pair, box), box])
@@ -102,17 +102,17 @@ class Framing:
         self._moments += 1
 
     def opening(self) -> View:
-        """Of all that moves and all that is shared; where nothing moves, of the bodies that share something."""
+        """The view of all that moves and overlaps; if nothing moves, of the bodies that overlap."""
         if self._moved:
             boxes = [box for key, box in self._first.items() if key[0] in self._moved]
-            # One that has left since does not count, one that takes part does.
+            # A body that moved away since does not count; a body in an overlap at that moment does.
             boxes += [box for body, box in self._then if body in self._moved & self._taking_part]
         else:
             boxes = [box for key, box in self._first.items() if key[0] in self._met]
         return View.of([*boxes, *self._shared.values()] or self._all(), self.side())
 
     def whole(self) -> View:
-        """Of all but grounds."""
+        """The view of all but grounds."""
         return View.of([*self._all(), *self._shared.values()], self.side())
 
     def _all(self) -> list[Array]:
@@ -123,14 +123,14 @@ class Framing:
         return _side(self.largest, [box for _, box in self._then]) if self.largest else BACK
 
     def _bounded(self, bodies: Bodies) -> list[tuple[tuple[int, int, int], Array]]:
-        """The shapes of all bodies that are no grounds, and the boxes around them."""
+        """The shapes of all bodies that are not grounds, and the boxes around them."""
         boxes = _boxes(bodies)
         sizes = _sizes(boxes)
         return [(key, box) for key, box in boxes if sizes[key[0]] < self._ground_size]
 
 
 def around(boxes: Sequence[Array]) -> Array:
-    """The box (2, 3) around boxes; of none, one about the origin."""
+    """The box (2, 3) around boxes; a box about the origin if there are no boxes."""
     corners = np.array(boxes or [NOWHERE])
     return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
 
@@ -144,7 +144,7 @@ def _boxes(bodies: Bodies) -> list[tuple[tuple[int, int, int], Array]]:
 
 
 def _sizes(boxes: Iterable[tuple[tuple[int, int, int], Array]]) -> dict[int, float]:
-    """How large each body is."""
+    """The size of each body, m."""
     of_body: dict[int, list[Array]] = defaultdict(list)
     for key, box in boxes:
         of_body[key[0]].append(box)
@@ -152,7 +152,7 @@ def _sizes(boxes: Iterable[tuple[tuple[int, int, int], Array]]) -> dict[int, flo
 
 
 def _ground_size(bodies: Bodies) -> float:
-    """From which size a body is a ground, m: those of one link that are so much larger than all that are smaller."""
+    """The size, m, from which a body is a ground: bodies of one link, so many times larger than all smaller bodies."""
     jointed = {body for body, link, _ in bodies.keys if link >= 0}
     sizes = sorted(((size, body) for body, size in _sizes(_boxes(bodies)).items()), reverse=True)
     found = np.inf
@@ -169,7 +169,7 @@ def _extent(box: Array) -> float:
 
 
 def _side(overlap: Overlap, boxes: Sequence[Array]) -> Array:
-    """The direction in which most of the overlap's surface is turned, and few of the boxes are in front of it."""
+    """The direction from which most of the overlap's surface is seen, and few boxes are in front of it."""
     corners = overlap.vertices[triangles(overlap.facets)]
     areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     centroid = np.asarray(overlap.centroid)
@@ -182,7 +182,7 @@ def _side(overlap: Overlap, boxes: Sequence[Array]) -> Array:
         back = np.array([cos * BACK[0] - sin * BACK[1], sin * BACK[0] + cos * BACK[1], BACK[2]])
         enters, leaves = (np.sort([lower / back, upper / back], axis=0)[k] for k in (0, 1))
         in_front = elsewhere & (enters.max(axis=1) < leaves.min(axis=1)) & (leaves.min(axis=1) > 0)
-        # The usual side is given up for what is seen to be better only.
+        # Another side is chosen only if it is clearly better than the usual one.
         seen = np.abs(areas @ back).sum() * 0.8 ** in_front.sum() * (1 - 0.02 * rank)
         if seen > most:
             best, most = back, float(seen)

@@ -1,4 +1,4 @@
-"""What views are given, and what bodies, links and pairs are called in them."""
+"""The bodies and contacts that views are given, and the names of bodies, links and pairs in them."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ ROOT = "/overlapper/bodies"
 Pair = tuple[str, str]
 LinkName = tuple[str, str]  # body and link
 
-# meshcat's tree and its panel look names up in objects, where these are found before any is put there; "<object>" is
-# what it calls the drawing at a node.
+# meshcat's tree and panel look names up in JavaScript objects, which have these names from the start. "<object>" is
+# meshcat's name for the drawing at a node.
 INHERITED = {"__proto__", "constructor", "hasOwnProperty", "isPrototypeOf", "propertyIsEnumerable", "toLocaleString"}
 INHERITED |= {f"__{way}{kind}__" for way in ("define", "lookup") for kind in ("Getter", "Setter")}
 INHERITED |= {"toString", "valueOf", "<object>"}
 
 
 class Bodies(Protocol):
-    """What is drawn: shapes in the world by (body, link, shape); the colours of the links and their distinct names."""
+    """Shapes in the world by (body, link, shape), and the colours and distinct names of links."""
 
     @property
     def keys(self) -> Sequence[tuple[int, int, int]]: ...
@@ -33,7 +33,7 @@ class Bodies(Protocol):
 
 
 class Contact(Protocol):
-    """A pair of shapes, each by body, link and index within the link, and what they have in common."""
+    """A pair of shapes, each by body, link and index within the link, and their overlap."""
 
     @property
     def bodyA(self) -> int: ...
@@ -52,7 +52,7 @@ class Contact(Protocol):
 
 
 def link_names(bodies: Bodies) -> dict[tuple[int, int], tuple[str, str]]:
-    """What the tree calls the body and the link: a slash would begin a new level of it."""
+    """The names of body and link in the tree, without slashes, as a slash begins a new level."""
     names = {}
     for (body, link), name in bodies.names.items():
         first, _, rest = name.partition("/")
@@ -61,23 +61,23 @@ def link_names(bodies: Bodies) -> dict[tuple[int, int], tuple[str, str]]:
 
 
 def _unlike(name: str) -> str:
-    """Quoted, where the name would be taken for something that every object of JavaScript has, or for a quoted one."""
+    """The name, in quotes if JavaScript objects have it from the start, or if it begins and ends with a quote."""
     return f"'{name}'" if name in INHERITED or name[:1] == name[-1:] == "'" else name
 
 
 def body_paths(bodies: Bodies) -> list[str]:
-    """`/overlapper/bodies/<body>/<link>/<shape>` of each shape."""
+    """The path `/overlapper/bodies/<body>/<link>/<shape>` of each shape."""
     names = link_names(bodies)
     return [f"{ROOT}/{'/'.join(names[body, link])}/{shape}" for body, link, shape in bodies.keys]
 
 
 def pairs(bodies: Bodies, contacts: Iterable[Contact]) -> dict[Pair, Overlap]:
-    """The overlapping pairs by their names; a link or shape is named only where its body or link has more than one."""
+    """The overlapping pairs by name. A link or shape is named only if its body or link has more than one."""
     return {pair: contact.overlap for pair, _, contact in labelled(bodies, contacts)}
 
 
 def labelled(bodies: Bodies, contacts: Iterable[Contact]) -> Iterator[tuple[Pair, tuple[LinkName, LinkName], Contact]]:
-    """The name of each overlapping pair, its bodies and links, and the pair; "" is the link of a body of one."""
+    """The name of each overlapping pair, its bodies and links, and the pair. The link of a body of one link is ""."""
     names = link_names(bodies)
     links = Counter(body for body, _ in names)
     shapes = Counter((body, link) for body, link, _ in bodies.keys)

@@ -55,7 +55,7 @@ class Viewer:
         self._pairs: set[tuple[str, str]] = set()
         self._framing: Framing | None = None
         self._scale: Scale | None = None
-        self._pushing = False  # whether arrows are seen
+        self._pushing = False  # True while arrows are drawn
 
     def _serve(self, host: str) -> None:
         must_be_here(host)
@@ -68,13 +68,13 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Where a browser finds it."""
+        """The address for a browser."""
         return str(self.visualizer.url())
 
     def show(self, bodies: Bodies, contacts: Iterable[Contact], forces: Forces | None = None) -> None:
-        """Draw the bodies where they are now, the overlapping pairs among `contacts` and the `forces` of these.
+        """Draw the bodies where they are now, the overlapping pairs among `contacts`, and their `forces`.
 
-        What was there is replaced.
+        This replaces the earlier drawing.
         """
         contacts = list(contacts)
         if self._stage is None or self._framing is None:
@@ -82,7 +82,7 @@ class Viewer:
             self._stage = Stage(self._framing, *self._looks)
             if self._server:
                 self._framing.see(bodies, contacts)
-                set_room(self.visualizer, self._framing.whole())  # what will move is not known yet
+                set_room(self.visualizer, self._framing.whole())  # nothing has moved yet
         seen = self._seen(self._stage, self._framing, bodies, contacts, forces)
         self._show_bodies(self._stage, bodies)
         self._show_overlaps(self._stage, bodies, contacts, seen)

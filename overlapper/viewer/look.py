@@ -29,27 +29,26 @@ OWNER_COLORS = [
     (0.84, 0.37, 0.00),
     (0.00, 0.45, 0.70),
 ]
-INK = (1.00, 0.31, 0.64)  # for what shines through everything: a colour that models hardly ever have
+INK = (1.00, 0.31, 0.64)  # marks that shine through everything: a colour that models hardly ever have
 LINE = (0.91, 0.92, 0.94)  # edges and vertices of overlaps
-TOP, BOTTOM = (0.20, 0.23, 0.28), (0.09, 0.10, 0.13)  # of the background
-GROUND, GRID = (0.36, 0.40, 0.47), (0.62, 0.68, 0.77)  # of a ground: its face and its lines, calm
-GROUND_OPACITY, GRID_OPACITY = 0.5, 0.45  # in its middle; it fades out from there
+TOP, BOTTOM = (0.20, 0.23, 0.28), (0.09, 0.10, 0.13)  # the background
+GROUND, GRID = (0.36, 0.40, 0.47), (0.62, 0.68, 0.77)  # the face and the lines of a ground
+GROUND_OPACITY, GRID_OPACITY = 0.5, 0.45  # in the middle of a ground, which fades out from there
 LIGHT = np.array([0.5, -0.8, 1.4]) / np.linalg.norm([0.5, -0.8, 1.4])  # the direction to the light
-AMBIENT, DIFFUSE = 0.45, 0.55  # of the light: what comes from all sides, what comes from that direction
+AMBIENT, DIFFUSE = 0.45, 0.55  # light from all sides, light from that direction
 FIELD_OF_VIEW = 35.0  # degrees, from bottom to top
 PARTS = ("faces", "edges", "vertices", "marks", "forces")  # what a Look may show
-MANY_FACETS = 100  # more than that are only of what is round
+MANY_FACETS = 100  # polytopes with more facets stand for round overlaps
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What is drawn of each polytope: its `faces`, `edges` and `vertices`.
+    """How each body or overlap is drawn: its `faces`, `edges` and `vertices`.
 
-    Colours are written #rrggbb; without them, each has its own. `opacity`, from 0 to 1, is that of the faces. `front`
-    is the colour of faces seen from outside, `back` of those seen from inside, which are drawn where they can be seen:
-    overlaps' own are a shade of their owners', bodies have none of their own. `marks` are the patch outline and the
-    normal of an overlap. `forces`, where there are any, are arrows in the place of normals, and faces are coloured by
-    pressure, which no colour above replaces.
+    `opacity`, from 0 to 1, is that of the faces. `front` and `back` are the colours of faces seen from outside and from
+    inside, written #rrggbb. Without `front`, each has its own colour. Without `back`, the inside of overlaps has a
+    darker shade of their colour, and the inside of bodies is not drawn. `marks` are the patch outline and the normal of
+    an overlap. With `forces`, if there are any, arrows replace normals, and pressures replace the colours of overlaps.
     """
 
     faces: bool = True
@@ -75,22 +74,22 @@ OVERLAPS = Look(edges=False)
 
 
 def channels(color: str) -> Array:
-    """(3,) red, green and blue in 0..1 of a colour #rrggbb."""
+    """Red, green and blue (3,) in 0..1 of a colour #rrggbb."""
     return np.array([int(color[k : k + 2], 16) for k in (1, 3, 5)]) / 255
 
 
 def owner_color(number: int) -> Array:
-    """(3,) the colour of what the surface of that shape of a pair or more owns."""
+    """The colour (3,) of the facets that lie on the surface of the shape with that number."""
     return np.array(OWNER_COLORS[number % len(OWNER_COLORS)])
 
 
 def hexadecimal(color: Sequence[float] | Array) -> str:
-    """#rrggbb of red, green and blue in 0..1."""
+    """The colour #rrggbb of red, green and blue in 0..1."""
     return "#" + "".join(f"{round(255 * each):02x}" for each in color)
 
 
 def to_draw(overlap: Overlap, size: float) -> Overlap:
-    """The overlap with no more facets than are seen in a scene of that size, m: what is round is drawn less so."""
+    """The overlap, a round one with no more facets than are seen in a scene of that size, m."""
     if len(overlap.owner) <= MANY_FACETS:
         return overlap
     extent = np.ptp(np.asarray(overlap.bounds), axis=0).max() / size
@@ -98,7 +97,7 @@ def to_draw(overlap: Overlap, size: float) -> Overlap:
 
 
 def arrow_length(area: float, size: float) -> float:
-    """Of the normal: in proportion to the patch, but neither lost in a scene of that size nor in the way of others."""
+    """The length of the normal, m: in proportion to the patch, within bounds that suit a scene of that size."""
     return float(np.clip(np.sqrt(area) / 3, 0.03 * size, 0.06 * size))
 
 

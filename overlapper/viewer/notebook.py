@@ -1,4 +1,4 @@
-"""What a notebook shows of an overlap: a picture that turns, and its numbers."""
+"""An overlap in a notebook: a picture that turns, and its numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from overlapper.viewer.turning import HEIGHT, WIDTH, turning
 
 
 def overlap_html(overlap: Overlap) -> str:
-    """A picture and a table, without a script, so that notebooks show it that trust nobody."""
+    """A picture and a table. They have no script, so notebooks that are not trusted show them, too."""
     picture = base64.b64encode(turning(overlap).encode()).decode()
     rows = "".join(
         f'<tr><th style="text-align:left">{name}</th><td style="text-align:left">{value}</td></tr>'
@@ -32,7 +32,7 @@ def _told(overlap: Overlap) -> str:
 
 
 def _numbers(overlap: Overlap) -> Iterator[tuple[str, str]]:
-    """Names and values, with units; where there is no volume, how far bodies are apart."""
+    """Names and values, with units; the distance if there is no volume."""
     colors = [hexadecimal(owner_color(k)) for k in range(len(overlap.shapes))]
     kinds = [
         f'<span style="color:{color}">\u25a0</span> {type(placed.shape).__name__}'
@@ -54,6 +54,6 @@ def _numbers(overlap: Overlap) -> Iterator[tuple[str, str]]:
 
 
 def _vector(values: Array) -> str:
-    """What is nothing but rounding beside the others is 0."""
+    """A value that is but rounding beside the others is written 0."""
     least = 1e-12 * float(abs(values).max())
     return ", ".join(f"{value if abs(value) > least else 0.0:.4g}" for value in values)

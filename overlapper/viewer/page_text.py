@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-# Styles are set by scripts, dat.gui's among them, which a policy cannot tell from those of others.
+# Scripts set styles, dat.gui's among them. A policy cannot tell these styles from foreign ones.
 POLICY = (
     "default-src 'none'; script-src {scripts}; style-src 'unsafe-inline'; img-src data: blob:; frame-src blob:; "
     "base-uri 'none'; form-action 'none'"
@@ -19,22 +19,21 @@ POLICY = (
 def filled(template: Path, texts: Mapping[str, str], frames: str = "") -> str:
     """The template with a text in the place of each {{mark}}, and the policy in that of {{policy}}.
 
-    What a text contains is not taken for a mark. `frames` is a page that this one opens in itself, and that is bound by
-    the policy of both.
+    Marks within texts are not replaced. `frames` is a page that this one opens within itself, bound by both policies.
     """
     page = re.sub(r"\{\{(\w+)\}\}", lambda mark: texts.get(mark[1], mark[0]), template.read_text(encoding="utf-8"))
     hashes = dict.fromkeys(_hash(script) for text in (page, frames) for script in _scripts(text))
-    # The head is the page's own up to there.
+    # The first {{policy}} is in the head, before any text.
     return page.replace("{{policy}}", POLICY.format(scripts=" ".join(hashes) or "'none'"), 1)
 
 
 def _scripts(page: str) -> list[str]:
-    """The scripts that a browser runs; those of another type are data."""
+    """The scripts that a browser runs; scripts of another type are data."""
     return re.findall(r'<script(?: type="module")?>(.*?)</script>', page, re.DOTALL)
 
 
 def _hash(script: str) -> str:
-    # A browser has no other line ends.
+    # A browser hashes scripts with these line ends.
     text = script.replace("\r\n", "\n").replace("\r", "\n")
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
@@ -45,5 +44,5 @@ def licences(viewer: Path) -> str:
     for each in json.loads((viewer / "dist" / "main.min.js.THIRD_PARTY_LICENSES.json").read_text(encoding="utf-8")):
         heading = f"{each['name']} {each['version']}, {each['license']}, {each.get('author') or each['repository']}"
         texts.append(f"{heading}\n\n{each.get('licenseText') or ''}")
-    # A text that could end the element that holds it would do so.
+    # "</" could end the element that holds the text.
     return "\n\n".join(text.strip() for text in texts).replace("</", "< /")

@@ -47,8 +47,8 @@ except ImportError as missing:
     raise ImportError(f"overlapper.viewer.picture needs {hint('matplotlib')}") from missing
 
 WIDTH, HEIGHT = 1200, 900  # pixels
-ROWS = 8  # of the table: the largest
-NEAR = 4.0  # times its size: from how far an overlap is looked at
+ROWS = 8  # of the table, for the largest overlaps
+NEAR = 4.0  # times the size of an overlap: the distance of a camera that is close
 SLOPE = float(np.tan(np.deg2rad(FIELD_OF_VIEW) / 2))
 UNTURNED = np.array([0.0, 0.0, 0.0, 1.0])
 SOLID, SHARED, SHINING = range(3)  # layers: a later one hides an earlier one
@@ -68,8 +68,8 @@ def save(
 ) -> Path:
     """Draw the bodies where they are, the overlapping pairs among `contacts` and their `forces`; returns the path.
 
-    With `close`, the camera comes near the largest of them. `looks` are those of the bodies and of the overlaps.
-    A `framing` that has seen other moments, too, knows what moves; without one, the bodies that overlap are framed.
+    With `close`, the camera comes near the largest overlap. `looks` are those of the bodies and of the overlaps.
+    A `framing` that has seen other moments knows what moves. Without one, the bodies that overlap are framed.
     """
     contacts = list(contacts)
     here = Framing(bodies)
@@ -101,7 +101,7 @@ def save(
 
 @dataclass(frozen=True)
 class _Camera:
-    """It looks at a point, m, from that `distance`; `axes` (3, 3) point right, up and back to the camera."""
+    """A camera looks at the point `at` from a `distance`, in m. The rows of `axes` (3, 3) point right, up and back."""
 
     at: Array
     axes: Array
@@ -109,19 +109,19 @@ class _Camera:
 
     @classmethod
     def of(cls, framing: Framing, back: Array, near: Array | None) -> _Camera:
-        """As far off as the framing asks for; with a box `near` (2, 3), a few times the size of that box."""
+        """A camera that sees what the framing has, or the box `near` (2, 3)."""
         view = View.of([near] if near is not None else framing.opening().framed, back)
         right = np.array([-back[1], back[0], 0.0]) / np.hypot(back[0], back[1])
         distance = view.distance(WIDTH / HEIGHT) if near is None else NEAR * float(np.linalg.norm(near[1] - near[0]))
         return cls(view.at, np.array([right, np.cross(back, right), back]), distance)
 
     def seen(self, points: Array) -> Array:
-        """World points (..., 3) in the camera's frame, where it looks along -z from the origin."""
+        """Points (..., 3) of the world in the camera's frame: the camera is the origin and looks along -z."""
         seen: Array = (points - self.at) @ self.axes.T - [0, 0, self.distance]
         return seen
 
     def on_screen(self, seen: Array) -> Array:
-        """Where points (..., 3) in the camera's frame are on the screen, (..., 2), in half heights from its middle."""
+        """Points (..., 3) in the camera's frame on the screen, (..., 2), in half heights from its middle."""
         screen: Array = seen[..., :2] / (SLOPE * np.maximum(-seen[..., 2:], 1e-3 * self.distance))
         return screen
 
@@ -134,7 +134,7 @@ class _Picture:
         self._dots: list[tuple[Array, Dots, int]] = []
 
     def add(self, primitives: Sequence[Primitive], layer: int, position: Array, turn: Array = UNTURNED) -> None:
-        """Primitives in a frame that is turned and placed so in the world."""
+        """Add primitives in a frame with that position and orientation in the world."""
         for each in primitives:
             if not each.visible:
                 continue
@@ -148,7 +148,7 @@ class _Picture:
                 self._add_lines(each, self.camera.seen(points), on)
 
     def _seen_faces(self, faces: Faces, points: Array) -> tuple[Array, Array]:
-        """Triangles (k, 3, 3) in the camera's frame, and their colours (k, 4); those that are seen from their side."""
+        """The triangles (k, 3, 3) that are seen from their side, in the camera's frame, and their colours (k, 4)."""
         facets = triangles(faces.facets)
         corners = points[facets]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -164,7 +164,7 @@ class _Picture:
         return self.camera.seen(corners[kept]), rgba[kept]
 
     def _add_lines(self, lines: Primitive, ends: Array, layer: int) -> None:
-        """Segments (k, 2, 3) in the camera's frame, cut off where they come too near to the camera."""
+        """Segments (k, 2, 3) in the camera's frame are cut off near the camera and behind it."""
         opacity = lines.opacity * (np.ones(len(ends)) if lines.strength is None else lines.strength.mean(axis=1))
         ahead = -ends[..., 2] - 0.01 * self.camera.distance  # (k, 2)
         seen = (ahead > 0).any(axis=1)
@@ -210,7 +210,7 @@ def _boxed(content: Any, corner: str) -> AnchoredOffsetbox:
 
 
 def _legend(scale: Scale) -> AnchoredOffsetbox:
-    """What colours and arrows stand for."""
+    """The scale of colours and arrows."""
     ramp = DrawingArea(140, 10)
     steps = 140
     for k, color in enumerate(colors(np.arange(steps) / (steps - 1), 1.0)):
@@ -224,7 +224,7 @@ def _legend(scale: Scale) -> AnchoredOffsetbox:
 
 
 def _table(title: str, table: Sequence[_Row]) -> AnchoredOffsetbox:
-    """The title, and the pairs with volume, depth and force, the largest first."""
+    """The title, and volume, depth and force of pairs, the largest first."""
     names: list[Any] = []
     volumes: list[Any] = []
     depths: list[Any] = []

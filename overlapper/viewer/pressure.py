@@ -1,7 +1,7 @@
-"""What bodies do to each other, as it is drawn: pressures as colours, and an arrow for each pair of links.
+"""Forces as they are drawn: pressures as colours, and an arrow for each pair of links.
 
-A pressure is stiffness times how far what is shared reaches along the direction of the pressures. Its colours are
-viridis's: as far apart as the values that they stand for, also to who is colour-blind, and lighter where it is more.
+A pressure is stiffness times the extent of the overlap along the direction of the pressures. The colours are viridis.
+They differ as much as their values do, for colour-blind readers, too, and higher pressures are lighter.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from overlapper.viewer.labels import Bodies, Contact, LinkName, labelled
 from overlapper.viewer.look import Array, channels, to_draw
 
 COLORS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21908c", "#27ad81", "#5dc863", "#aadc32", "#fde725")
-FORCE = (1.00, 1.00, 1.00)  # arrows: of no colour that pressures have
+FORCE = (1.00, 1.00, 1.00)  # arrows: no pressure has this colour
 FRICTION = (1.00, 0.42, 0.21)
-STEP = 1 / 25  # of the scale: a triangle in which pressures differ by more is cut in four
-HALVINGS = 4  # of a triangle's sides at most
-RIM = 0.01  # of the way to its middle: on the very rim of a facet there may be no pressure, however little further in
-ALONG = 1e-6  # sine: a facet that is turned by less from the direction of pressures is no end of a depth
+STEP = 1 / 25  # of the scale: a triangle is cut in four if its pressures differ by more
+HALVINGS = 4  # the most times that the sides of a triangle are halved
+RIM = 0.01  # of the way to the middle: pressures of a facet are taken so far within its rim, where they may jump to 0
+ALONG = 1e-6  # the sine of the least angle between a facet and the pressures by which the facet ends a depth
 
 Key = tuple[int, ...]  # bodyA, linkA, shapeA, bodyB, linkB, shapeB
 
 
 class Forces(Protocol):
-    """Forces between pairs of shapes, a row for each, in SI units and the world; see simulation.forces.Forces."""
+    """Forces between pairs of shapes, a row for each pair, in SI units and in the world frame."""
 
     @property
     def pairs(self) -> NDArray[np.int64]: ...
@@ -51,9 +51,9 @@ class Forces(Protocol):
 
 @dataclass(frozen=True)
 class Press:
-    """The `force` (3,) on the first of a pair in N, and what goes with it in N m, J, m/s and Pa/m.
+    """The `force` (3,) on the first of a pair in N, and its torque, energy, slip and stiffness in N m, J, m/s and Pa/m.
 
-    `normal` (3,) is the direction of the pressures, unit; what of the force is across it is friction.
+    `normal` (3,) is the unit direction of the pressures. Friction is the part of the force across it.
     """
 
     force: Array
@@ -70,7 +70,7 @@ class Press:
 
 
 def presses(forces: Forces | None) -> dict[Key, Press]:
-    """By pair of shapes; nothing of None."""
+    """The press of each pair of shapes; empty for None."""
     if forces is None:
         return {}
     torque, slip = (np.linalg.norm(each, axis=1) for each in (forces.torque, forces.slip))
@@ -85,7 +85,7 @@ def key_of(contact: Contact) -> Key:
 
 
 def depths(overlap: Overlap, normal: Array, points: Array) -> Array:
-    """How far the overlap reaches along the normal through points (..., 3) in it or on it, (...), in m."""
+    """The extent (...) of the overlap, m, along the normal through points (..., 3) in it or on it."""
     planes = overlap.halfspaces
     slopes = planes[:, :3] @ normal
     room = np.maximum(-(points @ planes[:, :3].T + planes[:, 3]), 0)
@@ -97,7 +97,7 @@ def depths(overlap: Overlap, normal: Array, points: Array) -> Array:
 
 
 def deepest(overlap: Overlap, normal: Array) -> float:
-    """How deep it is at about the deepest place: of its corners, the middles of edges and facets, and its centroid."""
+    """The largest depth, m, at corners, middles of edges and facets, and the centroid."""
     corners, edges = overlap.vertices, overlap.vertices[polytope_edges(overlap.facets)].mean(axis=1)
     middles = [corners[ring].mean(axis=0) for ring in overlap.facets]
     points = np.concatenate([corners, edges, middles, [overlap.centroid]])
@@ -107,7 +107,7 @@ def deepest(overlap: Overlap, normal: Array) -> float:
 def pressures(overlap: Overlap, press: Press, top: float) -> tuple[Array, Array]:
     """Triangles (k, 3, 3) of the surface, and the pressures (k, 3) at their corners, Pa.
 
-    They are so small that pressures differ by little of `top` in each.
+    Pressures within a triangle differ by a small part of `top`.
     """
     corners = overlap.vertices[triangles(overlap.facets)]
     middles = np.array([overlap.vertices[ring].mean(axis=0) for ring in overlap.facets])
@@ -127,14 +127,14 @@ def pressures(overlap: Overlap, press: Press, top: float) -> tuple[Array, Array]
 
 
 def colors(pressure: Array, top: float) -> Array:
-    """(..., 3) of pressures (...): the last colour is that of `top` and more."""
+    """The colours (..., 3) of pressures (...); `top` and more have the last colour."""
     places = np.linspace(0, 1, len(COLORS))
     stops = np.array([channels(color) for color in COLORS])
     return np.stack([np.interp(pressure / top, places, stops[:, part]) for part in range(3)], axis=-1)
 
 
 def usual(values: Sequence[float], weights: Sequence[float]) -> float:
-    """The value up to which there are four fifths of the weights; 0 without any: a few that stand out do not count."""
+    """The value below which four fifths of the weights lie; 0 without weights. So a few large values do not count."""
     if not len(values) or not sum(weights):
         return 0.0
     order = np.argsort(values)
@@ -143,7 +143,7 @@ def usual(values: Sequence[float], weights: Sequence[float]) -> float:
 
 
 def rounded_up(value: float, digits: Sequence[float] = (1, 1.5, 2, 3, 4, 5, 6, 8, 10)) -> float:
-    """To the next of those digits times a power of ten."""
+    """The value rounded up to one of these digits times a power of ten."""
     if not value > 0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(value))
@@ -160,17 +160,17 @@ class Scale:
 
     @classmethod
     def of(cls, force: float, top: float, length: float) -> Scale:
-        """With arrows of that force as long as that, or down to half of it, as lengths and forces are round."""
+        """The scale by which an arrow of that force has about that length, m, and at least half of it."""
         unit = 10.0 ** np.floor(np.log10(length))
         return cls(float(unit), rounded_up(force * unit / length, range(1, 11)), rounded_up(top))
 
     def suits(self, force: float, top: float, length: float) -> bool:
-        """True where what is usual neither outgrows it nor is lost in it, or where there is nothing to see."""
+        """True if usual forces and pressures are neither too large nor too small for it, or if there are none."""
         drawn = force * self.length / self.force
         return not force or (length / 6 <= drawn <= 1.5 * length and self.top / 12 <= top <= 1.5 * self.top)
 
     def arrow(self, force: Array) -> Array:
-        """As it is drawn, m."""
+        """The arrow of a force, m."""
         return force * (self.length / self.force)
 
     def __str__(self) -> str:
@@ -178,7 +178,7 @@ class Scale:
 
     @property
     def pressure(self) -> str:
-        """What the last colour stands for."""
+        """The pressure of the last colour, in words."""
         return _in_unit(self.top, PASCALS)
 
 
@@ -189,7 +189,7 @@ def usual_force(some: Sequence[Arrow]) -> float:
 
 @dataclass(frozen=True)
 class DrawnForces:
-    """What is seen of the forces of one frame: by pair of shapes, by pair of links, and the scale of both."""
+    """The forces of a frame as they are drawn: by pair of shapes, by pair of links, and the scale of both."""
 
     pressed: Mapping[Key, Press]
     arrows: Sequence[Arrow]
@@ -205,7 +205,7 @@ class DrawnForces:
         framing: Framing,
         before: Scale | None = None,
     ) -> DrawnForces:
-        """With arrows of what is usual about as long as that, m; by the scale of `before` as long as that does."""
+        """The forces with usual arrows about as long as `length`, m. The scale `before` is kept as long as it suits."""
         pressed = presses(forces)
         found = arrows(bodies, contacts, pressed, framing.pushed_second) if pressed else []
         overlapping = [each for each in contacts if each.overlap and key_of(each) in pressed]
@@ -236,7 +236,7 @@ def force_text(force: float) -> str:
 
 @dataclass(frozen=True)
 class Arrow:
-    """The sum of the forces of a pair of links on one of them, in N, and of their friction; `start` (3,) in m."""
+    """The sum of the forces between two links on one of them, and of their friction, in N; `start` (3,) is in m."""
 
     links: tuple[LinkName, LinkName]
     start: Array
@@ -250,7 +250,7 @@ def arrows(
     pressed: Mapping[Key, Press],
     on_second: Callable[[Contact], bool] = lambda contact: False,
 ) -> list[Arrow]:
-    """For each pair of links, where its overlaps are in the mean, weighted by force; on the first unless it is said."""
+    """An arrow for each pair of links, from the mean of its overlaps weighted by force; on the first or second."""
     sums: dict[tuple[LinkName, LinkName], Arrow] = {}
     weights: dict[tuple[LinkName, LinkName], float] = {}
     for _, links, contact in labelled(bodies, contacts):

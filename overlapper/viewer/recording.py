@@ -1,8 +1,8 @@
-"""A run recorded to one HTML file, which is looked at in any browser, without a server and without a network.
+"""A run recorded to one HTML file, for any browser, without a server and without a network.
 
-The page keeps bodies, poses, polytopes and numbers in arrays of the narrowest type that is seen to be enough: of what
-is at rest nothing is said twice, vertices are 16-bit fractions of their polytope's size, numbers have five digits.
-Where there are forces, the planes of facets are there, too: pressures are of depths far below a vertex's last bit.
+The page keeps bodies, poses, polytopes and numbers in arrays of narrow types. A pose at rest is written once. Vertices
+are 16-bit fractions of their polytope's size. Numbers have five digits. With forces, the planes of facets are written,
+too, as pressures depend on depths far below the last bit of a vertex.
 """
 
 from __future__ import annotations
@@ -59,16 +59,16 @@ from meshcat import Visualizer  # isort: skip  # after the stage, which says wha
 from meshcat.servers.zmqserver import VIEWER_ROOT  # isort: skip
 from meshcat.transformations import translation_matrix  # isort: skip
 
-# Of the page, in the order they need each other.
+# The scripts of the page, each after those that it needs.
 SCRIPTS = ("film", "scene", "forces", "look", "numbers", "camera", "chart", "list", "panels", "time")
 ASPECTS = (0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0)
 ARRAYS = {"float32": "Float32Array", "uint32": "Uint32Array", "int32": "Int32Array", "uint16": "Uint16Array"}
 ARRAYS |= {"int16": "Int16Array", "uint8": "Uint8Array"}
 
 
-# Volume; its error, of which one digit is shown; depth, area, centroid; normal: columns, and bits that are enough.
+# Columns and their bits: volume; its error, whose first digit is shown; depth, area and centroid; normal.
 NUMBERS = [(slice(0, 1), 17), (slice(1, 2), 6), (slice(2, 7), 17), (slice(7, 10), 14)]
-# Force; torque, energy, slip; direction of the pressures; stiffness.
+# The same of force, torque, energy and slip; direction of the pressures; stiffness.
 PRESSES = [(slice(0, 6), 17), (slice(6, 9), 14), (slice(9, 10), 17)]
 UNPRESSED = (0.0,) * 10
 
@@ -94,15 +94,15 @@ class Recording:
         self._bodies: dict[str, tuple[bytes, str]] = {}
         self._nodes: dict[str, int] = {}
         self._grounds: list[int] = []  # nodes
-        self._poses: dict[str, tuple[float, ...]] = {}  # the last of each node
+        self._poses: dict[str, tuple[float, ...]] = {}  # the last pose of each node
         self._keys: list[tuple[int, int, tuple[float, ...]]] = []  # frame, node, pose
         self._pairs: dict[Pair, int] = {}
         self._links: dict[Pair, tuple[LinkName, LinkName]] = {}
-        self._drawn: dict[Pair, tuple[Overlap, int]] = {}  # the last of each pair, and its place among the polytopes
+        self._drawn: dict[Pair, tuple[Overlap, int]] = {}  # the last of each pair, and its polytope
         self._polytopes = _Polytopes()
         self._sightings: list[tuple[int, int, int]] = []  # frame, pair, polytope
         self._numbers: list[Array] = []
-        self._contacts: dict[Pair, Contact] = {}  # the first of each
+        self._contacts: dict[Pair, Contact] = {}  # the first contact of each pair
         self._presses: list[tuple[float, ...]] = []  # of each sighting
         self._depths: dict[int, float] = {}  # of polytopes
         self._usual: list[tuple[float, float]] = []  # N and Pa, in each frame that has forces
@@ -167,7 +167,7 @@ class Recording:
         return Path(path)
 
     def _repr_html_(self) -> str:
-        """The page, as notebooks show it; without a frame, a line."""
+        """The page in a notebook; a line of text if there is no frame."""
         if not self._times:
             return html.escape(repr(self))
         return f'<iframe srcdoc="{html.escape(self._page())}" style="width:100%;height:600px;border:0"></iframe>'
@@ -206,7 +206,7 @@ class Recording:
         }
 
     def _scale(self, framing: Framing) -> dict[str, Any] | None:
-        """What is usual in a frame, for an impact of one moment is not what arrows and colours are to be told by."""
+        """The scale of arrows and colours: the median over frames, so that a short impact does not count."""
         if not self._usual:
             return None
         force, pressure = np.median(self._usual, axis=0).tolist()
@@ -236,7 +236,7 @@ class Recording:
         }
 
     def _pressing(self) -> dict[str, NDArray[Any]]:
-        """What there is beside of a recording with forces; empty without."""
+        """The arrays of forces; empty if the recording has no forces."""
         rows = self._presses if self._usual else []
         columns = np.array(rows, dtype=np.float32).reshape(-1, 10)
         return {
@@ -245,7 +245,7 @@ class Recording:
         }
 
     def _add_body(self, stage: Stage, path: str, placed: Placed, color: Sequence[float]) -> str:
-        """The node that shows the body, drawn if it is new."""
+        """The node of the body; a new body is drawn."""
         shape = pickle.dumps(placed.shape)
         drawn, node = self._bodies.get(path, (None, path))
         if drawn != shape:
@@ -258,7 +258,7 @@ class Recording:
         return node
 
     def _add_overlap(self, stage: Stage, pair: Pair, overlap: Overlap, press: Press | None) -> float:
-        """Returns about the highest pressure, Pa."""
+        """Record the overlap; returns about its highest pressure, Pa."""
         number = self._pairs.setdefault(pair, len(self._pairs))
         last, polytope = self._drawn.get(pair, (None, -1))
         slack = 2 if len(overlap.owner) > MANY_FACETS else 1
@@ -281,21 +281,21 @@ class Recording:
 
 @dataclass
 class _Polytopes:
-    """Facets by their vertices and owners; where facets have the same vertices as before, only how these have moved."""
+    """Facets by vertices and owners. If only the vertices have moved since, their motions are kept instead."""
 
-    frames: list[tuple[float, ...]] = field(default_factory=list)  # middle, and half the longest side: the unit
+    frames: list[tuple[float, ...]] = field(default_factory=list)  # middle, and the unit: half the longest side
     previous: list[int] = field(default_factory=list)  # the polytope that vertices are counted from, or -1
     vertices: list[NDArray[np.int16]] = field(default_factory=list)
     owners: list[NDArray[np.integer[Any]]] = field(default_factory=list)
     facets: list[list[NDArray[np.int32]]] = field(default_factory=list)
     planes: list[NDArray[np.float32]] = field(
         default_factory=list
-    )  # of facets: normal, offset from the middle in units
+    )  # normal, and offset from the middle in units, of each facet
 
     def add(self, overlap: Overlap, center: Array, like: int, slack: int) -> int:
         """Keep the overlap, about `center`; `like` is the one that the pair had before, or -1. Returns its number.
 
-        Where there is `slack`, as what is round is drawn within a tenth, vertices are as fine as 1/1000 of the size.
+        Round overlaps have a `slack` above 1: they are drawn within a tenth, so vertices are 1/1000 of the size fine.
         """
         lower, upper = np.asarray(overlap.bounds)
         unit = float((upper - lower).max()) / 2
@@ -329,9 +329,9 @@ class _Polytopes:
 
 
 class _Tape:
-    """In the place of meshcat's window: keeps the commands instead of sending them to a server.
+    """Takes the place of meshcat's window, and keeps the commands instead of sending them to a server.
 
-    A geometry is kept once; where it is used again, by its uuid alone.
+    A geometry that is used again is kept by its uuid alone.
     """
 
     def __init__(self, commands: list[str]) -> None:
@@ -348,22 +348,22 @@ class _Tape:
 
 
 def _seen_from(view: View) -> dict[str, Any]:
-    """A view for the page: the distances are for pictures of the widths that ASPECTS has for a height of 1."""
+    """A view for the page, with its distance for each of ASPECTS."""
     distances = {f"{aspect:g}": view.distance(aspect) for aspect in ASPECTS}
     return {"at": view.at.tolist(), "back": view.back.tolist(), "distances": distances}
 
 
 def _pose(stage: Stage, placed: Placed) -> tuple[float, ...]:
-    """Position about the scene's centre and quaternion.
+    """Position about the scene's centre, and quaternion.
 
-    A millionth of the scene is far below a pixel: what rests has one pose in spite of rounding.
+    Both are rounded to about a millionth, far below a pixel, so that a body at rest has one pose.
     """
     position = np.round((placed.position - stage.center) / stage.size, 6) * stage.size
     return (*position.tolist(), *np.round(placed.orientation, 6).tolist())
 
 
 def _facet_planes(overlap: Overlap, middle: Array, unit: float) -> NDArray[np.float32]:
-    """As fine as depths are told by them to some hundredths of about how thick it is: the last bytes pack well."""
+    """The planes of facets, rounded to a small part of the thickness, so that their last bytes pack well."""
     planes = np.array(overlap.halfspaces)
     planes[:, 3] = (planes[:, 3] + planes[:, :3] @ middle) / unit
     thickness = 2 * overlap.volume / (overlap.area * unit)
@@ -373,7 +373,7 @@ def _facet_planes(overlap: Overlap, middle: Array, unit: float) -> NDArray[np.fl
 
 
 def _look_alike(a: Overlap, b: Overlap, slack: int) -> bool:
-    """True if the one can stand for the other in a picture.
+    """True if the drawing of one overlap can stand for the other.
 
     Neither shape has moved by more than 1/200 of the size of what they share, a pixel where that fills a quarter
     of the page, nor has its volume or area changed by more than 3 %, as it does in a thin overlap where that is much.
@@ -390,7 +390,7 @@ def _look_alike(a: Overlap, b: Overlap, slack: int) -> bool:
 
 
 def _motion(before: Placed, after: Placed, point: Array, reach: float) -> float:
-    """About how far the shape has moved, at the most, as far as `reach` from a point."""
+    """About the largest motion, m, of the shape within `reach` of a point."""
     if facts(before.shape).isotropic:
         return math.dist(after.position, before.position)
     # A quaternion and its negative are the same rotation.
@@ -399,7 +399,7 @@ def _motion(before: Placed, after: Placed, point: Array, reach: float) -> float:
 
 
 def _rounded(numbers: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
-    """With so many bits of 24 significant ones, so that the last bytes pack well."""
+    """Numbers rounded to so many of their 24 significant bits, so that the last bytes pack well."""
     spare = 24 - bits
     raised = np.ascontiguousarray(numbers).view(np.uint32) + np.uint32(1 << (spare - 1))
     rounded: NDArray[np.float32] = (raised >> spare << spare).view(np.float32)
@@ -407,9 +407,9 @@ def _rounded(numbers: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
 
 
 def _film(heading: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """The length of the heading, the heading in JSON, and the arrays, byte by byte: all first bytes, all second ones...
+    """The length of the heading, the heading in JSON, and of each array all first bytes, all second bytes, ...
 
-    Numbers of like size have like bytes, and what is alike packs best side by side.
+    Numbers of similar size have similar first bytes, and similar bytes pack best side by side.
     """
     kinds = {name: [ARRAYS[array.dtype.name], array.size] for name, array in arrays.items()}
     head = json.dumps({**heading, "arrays": kinds}).encode()

@@ -1,6 +1,6 @@
-"""The server of a live view, in a process of its own: meshcat's, which is seen only where it is asked to be.
+"""The meshcat server of a live view, in a process of its own.
 
-meshcat's own listens on every address of the machine.
+It is seen at one address of the machine, while meshcat's own server listens on all of them.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ def must_be_here(host: str) -> None:
 
 
 def serve(host: str) -> Iterator[tuple[str, str]]:
-    """In the process of the server: the addresses for drawing and for looking at it; then it runs until it is ended."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the view, which ends this
+    """Yields the addresses for drawing and for viewing, and then runs the server; called in the server's process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the view, and the view ends the server
     bridge = _Bridge(host)
     yield bridge.zmq_url, bridge.seen_at()
     bridge.run()
 
 
 class Window(ViewerWindow):  # type: ignore[misc]
-    """What is drawn to: a connection with such a server."""
+    """The connection over which a view draws."""
 
     def __init__(self, drawn_at: str, seen_at: str) -> None:
         self.server_proc = None
@@ -45,7 +45,7 @@ class Window(ViewerWindow):  # type: ignore[misc]
 
 
 class _Bridge(ZMQWebSocketBridge):  # type: ignore[misc]
-    """Drawn to from this machine only, whoever sees it."""
+    """It accepts drawings from this machine only, wherever it is seen."""
 
     def __init__(self, seen_by: str) -> None:
         self._seen_by = seen_by

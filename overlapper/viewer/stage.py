@@ -1,4 +1,4 @@
-"""What is drawn, as objects of meshcat, and the room around them. Lengths are in metres, z is up."""
+"""The drawing as objects of meshcat, and the room around them. Lengths are in metres, z is up."""
 
 from __future__ import annotations
 
@@ -36,10 +36,12 @@ class Stage:
         """A shape in its own frame. Equal shapes share their geometries, which a page keeps once."""
         primitives = self.drawing.body(placed, color)
         if self.drawing.ground(placed):
-            return _group(primitives, _buffers(primitives))
+            return _group(primitives)
         shape = pickle.dumps(placed.shape)
         if shape not in self._known:
-            self._known[shape] = _buffers(primitives)
+            # Faces, their inside and the dots at their corners share one geometry.
+            known: dict[int, _Buffers] = {}
+            self._known[shape] = [known.setdefault(id(each.points), _Buffers(each)) for each in primitives]
         return _group(primitives, self._known[shape])
 
     def overlap(self, overlap: Overlap, press: Press | None = None, scale: Scale | None = None) -> Group:
@@ -59,7 +61,7 @@ def set_room(visualizer: Any, view: View) -> None:
     visualizer["/Background"].set_property("top_color", list(TOP))
     visualizer["/Background"].set_property("bottom_color", list(BOTTOM))
     center, distance = view.at, view.distance()
-    # meshcat's camera circles about the page's origin; so the scene is moved there, and the camera moved with it.
+    # meshcat's camera turns about the page's origin, so the scene and the camera are moved there.
     z_up = rotation_matrix(-np.pi / 2, (1, 0, 0))
     visualizer["/"].set_transform(z_up @ translation_matrix(-center))
     visualizer["/Cameras/default"].set_transform(translation_matrix(center))
@@ -76,7 +78,7 @@ def set_room(visualizer: Any, view: View) -> None:
 
 
 class Group(geometry.Object):  # type: ignore[misc]
-    """Objects that make one node of the tree, each with more of its attributes in three.js's object format."""
+    """Several objects in one node of the tree, each with more attributes of three.js's object format."""
 
     def __init__(self, *parts: tuple[geometry.Object, dict[str, Any]]) -> None:
         geometry.SceneElement.__init__(self)
@@ -97,7 +99,7 @@ class Group(geometry.Object):  # type: ignore[misc]
 
 
 def _with(child: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
-    """meshcat gives every object a matrix, the identity for these, that would win over a position."""
+    """The object with more attributes; without meshcat's matrix, the identity, which would replace a position."""
     return {key: value for key, value in child.items() if key != "matrix"} | more
 
 
@@ -106,21 +108,20 @@ def _once(elements: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _placed(primitives: Sequence[Primitive], position: Array) -> Group:
-    return Group((_group(primitives, _buffers(primitives)), {"position": position.tolist()}))
+    return Group((_group(primitives), {"position": position.tolist()}))
 
 
-def _group(primitives: Sequence[Primitive], buffers: Sequence[_Buffers]) -> Group:
+def _group(primitives: Sequence[Primitive], buffers: Sequence[_Buffers] = ()) -> Group:
     parts: list[tuple[geometry.Object, dict[str, Any]]] = []
-    for each, shape in zip(primitives, buffers, strict=True):
-        solid, lined = isinstance(each, Faces), isinstance(each, Lines)
-        kind = geometry.Mesh if solid else geometry.LineSegments if lined else geometry.Points
+    for each, shape in zip(primitives, buffers or map(_Buffers, primitives)):
+        kind = {Faces: geometry.Mesh, Lines: geometry.LineSegments, Dots: geometry.Points}[type(each)]
         more = {"name": each.name, "visible": each.visible, "renderOrder": each.order}
         parts.append((kind(shape, _material(each)), more))
     return Group(*parts)
 
 
 def _material(primitive: Primitive) -> geometry.Material:
-    """It is "transparent" even if opaque: three.js draws what is so called last, and in the order asked for."""
+    """The material is "transparent" even if opaque, as three.js draws transparent objects in the order asked for."""
     painted = primitive.color.ndim > 1
     properties: dict[str, Any] = {
         "transparent": True,
@@ -145,14 +146,8 @@ class _DotMaterial(geometry.GenericMaterial):  # type: ignore[misc]
     _type = "PointsMaterial"
 
 
-def _buffers(primitives: Sequence[Primitive]) -> list[_Buffers]:
-    """A geometry for each primitive; those of the same points share one."""
-    known: dict[int, _Buffers] = {}
-    return [known.setdefault(id(each.points), _Buffers(each)) for each in primitives]
-
-
 class _Buffers(geometry.Geometry):  # type: ignore[misc]
-    """Points, and what else three.js wants to know of each; triangles, if it is of faces."""
+    """The points of a primitive with their colours and normals, and the triangles of faces."""
 
     def __init__(self, primitive: Primitive) -> None:
         super().__init__()

@@ -17,13 +17,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mesh:
-    """A closed surface, concave or not, that is drawn and never measured: triangles (t, 3, 3), counter-clockwise."""
+    """A closed surface, concave or not, for drawing alone: `triangles` (t, 3, 3), counter-clockwise from outside."""
 
     triangles: Array
 
 
 def tessellation(shape: Shape | Mesh) -> Tessellation:
-    """The surface of a bounded shape; round ones within 0.3 % of the radius, rounded hulls with bevelled edges."""
+    """The surface of a bounded shape: round shapes within 0.3 % of the radius, rounded hulls with bevelled edges."""
     if not isinstance(shape, Mesh):
         return facts(shape).tessellation()
     vertices, faces = np.unique(shape.triangles.reshape(-1, 3), axis=0, return_inverse=True)
@@ -34,7 +34,7 @@ def tessellation(shape: Shape | Mesh) -> Tessellation:
 
 @dataclass(frozen=True)
 class Ground(Tessellation):
-    """The part of a plane that is seen of a ground, around `middle`, fading out as far as `reach` metres from there.
+    """The part of a ground that is drawn: a plane around `middle` that fades out at `reach`, m, from there.
 
     The grid, among `edges` and `wires`, is 1, 0.1, ... m wide.
     """
@@ -43,15 +43,15 @@ class Ground(Tessellation):
     reach: float
 
     def strength(self, points: Array) -> Array:
-        """How much is seen at points (..., 3), from 1 to 0."""
+        """The strength of the plane at points (..., 3), from 1 to 0."""
         faded: Array = np.clip(1 - (np.linalg.norm(points - self.middle, axis=-1) / self.reach) ** 2, 0, 1)
         return faded
 
 
 def ground(shape: Shape, center: Array, size: float) -> Ground | None:
-    """A half-space, or the side of a box or a hull on which the scene is, with `center` and `size`; None if round.
+    """The plane of a half-space, or the side of a box or hull that faces the scene; None for a round shape.
 
-    Of a hull it is the rectangle around that side.
+    `center` and `size`, m, are those of the scene. The side of a hull is drawn as the rectangle around it.
     """
     side = facts(shape).side(center)
     if side is None:
@@ -69,7 +69,7 @@ def ground(shape: Shape, center: Array, size: float) -> Ground | None:
         placed: Array = np.insert(flat, 2, offset, axis=-1) @ basis.T
         return placed
 
-    cells = 24  # each way: fine enough to fade
+    cells = 24  # each way: enough to fade smoothly
     across, along = (np.linspace(lower[k], upper[k], cells + 1) for k in (0, 1))
     lattice = np.stack(np.meshgrid(across, along), axis=-1)
     number = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)

@@ -23,13 +23,13 @@ _Screen = Callable[[Array], Array]
 WIDTH, HEIGHT = 480, 360  # pixels
 SECONDS = 16  # a turn
 STEPS = 24  # of a turn
-ABOVE = np.deg2rad(25)  # the horizon: where the camera is
+ABOVE = np.deg2rad(25)  # the horizon
 AROUND = 48  # corners of a silhouette
-NEAR = 2.5  # times half the size of what is shared: how much is seen to each side
-LEAST = 1e-150  # m, half the height of a picture: less cannot be divided by
-EDGES = 200  # of a body: more are a net that hides it
-COARSE = 0.05  # the tolerance by which round overlaps are drawn: every facet is written STEPS times
-GROUND = 4 / 3  # times that height: the size of the scene, by which planes are drawn
+NEAR = 2.5  # times half the size of the overlap: how much is seen to each side
+LEAST = 1e-150  # m, the least half height of a picture, which is divided by
+EDGES = 200  # of a body: more edges would hide it, and are not drawn
+COARSE = 0.05  # the tolerance of round overlaps, as every facet is written STEPS times
+GROUND = 4 / 3  # times half the height: the size of the scene, which sets how far planes are drawn
 
 
 def turning(overlap: Overlap) -> str:
@@ -39,7 +39,7 @@ def turning(overlap: Overlap) -> str:
     views = _views()
 
     def screen(points: Array) -> Array:
-        """(STEPS + 1, n, 2): where points of the world (n, 3) are on the screen at each step, in half pixels."""
+        """Points (n, 3) of the world on the screen at each step, (STEPS + 1, n, 2), in half pixels."""
         flat = np.einsum("sij,nj->sni", views[:, :2], np.atleast_2d(points) - center) / reach
         screens: Array = np.clip(np.array([WIDTH, HEIGHT]) + flat * [HEIGHT, -HEIGHT], -9999, 9999)
         return screens
@@ -72,7 +72,7 @@ def _framed(overlap: Overlap) -> tuple[Array, float]:
 
 
 def _views() -> Array:
-    """(STEPS + 1, 3, 3): right, up and the way to the camera at each step; the last is the first."""
+    """Right, up and the direction to the camera at each step, (STEPS + 1, 3, 3); the last step is the first."""
     turn = np.linspace(0, 2 * np.pi, STEPS + 1) - np.deg2rad(49)
     right = np.stack([-np.sin(turn), np.cos(turn), 0 * turn], axis=1)
     level = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
@@ -94,7 +94,7 @@ def _body(drawing: Drawing, placed: Placed, color: Array, screen: _Screen) -> It
 
 
 def _outermost(screens: Array) -> Array:
-    """(s, AROUND, 2): of the points (s, n, 2) of each screen those that lie farthest in so many directions."""
+    """The points (s, AROUND, 2) that lie farthest in so many directions among points (s, n, 2) of each screen."""
     angles = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
     farthest = (screens @ np.array([np.cos(angles), np.sin(angles)])).argmax(axis=1)
     return np.take_along_axis(screens, farthest[:, :, None], axis=1)

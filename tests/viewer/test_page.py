@@ -170,8 +170,7 @@ def test_a_live_view_looks_like_a_recording(browser, reach, tmp_path):
         page.write_text(viewer.visualizer.static_html(), encoding="utf-8")
     height = len(scene(browser)) + 51
     browser.open(page.as_uri(), until="document.querySelector('canvas')")
-    while coloured(live := browser.picture(), "orange") == 0:
-        pass
+    live = next(each for each in (browser.picture() for _ in range(100)) if coloured(each, "orange"))
     for colour in ("orange", "sky blue", "green"):
         # The live view has the whole height, of which the recording leaves some.
         assert_allclose(coloured(live, colour) * (height / 800) ** 2, coloured(recording, colour), rtol=0.25)
