@@ -12,6 +12,7 @@ namespace overlapper::quadric {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr DoubleDouble kWidePi{kPi, 1.2246467991473532e-16};
 constexpr double kUnit = 0x1p-53;  ///< of rounding
 /// Lengths are right to this fraction of how far the numbers reach that they are made of: a unit vector to 4 roundings,
@@ -20,14 +21,14 @@ constexpr double kPlacing = 8 * kUnit;
 constexpr double kOpen = 1e-9;  ///< of the radius' square: areas are right to less, without a wrong turn
 
 /// A sum that is rounded but once.
-class Sum {
+class SumRoundedOnce {
  public:
-  Sum& operator+=(DoubleDouble term) {
+  SumRoundedOnce& operator+=(DoubleDouble term) {
     const DoubleDouble sum = two_sum(sum_.head, term.head);
     sum_ = {sum.head, sum_.tail + sum.tail + term.tail};
     return *this;
   }
-  Sum& operator+=(double term) { return *this += DoubleDouble{term}; }
+  SumRoundedOnce& operator+=(double term) { return *this += DoubleDouble{term}; }
   double value() const { return sum_.head + sum_.tail; }
 
  private:
@@ -43,9 +44,9 @@ struct Disc {
   bool touched = false;  ///< by an edge
   int ends = 0;          ///< of edges, on the sphere
   double whole = 0;      ///< twice the area of the face, as its edges tell
-  Sum angle;             ///< of the edges' parts inside the ball, as the middle sees them
+  SumRoundedOnce angle;  ///< of the edges' parts inside the ball, as the middle sees them
   double sizes = 0;      ///< of these
-  Sum twice;             ///< twice the area of their triangles
+  SumRoundedOnce twice;  ///< twice the area of their triangles
   double second = 0;     ///< four times ∫ |y|² dA over the triangles
   Vec3 first;            ///< ∫ y dA over triangles and sectors
   Vec3 third;            ///< ∫ (|y|² − ρ²) y dA over the same
@@ -55,7 +56,7 @@ struct Disc {
 
 /// The part of an edge inside the ball, as the middle of a disc sees it. Lengths along the edge count from the point
 /// that is nearest to the centre.
-struct Chord {
+struct DiscChord {
   Vec3 out, along;  ///< unit, in the disc's plane: from the face across the edge, and along that
   double height;    ///< of the edge's line over the middle, positive if that is on the side of the face
   double from, to;
@@ -72,7 +73,7 @@ void add_sector(Vec3 out, Disc& disc) {
 }
 
 /// Returns the size of the angle.
-double add(const Chord& chord, Disc& disc) {
+double add(const DiscChord& chord, Disc& disc) {
   const auto [out, along, h, from, to] = chord;
   const double length = to - from, h2 = h * h, cubes = length * (from * from + from * to + to * to);
   const double angle = std::atan2(length * h, h2 + from * to);
@@ -92,11 +93,193 @@ double add(const Chord& chord, Disc& disc) {
   return std::abs(angle);
 }
 
-/// How far the border of the curved part turns where it leaves a plane for another, and the edge between them, at the
-/// length t from the edge's point nearest to the centre: less than none, or more than half a turn, if t is negative.
+/// How far the border of the curved part turns where it leaves a plane for another. It does so on the edge between
+/// them, `t` along from the point that is nearest to the centre. The turn is negative, or more than half a turn, if t
+/// is negative.
 double turn_at(double t, double radius, double cosine, double sine, double heights) {
   const double x = cosine * t * t - heights, turn = std::atan2(radius * sine * t, x);
   return turn < 0 && x < 0 ? turn + 2 * kPi : turn;
+}
+
+/// A ball and a polyhedron, with what is decided once for all sums.
+struct BallAndPolyhedron {
+  const Polyhedron& polyhedron;
+  Vec3 centre;
+  double r, r2 = r * r, r3 = r * r2;
+  std::vector<Disc>& discs;   ///< per plane
+  std::vector<char>& inside;  ///< per corner
+
+  /// False if a plane leaves nothing of the ball.
+  bool set_discs() {
+    discs.assign(polyhedron.planes.size(), {});
+    for (size_t f = 0; f < discs.size(); ++f) {
+      const double h = -signed_distance(polyhedron.planes[f], centre);
+      if (h <= -r) return false;
+      discs[f].height = h, discs[f].square = std::max(0.0, (r - h) * (r + h));
+    }
+    return true;
+  }
+  /// Returns how many corners are inside.
+  int set_inside() {
+    inside.resize(polyhedron.corners.size());
+    for (size_t i = 0; i < inside.size(); ++i) inside[i] = norm2(polyhedron.corners[i] - centre) < r2;
+    return static_cast<int>(std::ranges::count(inside, char{1}));
+  }
+};
+
+/// Sums over edges and faces.
+struct BallSums {
+  BallPart part;
+  int characteristic;            ///< of the curved part (Euler)
+  SumRoundedOnce curved, cones;  ///< the curved part's area, by r²; Σ h A
+  double sizes = 0, cone_sizes = 0;
+  double flats = 0;     ///< m², of all faces
+  double pressure = 0;  ///< Σ h ∫ (|x|² − r²) dA
+};
+
+/// An edge, seen along itself: both planes and the line in which they meet, from one plane's height and the line's.
+struct SeenEdge {
+  Vec3 n, m, along, out;
+  double length, cosine, sine;
+  bool from_middle, to_middle;  ///< the ball's centre is that end
+  double height, other;         ///< of the line, over the middles of the left and the right disc
+  double first, last;           ///< of the ends, along the line from its point nearest to the centre
+
+  bool through() const { return from_middle || to_middle; }
+
+  SeenEdge(const Edge& edge, const BallAndPolyhedron& at, double left_height) {
+    const Vec3 corner = at.polyhedron.corners[edge.from], between = at.polyhedron.corners[edge.to] - corner;
+    n = at.polyhedron.planes[edge.left].normal, m = at.polyhedron.planes[edge.right].normal;
+    length = std::sqrt(norm2(between));
+    const Vec3 p = corner - at.centre;
+    along = between / length, out = cross(along, n);
+    // No zero is negative, whose angle would be on the other side.
+    cosine = dot(n, m), sine = std::max(0.0, dot(out, m));
+    from_middle = p == Vec3{}, to_middle = at.polyhedron.corners[edge.to] == at.centre;
+    height = through() ? 0 : dot(out, p) + 0.0;
+    other = through() ? 0 : sine * left_height - cosine * height + 0.0;
+    first = to_middle ? -length : dot(p, along), last = to_middle ? 0 : first + length;
+  }
+};
+
+/// Adds to the discs what an edge tells of the whole faces.
+void add_border(const SeenEdge& edge, Disc& left, Disc& right) {
+  if (edge.from_middle) left.goes = right.comes = edge.along;
+  if (edge.to_middle) left.comes = right.goes = -edge.along;
+  left.whole += edge.height * edge.length, right.whole += edge.other * edge.length;
+  if (edge.height < 0) left.around = false;
+  if (edge.other < 0) right.around = false;
+}
+
+/// Adds the error of an edge's part inside, of which two chords make `beside` of the ball.
+void add_error(const SeenEdge& edge, const DiscChord& left, const DiscChord& right, bool from_inside, bool to_inside,
+               double beside, double left_height, double r3, double misplaced_corners, double& error) {
+  const double far = std::abs(edge.first) + std::abs(edge.height) + std::abs(left_height);
+  const double misplaced = kPlacing * far + misplaced_corners;
+  const auto seen = [&](double t) {
+    return edge.through() && t == 0 ? 0 : 1 / std::sqrt(left.distance2(t)) + 1 / std::sqrt(right.distance2(t));
+  };
+  const int ends = !from_inside + !to_inside;
+  error += misplaced * beside;
+  if (from_inside) error += misplaced * r3 / 2 * seen(left.from);
+  if (to_inside) error += (misplaced + kPlacing * edge.length) * r3 / 2 * seen(left.to);
+  error += ends * r3 * (std::abs(dot(edge.along, edge.n)) + std::abs(dot(edge.along, edge.m)) + kPlacing);
+}
+
+/// An edge between two corners at one place, where more than three faces meet.
+void add_short_edge(const Edge& edge, const BallAndPolyhedron& at, BallSums& sums) {
+  if (!at.inside[edge.from]) return;
+  for (Disc* disc : {&at.discs[edge.left], &at.discs[edge.right]})
+    disc->touched = true, disc->around = disc->around && at.polyhedron.corners[edge.from] != at.centre;
+  ++sums.characteristic;
+}
+
+void add_edge(const Edge& edge, const BallAndPolyhedron& at, BallSums& sums) {
+  if (norm2(at.polyhedron.corners[edge.to] - at.polyhedron.corners[edge.from]) == 0)
+    return add_short_edge(edge, at, sums);
+  Disc &left = at.discs[edge.left], &right = at.discs[edge.right];
+  const bool from_inside = at.inside[edge.from], to_inside = at.inside[edge.to];
+  const SeenEdge seen(edge, at, left.height);
+  add_border(seen, left, right);
+  const double half = std::sqrt(std::max(0.0, left.square - seen.height * seen.height));
+  const double first = seen.first, last = seen.last;
+  if (!from_inside && !to_inside && !(half > 0 && right.square > 0 && first < 0 && last > 0)) return;
+  // An edge along the sphere may seem to end on that beyond a corner: the corner counts.
+  const double from = from_inside ? first : std::clamp(-half, first, to_inside ? last : 0);
+  const double to = to_inside ? last : std::clamp(half, from_inside ? first : 0, last);
+  const auto turn = [&](double t) { return turn_at(t, at.r, seen.cosine, seen.sine, seen.height * seen.other); };
+  const int ends = !from_inside + !to_inside;
+  left.ends += ends, right.ends += ends;
+  const double at_from = from_inside ? 0 : turn(-from);
+  const double at_to = to_inside ? 0 : ends == 2 && -from == to ? at_from : turn(to);
+  sums.curved += -at_from, sums.curved += -at_to;
+  sums.sizes += at_from + at_to;
+  const DiscChord of_left{seen.out, seen.along, seen.height, from, to};
+  const DiscChord of_right{seen.sine * seen.n - seen.cosine * seen.out, seen.along, seen.other, from, to};
+  const double beside = left.square * add(of_left, left) + right.square * add(of_right, right);
+  ++sums.characteristic;
+  add_error(seen, of_left, of_right, from_inside, to_inside, beside, left.height, at.r3, at.polyhedron.misplaced,
+            sums.part.error);
+}
+
+/// A face of which the ball's centre is a corner.
+void add_corner_at_centre(Vec3 n, Disc& disc) {
+  if (disc.goes == Vec3{}) return;
+  const double angle = std::atan2(dot(n, cross(disc.comes, disc.goes)), dot(disc.comes, disc.goes));
+  disc.around = false;
+  disc.angle += angle, disc.sizes += std::abs(angle);
+  add_sector(cross(disc.comes - disc.goes, n), disc);
+}
+
+/// Adds the part of a face inside the ball, and returns it.
+Section add_face(const Disc& disc, Vec3 n, bool is_cut, double r, BallSums& sums) {
+  BallPart& part = sums.part;
+  // A face that is nothing but rounding may seem to lie around anything.
+  const bool wide_enough = disc.touched || disc.whole >= 6 * disc.square;
+  const bool whole_turn = disc.around && disc.square > 0 && wide_enough;
+  if (!whole_turn && !disc.touched) return {};
+  ++part.faces;
+  // Without an end on the sphere, edges are the whole border, and what they turn beside a whole turn is rounding.
+  const double h = disc.height, turn = whole_turn ? 2 * kPi : 0, rest = turn - disc.angle.value();
+  const double arcs = disc.touched && disc.ends == 0 ? 0 : rest;
+  if (!(arcs > -kOpen && arcs < 2 * kPi + kOpen)) part.error = kInfinity;
+  const double twice = disc.twice.value(), face = (disc.square * arcs + twice) / 2;
+  --sums.characteristic;
+  sums.curved += arcs * h / r;
+  sums.cones += h * face;
+  sums.sizes += (turn + disc.sizes) * std::abs(h) / r;
+  sums.cone_sizes += std::abs(h) * (disc.square * (turn + disc.sizes) + std::abs(twice)) / 2;
+  sums.flats += face;
+  if (!is_cut) part.area += face;
+  part.flat += face * n;
+  const double on_face = (disc.second - disc.square * disc.square * arcs) / 4 - disc.square * twice / 2;
+  part.first += on_face / 2 * n;
+  sums.pressure += h * on_face;
+  const Vec3 w = h * on_face * n + disc.third;
+  part.squares += scaled(n, w);
+  part.products += 0.5 * Vec3{n.y * w.z + n.z * w.y, n.z * w.x + n.x * w.z, n.x * w.y + n.y * w.x};
+  return {face, face * h * n + disc.first, {}, {}};
+}
+
+/// Adds the curved part to the sums over the faces.
+void finish(const std::vector<Disc>& discs, double r, BallSums& sums) {
+  BallPart& part = sums.part;
+  const double r2 = r * r, r3 = r * r2;
+  sums.curved += DoubleDouble{sums.characteristic * 2.0} * kWidePi;
+  const double area = r2 * sums.curved.value();
+  // A ball that no face reaches no plane reaches either, unless the polyhedron is nothing but rounding.
+  const bool reached = std::ranges::any_of(discs, [](const Disc& disc) { return disc.square > 0; });
+  if (part.faces == 0 && reached) part.error = kInfinity;
+  // What lies beyond the faces is farther around the ball than they are, and the curved part than its vector is long;
+  // by a wrong turn, one of them would not be so.
+  const double slack = kOpen * r2;
+  if (!(area + sums.flats <= 4 * kPi * r2 + slack && norm(part.flat) <= area + slack)) part.error = kInfinity;
+  part.area += area;
+  part.volume = (sums.cones.value() + r * area) / 3;
+  part.error += kUnit * 10 * (sums.cone_sizes + r3 * sums.sizes + r * std::abs(area)) / 3;
+  const double all = (3 * r2 * part.volume + sums.pressure) / 5, each = r2 * part.volume - all;
+  part.squares = 0.5 * (part.squares + Vec3{each, each, each});
+  part.products = 0.5 * part.products;
 }
 
 }  // namespace
@@ -130,135 +313,21 @@ std::optional<BallPart> measure_ball(const Polyhedron& polyhedron, Vec3 centre, 
   thread_local std::vector<Disc> discs;
   thread_local std::vector<char> inside;
   thread_local std::vector<Section> sections;
-  const double r = radius, r2 = r * r, r3 = r * r2;
-  discs.assign(polyhedron.planes.size(), {}), sections.assign(polyhedron.planes.size(), {});
+  BallAndPolyhedron at{.polyhedron = polyhedron, .centre = centre, .r = radius, .discs = discs, .inside = inside};
+  if (!at.set_discs()) return std::nullopt;
+  BallSums sums{{}, 2 - at.set_inside(), {}, {}};
+  for (const Edge& edge : polyhedron.edges) add_edge(edge, at, sums);
+  sections.clear();
   for (size_t f = 0; f < discs.size(); ++f) {
-    const double h = -signed_distance(polyhedron.planes[f], centre);
-    if (h <= -r) return std::nullopt;
-    discs[f].height = h, discs[f].square = std::max(0.0, (r - h) * (r + h));
-  }
-  inside.resize(polyhedron.corners.size());
-  int characteristic = 2;
-  for (size_t i = 0; i < inside.size(); ++i) {
-    inside[i] = norm2(polyhedron.corners[i] - centre) < r2;
-    characteristic -= inside[i];
-  }
-  BallPart part;
-  Sum curved;  // the curved part's area, by r²
-  double sizes = 0, cone_sizes = 0;
-  for (const Edge& edge : polyhedron.edges) {
-    Disc &left = discs[edge.left], &right = discs[edge.right];
-    const bool from_inside = inside[edge.from], to_inside = inside[edge.to];
-    const Vec3 corner = polyhedron.corners[edge.from], between = polyhedron.corners[edge.to] - corner;
-    const Vec3 n = polyhedron.planes[edge.left].normal, m = polyhedron.planes[edge.right].normal;
-    const double length = std::sqrt(norm2(between));
-    if (length == 0) {  // of corners where more than three faces meet
-      if (!from_inside) continue;
-      for (Disc* disc : {&left, &right}) disc->touched = true, disc->around = disc->around && corner != centre;
-      ++characteristic;
-      continue;
-    }
-    const Vec3 p = corner - centre, along = between / length, out = cross(along, n);
-    // Seen along the edge, both planes and the line in which they meet, from the one plane's height and the line's. No
-    // zero is negative, whose angle would be on the other side.
-    const double cosine = dot(n, m), sine = std::max(0.0, dot(out, m));
-    const bool from_middle = p == Vec3{}, to_middle = polyhedron.corners[edge.to] == centre;
-    const bool through = from_middle || to_middle;
-    const double height = through ? 0 : dot(out, p) + 0.0;
-    const double other = through ? 0 : sine * left.height - cosine * height + 0.0;
-    if (from_middle) left.goes = right.comes = along;
-    if (to_middle) left.comes = right.goes = -along;
-    left.whole += height * length, right.whole += other * length;
-    if (height < 0) left.around = false;
-    if (other < 0) right.around = false;
-    const double half = std::sqrt(std::max(0.0, left.square - height * height));
-    const double first = to_middle ? -length : dot(p, along), last = to_middle ? 0 : first + length;
-    if (!from_inside && !to_inside && !(half > 0 && right.square > 0 && first < 0 && last > 0)) continue;
-    // An edge along the sphere may seem to end on that beyond a corner: the corner counts.
-    const double from = from_inside ? first : std::clamp(-half, first, to_inside ? last : 0);
-    const double to = to_inside ? last : std::clamp(half, from_inside ? first : 0, last);
-    const auto turn = [&](double t) { return turn_at(t, r, cosine, sine, height * other); };
-    const int ends = !from_inside + !to_inside;
-    left.ends += ends, right.ends += ends;
-    const double at_from = from_inside ? 0 : turn(-from);
-    const double at_to = to_inside ? 0 : ends == 2 && -from == to ? at_from : turn(to);
-    curved += -at_from, curved += -at_to;
-    sizes += at_from + at_to;
-    const Chord of_left{out, along, height, from, to};
-    const Chord of_right{sine * n - cosine * out, along, other, from, to};
-    const double beside = left.square * add(of_left, left) + right.square * add(of_right, right);
-    ++characteristic;
-    const double far = std::abs(first) + std::abs(height) + std::abs(left.height);
-    const double misplaced = kPlacing * far + polyhedron.misplaced;
-    const auto seen = [&](double t) {
-      return through && t == 0 ? 0 : 1 / std::sqrt(of_left.distance2(t)) + 1 / std::sqrt(of_right.distance2(t));
-    };
-    part.error += misplaced * beside;
-    if (from_inside) part.error += misplaced * r3 / 2 * seen(from);
-    if (to_inside) part.error += (misplaced + kPlacing * length) * r3 / 2 * seen(to);
-    part.error += ends * r3 * (std::abs(dot(along, n)) + std::abs(dot(along, m)) + kPlacing);
-  }
-  for (size_t f = 0; f < discs.size(); ++f) {
-    Disc& disc = discs[f];
-    if (disc.goes == Vec3{}) continue;
     const Vec3 n = polyhedron.planes[f].normal;
-    const double angle = std::atan2(dot(n, cross(disc.comes, disc.goes)), dot(disc.comes, disc.goes));
-    disc.around = false;
-    disc.angle += angle, disc.sizes += std::abs(angle);
-    add_sector(cross(disc.comes - disc.goes, n), disc);
+    add_corner_at_centre(n, discs[f]);
+    sections.push_back(add_face(discs[f], n, f >= polyhedron.faces, radius, sums));
   }
-  Sum cones;
-  double flats = 0;     // m², of all faces
-  double pressure = 0;  // Σ h ∫ (|x|² − r²) dA
-  for (size_t f = 0; f < discs.size(); ++f) {
-    const Disc& disc = discs[f];
-    // A face that is nothing but rounding may seem to lie around anything.
-    const bool wide_enough = disc.touched || disc.whole >= 6 * disc.square;
-    const bool whole_turn = disc.around && disc.square > 0 && wide_enough;
-    if (!whole_turn && !disc.touched) continue;
-    ++part.faces;
-    const Vec3 n = polyhedron.planes[f].normal;
-    // Without an end on the sphere, edges are the whole border, and what they turn beside a whole turn is rounding.
-    const double h = disc.height, turn = whole_turn ? 2 * kPi : 0, rest = turn - disc.angle.value();
-    const double arcs = disc.touched && disc.ends == 0 ? 0 : rest;
-    if (!(arcs > -kOpen && arcs < 2 * kPi + kOpen)) part.error = std::numeric_limits<double>::infinity();
-    const double twice = disc.twice.value(), face = (disc.square * arcs + twice) / 2;
-    --characteristic;
-    curved += arcs * h / r;
-    cones += h * face;
-    sizes += (turn + disc.sizes) * std::abs(h) / r;
-    cone_sizes += std::abs(h) * (disc.square * (turn + disc.sizes) + std::abs(twice)) / 2;
-    flats += face;
-    if (f < polyhedron.faces) part.area += face;
-    part.flat += face * n;
-    sections[f].area = face, sections[f].first = face * h * n + disc.first;
-    const double on_face = (disc.second - disc.square * disc.square * arcs) / 4 - disc.square * twice / 2;
-    part.first += on_face / 2 * n;
-    pressure += h * on_face;
-    const Vec3 w = h * on_face * n + disc.third;
-    part.squares += scaled(n, w);
-    part.products += 0.5 * Vec3{n.y * w.z + n.z * w.y, n.z * w.x + n.x * w.z, n.x * w.y + n.y * w.x};
-  }
-  curved += DoubleDouble{characteristic * 2.0} * kWidePi;
-  const double area = r2 * curved.value();
   const bool holds_centre = std::ranges::none_of(discs, [](const Disc& disc) { return disc.height < 0; });
-  if (part.faces == 0 && !holds_centre) return BallPart{};
-  // A ball that no face reaches no plane reaches either, unless the polyhedron is nothing but rounding.
-  const bool reached = std::ranges::any_of(discs, [](const Disc& disc) { return disc.square > 0; });
-  if (part.faces == 0 && reached) part.error = std::numeric_limits<double>::infinity();
-  // What lies beyond the faces is farther around the ball than they are, and the curved part than its vector is long;
-  // by a wrong turn, one of them would not be so.
-  const double slack = kOpen * r2;
-  if (!(area + flats <= 4 * kPi * r2 + slack && norm(part.flat) <= area + slack))
-    part.error = std::numeric_limits<double>::infinity();
-  part.area += area;
-  part.volume = (cones.value() + r * area) / 3;
-  part.error += kUnit * 10 * (cone_sizes + r3 * sizes + r * std::abs(area)) / 3;
-  const double all = (3 * r2 * part.volume + pressure) / 5, each = r2 * part.volume - all;
-  part.squares = 0.5 * (part.squares + Vec3{each, each, each});
-  part.products = 0.5 * part.products;
-  part.sections = sections;
-  return part;
+  if (sums.part.faces == 0 && !holds_centre) return BallPart{};
+  finish(discs, radius, sums);
+  sums.part.sections = sections;
+  return sums.part;
 }
 
 }  // namespace overlapper::quadric

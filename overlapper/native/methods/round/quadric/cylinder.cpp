@@ -57,7 +57,7 @@ ThirdMoments third_moments(double x, double s, double c, double along) {
 }
 
 /// The part of an edge inside the cylinder.
-struct Chord {
+struct CylinderChord {
   Vec3 from, to;
   bool from_surface, to_surface;  ///< whether that is where it enters or leaves, and not a corner
 };
@@ -66,7 +66,7 @@ double cross2(Vec3 a, Vec3 b) { return a.x * b.y - a.y * b.x; }
 double dot2(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y; }
 
 /// The same points whichever way round the edge is asked for.
-bool find_chord(Vec3 p, Vec3 q, bool p_inside, bool q_inside, double radius, Chord& chord) {
+bool find_chord(Vec3 p, Vec3 q, bool p_inside, bool q_inside, double radius, CylinderChord& chord) {
   chord = {p, q, !p_inside, !q_inside};
   if (p_inside && q_inside) return true;
   const Vec3 e = q - p;
@@ -82,281 +82,297 @@ bool find_chord(Vec3 p, Vec3 q, bool p_inside, bool q_inside, double radius, Cho
 }
 
 /// What is summed over a face's part inside.
-struct Sum : Section {
+struct FaceSums : Section {
   double sizes = 0;  ///< m²: of the areas that are summed
   /// ∫ (ρ² − r²) x dA, of the distance ρ from the axis, and ∫ z³ dA.
   Vec3 within;
   double cubes = 0;
 };
 
-class Measuring {
- public:
-  std::optional<CylinderPart> measure(const Rings& polyhedron, double radius) {
-    polyhedron_ = &polyhedron, radius_ = radius, part_ = {};
-    radial_ = 0, lengthwise_ = across_ = {}, sections_.assign(polyhedron.planes().size(), {});
-    terms_ = 0, cones_ = sizes_ = all_area_ = upward_ = far2_ = turned_ = levels_ = squares_ = 0, height_moments_ = {};
-    return measure();
-  }
+/// The polyhedron about the point of the axis that is as high as its middle.
+struct AboutAxis {
+  const Rings* polyhedron = nullptr;
+  double radius = 0, level = 0, height = 0;
+  std::vector<Vec3> corners;
+  std::vector<char> inside;
 
- private:
-  std::optional<CylinderPart> measure() {
-    const auto given = polyhedron_->corners();
-    corners_.assign(given.begin(), given.end());
+  void become(const Rings& rings, double cylinder_radius) {
+    polyhedron = &rings, radius = cylinder_radius;
+    corners.assign(rings.corners().begin(), rings.corners().end());
     double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (size_t f = 0; f < polyhedron_->planes().size(); ++f)
-      for (const int i : polyhedron_->ring(f)) low = std::min(low, given[i].z), high = std::max(high, given[i].z);
-    level_ = low + (high - low) / 2, height_ = high - low;
-    inside_.resize(corners_.size());
-    for (size_t i = 0; i < corners_.size(); ++i) {
-      corners_[i].z -= level_;
-      inside_[i] = dot2(corners_[i], corners_[i]) < radius_ * radius_;
+    for (size_t f = 0; f < rings.planes().size(); ++f)
+      for (const int i : rings.ring(f)) low = std::min(low, corners[i].z), high = std::max(high, corners[i].z);
+    level = low + (high - low) / 2, height = high - low;
+    inside.resize(corners.size());
+    for (size_t i = 0; i < corners.size(); ++i) {
+      corners[i].z -= level;
+      inside[i] = dot2(corners[i], corners[i]) < radius * radius;
     }
-    for (size_t f = 0; f < polyhedron_->planes().size(); ++f)
-      if (!add_face(f)) return std::nullopt;
-    return sum();
   }
+};
 
-  bool add_face(size_t f) {
-    Plane plane = polyhedron_->planes()[f];
-    plane.offset -= plane.normal.z * level_;
-    const Vec3 n = plane.normal;
-    // Of the cylinder between the heights, nothing reaches a plane that is farther away.
-    const double reach = radius_ * std::sqrt(dot2(n, n)) + std::abs(n.z) * height_ / 2;
-    if (plane.offset > reach + kBeyond * (reach + radius_ + std::abs(level_))) return true;
-    Sum section;
-    find_chords(polyhedron_->ring(f));
-    if (chords_.empty()) {
-      if (!around(polyhedron_->ring(f), n)) return true;
-      add_ellipse(plane, section);
-    } else {
-      const Vec3 apex = chords_[0].from;
-      double border = 0;
-      for (const Chord& chord : chords_) border += std::sqrt(dot2(chord.to - chord.from, chord.to - chord.from));
-      for (size_t k = 0; k < chords_.size(); ++k) {
-        const Chord &chord = chords_[k], &next = chords_[k + 1 < chords_.size() ? k + 1 : 0];
-        add_triangle(n, apex, chord.from, chord.to, section);
-        if (!chord.to_surface && !next.from_surface) continue;
-        if (!add_arc(n, chord.to, next.from, border, section)) return false;
-        add_triangle(n, apex, chord.to, next.from, section);
-      }
-    }
-    const double area = section.area;
-    ++part_.faces, ++terms_;
-    cones_ += plane.offset * area;
-    sizes_ += std::abs(plane.offset) * section.sizes;
-    all_area_ += area;
-    upward_ += std::max(0.0, area * n.z);
-    height_moments_ += plane.offset * section.first;
-    radial_ += n.x * section.within.x + n.y * section.within.y;
-    lengthwise_ += scaled(n, {section.within.x, section.within.y, section.cubes});
-    across_ +=
-        Vec3{n.y * section.within.z, n.x * section.within.z, (n.x * section.within.y + n.y * section.within.x) / 2};
-    sections_[f] = section;
-    const Pull pull{area * n, cross(section.first, n)};
-    part_.curved.force += -pull.force, part_.curved.moment += -pull.moment;
-    if (!polyhedron_->face(f)) return true;
-    part_.flat.force += pull.force, part_.flat.moment += pull.moment;
-    part_.area += area;
-    return true;
+/// Sums over all faces and arcs.
+struct CylinderSums {
+  CylinderPart part;
+  int terms = 0;
+  double cones = 0, sizes = 0, all_area = 0;
+  double upward = 0;               ///< m²: of faces that look up, as seen along the axis
+  double far2 = 0;                 ///< m²: of how far corners of edges that are cut are from the origin
+  double turned = 0;               ///< rad
+  double levels = 0, squares = 0;  ///< ∫ z dθ and ∫ z² dθ along the arcs
+  Vec3 height_moments;             ///< Σ h ∫ x dA
+  double radial = 0;               ///< Σ ∫ (ρ² − r²) (n_x x + n_y y) dA
+  Vec3 lengthwise, across;  ///< Σ of n_x and n_y times that ∫ of x and y, n_z ∫ z³ dA; of those of two coordinates
+
+  /// The part of a face inside, in a plane of such a normal and offset.
+  void add_face(Vec3 n, double offset, const FaceSums& face, bool is_cut) {
+    const double area = face.area;
+    ++part.faces, ++terms;
+    cones += offset * area;
+    sizes += std::abs(offset) * face.sizes;
+    all_area += area;
+    upward += std::max(0.0, area * n.z);
+    height_moments += offset * face.first;
+    radial += n.x * face.within.x + n.y * face.within.y;
+    lengthwise += scaled(n, {face.within.x, face.within.y, face.cubes});
+    across += Vec3{n.y * face.within.z, n.x * face.within.z, (n.x * face.within.y + n.y * face.within.x) / 2};
+    const Pull pull{area * n, cross(face.first, n)};
+    part.curved.force += -pull.force, part.curved.moment += -pull.moment;
+    if (is_cut) return;
+    part.flat.force += pull.force, part.flat.moment += pull.moment;
+    part.area += area;
   }
+};
 
-  void find_chords(std::span<const int> ring) {
-    chords_.clear();
-    for (size_t k = 0; k < ring.size(); ++k) {
-      const int i = ring[k], j = ring[k + 1 < ring.size() ? k + 1 : 0];
-      const auto [low, high] = std::minmax(i, j);
-      Chord chord;
-      if (!find_chord(corners_[low], corners_[high], inside_[low], inside_[high], radius_, chord)) continue;
-      if (i < j) chords_.push_back(chord);
-      else chords_.push_back({chord.to, chord.from, chord.to_surface, chord.from_surface});
-      far2_ = std::max({far2_, norm2(corners_[i]), norm2(corners_[j])});
-    }
-    terms_ += 2 * static_cast<int>(chords_.size());
+void find_chords(const AboutAxis& at, std::span<const int> ring, std::vector<CylinderChord>& chords,
+                 CylinderSums& sums) {
+  chords.clear();
+  for (size_t k = 0; k < ring.size(); ++k) {
+    const int i = ring[k], j = ring[k + 1 < ring.size() ? k + 1 : 0];
+    const auto [low, high] = std::minmax(i, j);
+    CylinderChord chord;
+    if (!find_chord(at.corners[low], at.corners[high], at.inside[low], at.inside[high], at.radius, chord)) continue;
+    if (i < j) chords.push_back(chord);
+    else chords.push_back({chord.to, chord.from, chord.to_surface, chord.from_surface});
+    sums.far2 = std::max({sums.far2, norm2(at.corners[i]), norm2(at.corners[j])});
   }
+  sums.terms += 2 * static_cast<int>(chords.size());
+}
 
-  /// Whether a face that has no edge inside reaches all around: one steeper would be higher than the polyhedron.
-  bool around(std::span<const int> ring, Vec3 n) const {
-    if (!(std::abs(n.z) * height_ > radius_ * std::hypot(n.x, n.y))) return false;
-    double twice = 0;  // its area as seen along the axis
-    for (size_t k = 0; k < ring.size(); ++k) {
-      const double turn = cross2(corners_[ring[k]], corners_[ring[k + 1 < ring.size() ? k + 1 : 0]]) * n.z;
-      if (turn < 0) return false;
-      twice += turn;
-    }
-    // What is nothing but rounding may seem to lie around anything.
-    return twice >= 6 * std::abs(n.z) * radius_ * radius_;
+/// Whether a face that has no edge inside reaches all around: a steeper face would be higher than the polyhedron.
+bool around(const AboutAxis& at, std::span<const int> ring, Vec3 n) {
+  if (!(std::abs(n.z) * at.height > at.radius * std::hypot(n.x, n.y))) return false;
+  double twice = 0;  // its area as seen along the axis
+  for (size_t k = 0; k < ring.size(); ++k) {
+    const double turn = cross2(at.corners[ring[k]], at.corners[ring[k + 1 < ring.size() ? k + 1 : 0]]) * n.z;
+    if (turn < 0) return false;
+    twice += turn;
   }
+  // What is nothing but rounding may seem to lie around anything.
+  return twice >= 6 * std::abs(n.z) * at.radius * at.radius;
+}
 
-  void add_ellipse(const Plane& plane, Sum& section) {
-    const Vec3 n = plane.normal;
-    const double turn = n.z > 0 ? 2 * kPi : -2 * kPi, z = plane.offset / n.z;
-    const double wave2 = radius_ * radius_ * dot2(n, n) / (n.z * n.z);
-    section.area = section.sizes = kPi * radius_ * radius_ / std::abs(n.z);
-    // The middle of the ellipse is on the axis.
-    section.first = section.area * Vec3{0, 0, z};
-    turned_ += turn, levels_ += turn * z, squares_ += turn * (z * z + wave2 / 2);
-    sizes_ += radius_ * radius_ * std::abs(turn * z);
-    const double quarter = radius_ * radius_ / 4;
-    const Vec3 slope{-n.x / n.z, -n.y / n.z, 0};
-    const double rise2 = quarter * dot2(slope, slope);
-    section.squares = section.area * Vec3{quarter, quarter, z * z + rise2};
-    section.products = section.area * quarter * Vec3{slope.y, slope.x, 0};
-    // Over a disc, the mean of (ρ² − r²) is −r² / 2, and that of (ρ² − r²) x² is −r⁴ / 12.
-    section.within = section.area * Vec3{0, 0, -2 * quarter * z};
-    section.cubes = section.area * z * (z * z + 3 * rise2);
-  }
+FaceSums add_ellipse(Vec3 n, double offset, double radius, CylinderSums& sums) {
+  FaceSums face;
+  const double turn = n.z > 0 ? 2 * kPi : -2 * kPi, z = offset / n.z;
+  const double wave2 = radius * radius * dot2(n, n) / (n.z * n.z);
+  face.area = face.sizes = kPi * radius * radius / std::abs(n.z);
+  // The middle of the ellipse is on the axis.
+  face.first = face.area * Vec3{0, 0, z};
+  sums.turned += turn, sums.levels += turn * z, sums.squares += turn * (z * z + wave2 / 2);
+  sums.sizes += radius * radius * std::abs(turn * z);
+  const double quarter = radius * radius / 4;
+  const Vec3 slope{-n.x / n.z, -n.y / n.z, 0};
+  const double rise2 = quarter * dot2(slope, slope);
+  face.squares = face.area * Vec3{quarter, quarter, z * z + rise2};
+  face.products = face.area * quarter * Vec3{slope.y, slope.x, 0};
+  // Over a disc, the mean of (ρ² − r²) is −r² / 2, and that of (ρ² − r²) x² is −r⁴ / 12.
+  face.within = face.area * Vec3{0, 0, -2 * quarter * z};
+  face.cubes = face.area * z * (z * z + 3 * rise2);
+  return face;
+}
 
-  void add_triangle(Vec3 n, Vec3 a, Vec3 b, Vec3 c, Sum& section) const {
-    const double area = dot(n, cross(b - a, c - a)) / 2;
-    if (area == 0) return;
-    section.area += area, section.sizes += std::abs(area);
-    const Vec3 sum = a + b + c;
-    section.first += area / 3 * sum;
-    // A rule for polynomials of the third degree.
-    const auto at = [&](double weight, Vec3 p) {
-      const double w = weight * area, inner = w * (dot2(p, p) - radius_ * radius_);
-      section.within += inner * p;
-      section.cubes += w * p.z * p.z * p.z;
-      add_second(w, p, section);
-    };
-    at(-27.0 / 48, sum / 3);
-    for (const Vec3 corner : {a, b, c}) at(25.0 / 48, 0.2 * sum + 0.4 * corner);
-  }
+void add_triangle(Vec3 n, Vec3 a, Vec3 b, Vec3 c, double radius, FaceSums& face) {
+  const double area = dot(n, cross(b - a, c - a)) / 2;
+  if (area == 0) return;
+  face.area += area, face.sizes += std::abs(area);
+  const Vec3 sum = a + b + c;
+  face.first += area / 3 * sum;
+  // A rule for polynomials of the third degree.
+  const auto at = [&](double weight, Vec3 p) {
+    const double w = weight * area, inner = w * (dot2(p, p) - radius * radius);
+    face.within += inner * p;
+    face.cubes += w * p.z * p.z * p.z;
+    face.squares += w * scaled(p, p);
+    face.products += w * Vec3{p.y * p.z, p.z * p.x, p.x * p.y};
+  };
+  at(-27.0 / 48, sum / 3);
+  for (const Vec3 corner : {a, b, c}) at(25.0 / 48, 0.2 * sum + 0.4 * corner);
+}
 
-  static void add_second(double weight, Vec3 p, Section& section) {
-    section.squares += weight * scaled(p, p);
-    section.products += weight * Vec3{p.y * p.z, p.z * p.x, p.x * p.y};
-  }
+/// Whether a face lies along the surface there: its area is as uncertain as the root of where it lies.
+bool grazes(Vec3 n, Vec3 end, double radius) {
+  const double sine = dot2(n, end) / radius;
+  return !(1 - sine * sine > kGrazing);
+}
 
-  /// An arc of a face's border, counter-clockwise seen along the axis from where its normal leads, and the segment
-  /// between it and its chord. False if that may be nothing as well as a whole turn, or if the face lies along the
-  /// surface, where its area is as uncertain as the root of where it lies.
-  bool add_arc(Vec3 n, Vec3 p, Vec3 q, double border, Sum& section) {
-    for (const Vec3 end : {p, q}) {
-      const double sine = dot2(n, end) / radius_;
-      if (!(1 - sine * sine > kGrazing)) return false;
-    }
-    double angle = std::atan2(cross2(p, q), dot2(p, q));
+/// The angle of an arc from p to q of a face's border, counter-clockwise seen along the axis from where its normal
+/// leads. Nothing where it may be nothing as well as a whole turn. The face's chords are `border` long.
+std::optional<double> arc_angle(Vec3 n, Vec3 p, Vec3 q, std::span<const CylinderChord> chords, double border,
+                                double radius) {
+  const double angle = std::atan2(cross2(p, q), dot2(p, q)), turn = n.z > 0 ? 2 * kPi : -2 * kPi;
+  if (!(std::abs(angle) < kNearlyWhole)) {
     const bool upright = std::abs(n.z) < kUpright;
-    if (std::abs(angle) < kNearlyWhole) {
-      // What has a border longer than the arc's chord is not between the two.
-      if (!(border > 100 * kNearlyWhole * radius_)) {
-        if (chords_.size() != 1) return false;
-        const double side = cross2(chords_[0].from, chords_[0].to) * n.z;
-        if (std::abs(side) > 0.5 * radius_ * border * std::abs(n.z) && side > 0) angle += n.z > 0 ? 2 * kPi : -2 * kPi;
-      }
-    } else if (!upright && (n.z > 0) != (angle > 0)) {
-      angle += n.z > 0 ? 2 * kPi : -2 * kPi;
-    }
-    const double x = angle / 2, mean = p.z + (q.z - p.z) / 2, rise = q.z - p.z;
-    const double s = std::sin(x), c = std::cos(x);
-    const Arc of = arc(x, s, c);
-    ++terms_;
-    turned_ += angle;
-    sizes_ += radius_ * radius_ * std::abs(mean * angle);
-    levels_ += mean * angle;
-    squares_ += mean * mean * angle;
-    if (upright) {
-      squares_ += rise * rise * x / 6;
-      return true;
-    }
-    // From the axis to the arc's middle.
-    const Vec3 sum{p.x + q.x, p.y + q.y, 0}, way{q.y - p.y, p.x - q.x, 0};
-    Vec3 w;
-    if (dot2(sum, sum) > dot2(way, way)) w = (std::abs(angle) < kPi ? 1 : -1) / std::sqrt(dot2(sum, sum)) * sum;
-    else w = (angle > 0 ? 1 : -1) / std::sqrt(dot2(way, way)) * way;
-    const double steep = radius_ / n.z, fall = steep * dot2(n, w);
-    levels_ -= 2 * fall * of.bulge;
-    sizes_ += radius_ * radius_ * std::abs(2 * fall * of.bulge);
-    squares_ += -4 * mean * fall * of.bulge + fall * fall * of.bulge_square;
-    const double slope = steep * (n.y * w.x - n.x * w.y);
-    if (std::abs(x) < 1e-4) squares_ += rise * rise * x / 6;
-    else if (std::abs(x) < 1.5) squares_ += rise * rise / 4 * of.segment / (s * s);
-    else squares_ += slope * slope * of.segment;
-    // The segment, seen along the axis and as large as it is.
-    const double seen = radius_ * radius_ * std::abs(of.segment), area = seen / std::abs(n.z);
-    const double beyond = radius_ * radius_ * radius_ * std::abs(of.across) / std::abs(n.z);
-    section.area += area, section.sizes += area;
-    const Vec3 middle{(p.x + q.x) / 2, (p.y + q.y) / 2, mean};
-    const Vec3 out{w.x, w.y, -dot2(n, w) / n.z};
-    section.first += area * middle + beyond * out;
-    add_segment(middle, radius_ * out, {-radius_ * w.y, radius_ * w.x, -slope}, of, std::abs(x), std::abs(s), c,
-                radius_ * radius_ / std::abs(n.z), section);
-    return true;
+    return !upright && (n.z > 0) != (angle > 0) ? angle + turn : angle;
   }
+  // What has a border longer than the arc's chord is not between the two.
+  if (border > 100 * kNearlyWhole * radius) return angle;
+  if (chords.size() != 1) return std::nullopt;
+  const double side = cross2(chords[0].from, chords[0].to) * n.z;
+  return std::abs(side) > 0.5 * radius * border * std::abs(n.z) && side > 0 ? angle + turn : angle;
+}
 
-  /// The segment of a unit disc of which that is half the angle, as it lies in the face, `scale` times as large: about
-  /// the middle of its chord, across that towards the arc, and along it.
-  void add_segment(Vec3 middle, Vec3 across, Vec3 along, const Arc& of, double half, double s, double c, double scale,
-                   Sum& section) const {
-    const double one = scale * std::abs(of.segment), a = scale * std::abs(of.across);
-    const Segment two = segment(half, s, c);
-    const ThirdMoments three = third_moments(half, s, c, two.second_along);
-    const double aa = scale * two.second_across, bb = scale * two.second_along;
-    const double aaa = scale * three.across, abb = scale * three.across_along;
-    const auto product = [&](double p, double q, double p_across, double q_across, double p_along, double q_along) {
-      return one * p * q + a * (p * q_across + q * p_across) + aa * p_across * q_across + bb * p_along * q_along;
-    };
-    section.squares += one * scaled(middle, middle) + 2 * a * scaled(middle, across) + aa * scaled(across, across) +
-                       bb * scaled(along, along);
-    section.products += {product(middle.y, middle.z, across.y, across.z, along.y, along.z),
-                         product(middle.z, middle.x, across.z, across.x, along.z, along.x),
-                         product(middle.x, middle.y, across.x, across.y, along.x, along.y)};
-    // ρ² − r² is r² (a² + 2 a cos x + b² − sin² x).
-    const double at_middle = aa + 2 * c * a + bb - s * s * one, at_across = aaa + 2 * c * aa + abb - s * s * a;
-    section.within += radius_ * radius_ * (at_middle * middle + at_across * across);
-    const double m = middle.z, u = across.z, v = along.z;
-    section.cubes +=
-        m * m * (m * one + 3 * u * a) + 3 * m * (u * u * aa + v * v * bb) + u * (u * u * aaa + 3 * v * v * abb);
+/// The unit vector from the axis to the middle of an arc.
+Vec3 way_to_middle(Vec3 p, Vec3 q, double angle) {
+  const Vec3 sum{p.x + q.x, p.y + q.y, 0}, way{q.y - p.y, p.x - q.x, 0};
+  if (dot2(sum, sum) > dot2(way, way)) return (std::abs(angle) < kPi ? 1 : -1) / std::sqrt(dot2(sum, sum)) * sum;
+  return (angle > 0 ? 1 : -1) / std::sqrt(dot2(way, way)) * way;
+}
+
+/// The segment of a unit disc of half angle `half`, as it lies in the face, `scale` times as large: about the middle of
+/// its chord, across that towards the arc, and along it.
+void add_segment(Vec3 middle, Vec3 across, Vec3 along, const Arc& of, double half, double s, double c, double scale,
+                 double radius, FaceSums& face) {
+  const double one = scale * std::abs(of.segment), a = scale * std::abs(of.across);
+  const Segment two = segment(half, s, c);
+  const ThirdMoments three = third_moments(half, s, c, two.second_along);
+  const double aa = scale * two.second_across, bb = scale * two.second_along;
+  const double aaa = scale * three.across, abb = scale * three.across_along;
+  const auto product = [&](double p, double q, double p_across, double q_across, double p_along, double q_along) {
+    return one * p * q + a * (p * q_across + q * p_across) + aa * p_across * q_across + bb * p_along * q_along;
+  };
+  face.squares += one * scaled(middle, middle) + 2 * a * scaled(middle, across) + aa * scaled(across, across) +
+                  bb * scaled(along, along);
+  face.products += {product(middle.y, middle.z, across.y, across.z, along.y, along.z),
+                    product(middle.z, middle.x, across.z, across.x, along.z, along.x),
+                    product(middle.x, middle.y, across.x, across.y, along.x, along.y)};
+  // ρ² − r² is r² (a² + 2 a cos x + b² − sin² x).
+  const double at_middle = aa + 2 * c * a + bb - s * s * one, at_across = aaa + 2 * c * aa + abb - s * s * a;
+  face.within += radius * radius * (at_middle * middle + at_across * across);
+  const double m = middle.z, u = across.z, v = along.z;
+  face.cubes += m * m * (m * one + 3 * u * a) + 3 * m * (u * u * aa + v * v * bb) + u * (u * u * aaa + 3 * v * v * abb);
+}
+
+/// Adds an arc of a face's border, and the segment between it and its chord.
+void add_arc(Vec3 n, Vec3 p, Vec3 q, double angle, double radius, CylinderSums& sums, FaceSums& face) {
+  const double x = angle / 2, mean = p.z + (q.z - p.z) / 2, rise = q.z - p.z;
+  const double s = std::sin(x), c = std::cos(x);
+  const Arc of = arc(x, s, c);
+  ++sums.terms;
+  sums.turned += angle;
+  sums.sizes += radius * radius * std::abs(mean * angle);
+  sums.levels += mean * angle;
+  sums.squares += mean * mean * angle;
+  if (std::abs(n.z) < kUpright) {
+    sums.squares += rise * rise * x / 6;
+    return;
   }
+  const Vec3 w = way_to_middle(p, q, angle);
+  const double steep = radius / n.z, fall = steep * dot2(n, w);
+  sums.levels -= 2 * fall * of.bulge;
+  sums.sizes += radius * radius * std::abs(2 * fall * of.bulge);
+  sums.squares += -4 * mean * fall * of.bulge + fall * fall * of.bulge_square;
+  const double slope = steep * (n.y * w.x - n.x * w.y);
+  if (std::abs(x) < 1e-4) sums.squares += rise * rise * x / 6;
+  else if (std::abs(x) < 1.5) sums.squares += rise * rise / 4 * of.segment / (s * s);
+  else sums.squares += slope * slope * of.segment;
+  // The segment, seen along the axis and as large as it is.
+  const double seen = radius * radius * std::abs(of.segment), area = seen / std::abs(n.z);
+  const double beyond = radius * radius * radius * std::abs(of.across) / std::abs(n.z);
+  face.area += area, face.sizes += area;
+  const Vec3 middle{(p.x + q.x) / 2, (p.y + q.y) / 2, mean};
+  const Vec3 out{w.x, w.y, -dot2(n, w) / n.z};
+  face.first += area * middle + beyond * out;
+  add_segment(middle, radius * out, {-radius * w.y, radius * w.x, -slope}, of, std::abs(x), std::abs(s), c,
+              radius * radius / std::abs(n.z), radius, face);
+}
 
-  std::optional<CylinderPart> sum() {
-    const double r = radius_, curved = r * levels_;
-    // Once around the cylinder and back, and faces that look up and down, unless a turn is wrong.
-    if (!(std::abs(turned_) <= kOpen)) return std::nullopt;
-    if (!(std::abs(part_.curved.force.z) <= kOpen * all_area_)) return std::nullopt;
-    // Seen along the axis, faces that look up share nothing, but where two are one but for rounding.
-    if (!(upward_ <= (1 + kOpen) * kPi * r * r)) return std::nullopt;
-    part_.volume = (cones_ + r * curved) / 3;
-    if (!(part_.volume <= (1 + kOpen) * kPi * r * r * height_)) return std::nullopt;
-    part_.area += curved, part_.whole_area = all_area_ + curved;
-    const double reach = std::sqrt(far2_) + r;
-    part_.error = kUnit * (16 + terms_) * sizes_ / 3 + kPlacing * reach * (all_area_ + std::abs(curved));
-    const Vec3 of_curved{r * part_.curved.force.x, r * part_.curved.force.y, r * squares_ / 2};
-    part_.first = 0.25 * (height_moments_ + r * of_curved);
-    const double v = part_.volume, both = radial_ / 4 + r * r * v / 2, rest = (r * r * v - both) / 2;
-    part_.squares = {lengthwise_.x / 2 + rest, lengthwise_.y / 2 + rest, lengthwise_.z / 3};
-    part_.products = 0.5 * across_;
-    // About the origin again.
-    const Vec3 up{0, 0, level_};
-    const auto lift = [&](double size, Vec3& first, Vec3& squares, Vec3& products) {
-      squares.z += level_ * (2 * first.z + level_ * size);
-      products += level_ * Vec3{first.y, first.x, 0};
-      first += size * up;
-    };
-    lift(part_.volume, part_.first, part_.squares, part_.products);
-    for (Section& section : sections_) lift(section.area, section.first, section.squares, section.products);
-    part_.sections = sections_;
-    for (Pull* pull : {&part_.curved, &part_.flat}) pull->moment += cross(up, pull->force);
-    return part_;
+/// The part of a face inside that chords bound, and arcs between them; nothing where an arc leaves that open.
+std::optional<FaceSums> add_polygon(Vec3 n, std::span<const CylinderChord> chords, double radius, CylinderSums& sums) {
+  FaceSums face;
+  const Vec3 apex = chords[0].from;
+  double border = 0;
+  for (const CylinderChord& chord : chords) border += std::sqrt(dot2(chord.to - chord.from, chord.to - chord.from));
+  for (size_t k = 0; k < chords.size(); ++k) {
+    const CylinderChord &chord = chords[k], &next = chords[k + 1 < chords.size() ? k + 1 : 0];
+    add_triangle(n, apex, chord.from, chord.to, radius, face);
+    if (!chord.to_surface && !next.from_surface) continue;
+    if (grazes(n, chord.to, radius) || grazes(n, next.from, radius)) return std::nullopt;
+    const auto angle = arc_angle(n, chord.to, next.from, chords, border, radius);
+    if (!angle) return std::nullopt;
+    add_arc(n, chord.to, next.from, *angle, radius, sums, face);
+    add_triangle(n, apex, chord.to, next.from, radius, face);
   }
+  return face;
+}
 
-  const Rings* polyhedron_ = nullptr;
-  double radius_ = 0, level_ = 0, height_ = 0;
-  std::vector<Vec3> corners_;  ///< about the point of the axis that is as high as the polyhedron's middle
-  std::vector<char> inside_;
-  std::vector<Chord> chords_;
-  CylinderPart part_;
-  int terms_ = 0;
-  double cones_ = 0, sizes_ = 0, all_area_ = 0;
-  double upward_ = 0;                ///< m²: of faces that look up, as seen along the axis
-  double far2_ = 0;                  ///< m²: of how far corners of edges that are cut are from the origin
-  double turned_ = 0;                ///< rad
-  double levels_ = 0, squares_ = 0;  ///< ∫ z dθ and ∫ z² dθ along the arcs
-  Vec3 height_moments_;              ///< Σ h ∫ x dA
-  std::vector<Section> sections_;
-  double radial_ = 0;         ///< Σ ∫ (ρ² − r²) (n_x x + n_y y) dA
-  Vec3 lengthwise_, across_;  ///< Σ of n_x and n_y times that ∫ of x and y, n_z ∫ z³ dA; of those of two coordinates
+/// Adds what of a face is inside, to `section`, too. False where that is open.
+bool add_face(const AboutAxis& at, size_t f, std::vector<CylinderChord>& chords, CylinderSums& sums, Section& section) {
+  const Vec3 n = at.polyhedron->planes()[f].normal;
+  const double offset = at.polyhedron->planes()[f].offset - n.z * at.level;
+  // Of the cylinder between the heights, nothing reaches a plane that is farther away.
+  const double reach = at.radius * std::sqrt(dot2(n, n)) + std::abs(n.z) * at.height / 2;
+  if (offset > reach + kBeyond * (reach + at.radius + std::abs(at.level))) return true;
+  const auto ring = at.polyhedron->ring(f);
+  find_chords(at, ring, chords, sums);
+  if (chords.empty() && !around(at, ring, n)) return true;
+  const auto face =
+      chords.empty() ? std::optional(add_ellipse(n, offset, at.radius, sums)) : add_polygon(n, chords, at.radius, sums);
+  if (!face) return false;
+  sums.add_face(n, offset, *face, !at.polyhedron->face(f));
+  section = *face;
+  return true;
+}
+
+/// Whether the sums are those of a closed surface: it goes once around the cylinder and back, and faces look up as much
+/// as down, unless a turn is wrong. Seen along the axis, faces that look up share nothing, but where two are one but
+/// for rounding.
+bool closes(const CylinderSums& sums, double radius) {
+  return std::abs(sums.turned) <= kOpen && std::abs(sums.part.curved.force.z) <= kOpen * sums.all_area &&
+         sums.upward <= (1 + kOpen) * kPi * radius * radius;
+}
+
+/// About a point that is `level` lower.
+void lift(double level, double size, Vec3& first, Vec3& squares, Vec3& products) {
+  squares.z += level * (2 * first.z + level * size);
+  products += level * Vec3{first.y, first.x, 0};
+  first += size * Vec3{0, 0, level};
+}
+
+/// Adds the curved part. False if the volume is larger than that of the cylinder between the heights.
+bool finish(const AboutAxis& at, CylinderSums& sums) {
+  const double r = at.radius, curved = r * sums.levels;
+  CylinderPart& part = sums.part;
+  part.volume = (sums.cones + r * curved) / 3;
+  if (!(part.volume <= (1 + kOpen) * kPi * r * r * at.height)) return false;
+  part.area += curved, part.whole_area = sums.all_area + curved;
+  const double reach = std::sqrt(sums.far2) + r;
+  part.error = kUnit * (16 + sums.terms) * sums.sizes / 3 + kPlacing * reach * (sums.all_area + std::abs(curved));
+  const Vec3 of_curved{r * part.curved.force.x, r * part.curved.force.y, r * sums.squares / 2};
+  part.first = 0.25 * (sums.height_moments + r * of_curved);
+  const double v = part.volume, both = sums.radial / 4 + r * r * v / 2, rest = (r * r * v - both) / 2;
+  part.squares = {sums.lengthwise.x / 2 + rest, sums.lengthwise.y / 2 + rest, sums.lengthwise.z / 3};
+  part.products = 0.5 * sums.across;
+  // About the origin again.
+  lift(at.level, part.volume, part.first, part.squares, part.products);
+  for (Pull* pull : {&part.curved, &part.flat}) pull->moment += cross(Vec3{0, 0, at.level}, pull->force);
+  return true;
+}
+
+struct CylinderScratch {
+  AboutAxis about;
+  std::vector<CylinderChord> chords;
+  std::vector<Section> sections;
 };
 
 }  // namespace
@@ -384,8 +400,17 @@ class Measuring {
 // of how far their numbers reach: by that, times the area, is the volume between the surface as computed and as it
 // should be.
 std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius) {
-  const Scratch<Measuring> measuring;
-  return measuring->measure(polyhedron, radius);
+  const Scratch<CylinderScratch> scratch;
+  auto& [at, chords, sections] = *scratch;
+  at.become(polyhedron, radius);
+  sections.assign(polyhedron.planes().size(), {});
+  CylinderSums sums;
+  for (size_t f = 0; f < sections.size(); ++f)
+    if (!add_face(at, f, chords, sums, sections[f])) return std::nullopt;
+  if (!closes(sums, radius) || !finish(at, sums)) return std::nullopt;
+  for (Section& section : sections) lift(at.level, section.area, section.first, section.squares, section.products);
+  sums.part.sections = sections;
+  return sums.part;
 }
 
 }  // namespace overlapper::quadric

@@ -13,6 +13,7 @@ namespace overlapper::quadric {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kUnit = 0x1p-53;  ///< of rounding
 constexpr double kOneWay = 1e-7;   ///< of how far ends are: so near each other, doubles do not say which way they are
 constexpr double kNear = 1e-9;     ///< of squares: so near the sphere, doubles do not say which side a corner is on
@@ -175,201 +176,304 @@ Moments ShallowBall::moments() const {
 namespace {
 
 /// The part of an edge inside the ball.
-struct Chord {
+struct ShallowChord {
   int left, right;
-  WideVector from, to;          ///< from the ball's centre
+  WideVector from, to;          ///< from the apex
   WideVector along;             ///< unit
   bool from_sphere, to_sphere;  ///< whether that is where it enters or leaves, and not a corner
 };
 
+/// The same in the axes of the apex.
+struct SeenChord {
+  Vec3 from, to, along;
+};
+
 /// An end of a chord on the sphere, as the arcs of a face see it.
-struct End {
+struct ArcEnd {
   Vec3 at;
   int chord;
 };
+
+/// The face whose plane is the highest over the ball's centre, and how high that is.
+struct HighestFace {
+  int face = 0;
+  double over = -kInfinity;
+};
+
+/// Nothing if a plane leaves nothing of the ball, or if all planes hold its centre.
+std::optional<HighestFace> highest_face(const Polyhedron& polyhedron, Vec3 centre, double radius) {
+  HighestFace highest;
+  for (int f = 0; f < static_cast<int>(polyhedron.planes.size()); ++f) {
+    const double over = signed_distance(polyhedron.planes[f], centre);
+    if (over >= radius) return std::nullopt;
+    if (over > highest.over) highest = {f, over};
+  }
+  return highest.over > 0 ? std::optional(highest) : std::nullopt;
+}
+
+/// The polyhedron's point that is nearest to the centre, as doubles see it: any near it would do.
+struct NearestPoint {
+  bool above = true;  ///< it is in the highest face
+  int edge = -1;      ///< else it is on that edge
+  int corner = -1;    ///< of which it is that end, if it is one
+  double least2 = kInfinity;
+};
+
+/// Nothing if an edge has no length. Edges that may reach the ball are left in `reached`.
+std::optional<NearestPoint> nearest_point(const Polyhedron& polyhedron, Vec3 centre, double radius, int highest,
+                                          std::vector<int>& reached) {
+  NearestPoint nearest;
+  const double reach2 = radius * radius * (1 + kNear);
+  const Vec3 n = polyhedron.planes[highest].normal;
+  reached.clear();
+  for (int e = 0; e < static_cast<int>(polyhedron.edges.size()); ++e) {
+    const Edge& edge = polyhedron.edges[e];
+    const Vec3 from = polyhedron.corners[edge.from] - centre;
+    const Vec3 between = polyhedron.corners[edge.to] - centre - from;
+    const double length2 = norm2(between), at = std::clamp(-dot(from, between) / length2, 0.0, 1.0);
+    if (!(length2 > 0)) return std::nullopt;
+    const double distance2 = norm2(from + at * between);
+    if (distance2 <= reach2) reached.push_back(e);
+    if (distance2 < nearest.least2)
+      nearest.least2 = distance2, nearest.edge = e, nearest.corner = at == 0 ? edge.from : at == 1 ? edge.to : -1;
+    if (edge.left == highest && dot(cross(between, n), from) < 0) nearest.above = false;
+    if (edge.right == highest && dot(cross(between, n), from) > 0) nearest.above = false;
+  }
+  return nearest;
+}
+
+/// A polyhedron about the centre of a ball, in double-doubles.
+struct WidePolyhedron {
+  const Polyhedron& polyhedron;
+  const std::function<std::optional<WidePlane>(int)>& plane;
+  const WideVector& centre;
+  Vec3 c;  ///< the centre in doubles
+  double radius;
+
+  WideVector corner(int i) const { return wide(polyhedron.corners[i]) - centre; }
+  WideVector along(const Edge& edge) const {
+    return unit(wide_difference(polyhedron.corners[edge.to], polyhedron.corners[edge.from]));
+  }
+  bool inside(int i) const {
+    const double r2 = radius * radius, distance2 = norm2(polyhedron.corners[i] - c);
+    if (std::abs(distance2 - r2) <= kNear * r2) return norm(corner(i)) < DoubleDouble{radius};
+    return distance2 < r2;
+  }
+};
+
+/// The point of a line that is nearest to the origin.
+WideVector foot_on(const WideVector& from, const WideVector& along) { return from - dot(from, along) * along; }
+
+/// The apex, from the centre of the ball. Nothing where corners miss the plane of the highest face.
+std::optional<WideVector> apex_of(const WidePolyhedron& at, const NearestPoint& nearest, int highest) {
+  if (nearest.above) {
+    const auto top = at.plane(highest);
+    return top ? std::optional(-signed_distance(*top, at.centre) * top->normal) : std::nullopt;
+  }
+  if (nearest.corner >= 0) return at.corner(nearest.corner);
+  const Edge& edge = at.polyhedron.edges[nearest.edge];
+  return foot_on(at.corner(edge.from), at.along(edge));
+}
+
+/// The part of an edge inside the ball, about the apex; nothing if there is none.
+std::optional<ShallowChord> chord_of(const Edge& edge, bool from_inside, bool to_inside, const WidePolyhedron& at,
+                                     const WideVector& apex) {
+  ShallowChord chord{edge.left,    edge.right, at.corner(edge.from), at.corner(edge.to), at.along(edge),
+                     !from_inside, !to_inside};
+  if (chord.from_sphere || chord.to_sphere) {
+    const WideVector foot = foot_on(chord.from, chord.along);
+    const DoubleDouble wide_radius{at.radius}, off = norm(foot);
+    const DoubleDouble half2 = (wide_radius - off) * (wide_radius + off);
+    const auto crosses = [&] {
+      return half2.head > 0 && dot(chord.from, chord.along).head < 0 && dot(chord.to, chord.along).head > 0;
+    };
+    if (chord.from_sphere && chord.to_sphere && !crosses()) return std::nullopt;
+    const WideVector half = sqrt(half2) * chord.along;
+    if (chord.from_sphere) chord.from = foot - half;
+    if (chord.to_sphere) chord.to = foot + half;
+  }
+  chord.from = chord.from - apex, chord.to = chord.to - apex;
+  return chord;
+}
+
+/// Which corners are inside is decided once for all their edges.
+void find_chords(const WidePolyhedron& at, std::span<const int> reached, const WideVector& apex,
+                 std::vector<ShallowChord>& chords) {
+  thread_local std::vector<signed char> known;
+  known.assign(at.polyhedron.corners.size(), -1);
+  const auto inside = [&](int i) {
+    if (known[i] < 0) known[i] = at.inside(i);
+    return known[i] == 1;
+  };
+  chords.clear();
+  for (const int e : reached) {
+    const Edge& edge = at.polyhedron.edges[e];
+    const bool from_inside = inside(edge.from), to_inside = inside(edge.to);
+    if (const auto chord = chord_of(edge, from_inside, to_inside, at, apex)) chords.push_back(*chord);
+  }
+}
+
+/// Axes at the apex, the first towards the farthest end of a chord: slender parts have the digits of their widths.
+struct ApexAxes {
+  WideVector ahead, aside, up;
+
+  Vec3 seen(const WideVector& v) const { return {rounded(dot(v, ahead)), rounded(dot(v, aside)), rounded(dot(v, up))}; }
+};
+
+std::optional<ApexAxes> axes_at(const WideVector& up, std::span<const ShallowChord> chords) {
+  Vec3 farthest_at;
+  double farthest2 = 0;
+  for (const ShallowChord& chord : chords)
+    for (const WideVector* end : {&chord.from, &chord.to}) {
+      const Vec3 at = rounded(*end);
+      if (const double far2 = norm2(at); far2 > farthest2) farthest2 = far2, farthest_at = at;
+    }
+  if (!(farthest2 > 0)) return std::nullopt;
+  const WideVector across = wide(farthest_at) - dot(wide(farthest_at), up) * up;
+  if (!(norm2(rounded(across)) > 0)) return std::nullopt;
+  const WideVector ahead = unit(across);
+  return ApexAxes{ahead, cross(up, ahead), up};
+}
+
+/// The border of a face: the chords of its edges, and arcs between the ends where they leave and enter the sphere.
+struct FaceBorder {
+  int face;
+  Vec3 n;
+  std::span<const ShallowChord> chords;
+  std::span<const SeenChord> seen;
+  std::vector<ArcEnd>&leaves, &enters;
+
+  void add_chords(ShallowBall& ball) {
+    leaves.clear(), enters.clear();
+    for (int k = 0; k < static_cast<int>(chords.size()); ++k) {
+      const auto& [from, to, along] = seen[k];
+      if (chords[k].left == face) add_chord(ball, k, from, to, chords[k].from_sphere, chords[k].to_sphere);
+      if (chords[k].right == face) add_chord(ball, k, to, from, chords[k].to_sphere, chords[k].from_sphere);
+    }
+  }
+
+  /// The next of the ends where edges enter, counter-clockwise.
+  const ArcEnd& next(const ArcEnd& leave, Vec3 middle) const {
+    const ArcEnd* next = &enters[0];
+    double first = kInfinity;
+    for (const ArcEnd& enter : enters) {
+      if (enters.size() == 1) break;
+      const Vec3 u = leave.at - middle, v = enter.at - middle;
+      double turn = std::atan2(dot(n, cross(u, v)), dot(u, v));
+      if (turn < 0) turn += 2 * kPi;
+      if (turn < first) first = turn, next = &enter;
+    }
+    return *next;
+  }
+
+  /// The unit vector from the begin of an arc to its end; nothing where doubles do not say which way round it goes.
+  std::optional<Vec3> back(const ArcEnd& leave, const ArcEnd& enter) const {
+    if (enter.chord == leave.chord) {
+      const Vec3 along = seen[leave.chord].along;
+      return chords[leave.chord].left == face ? -along : along;
+    }
+    const Vec3 between = enter.at - leave.at;
+    const double length = std::sqrt(norm2(between));
+    if (!(length > kOneWay * (norm(leave.at) + norm(enter.at)))) return std::nullopt;
+    return between / length;
+  }
+
+  /// False where doubles leave open which way round an arc goes.
+  bool add_arcs(ShallowBall& ball) const {
+    if (leaves.size() != enters.size()) return false;
+    for (const ArcEnd& leave : leaves) {
+      const ArcEnd& enter = next(leave, ball.disc());
+      const auto way = back(leave, enter);
+      if (!way) return false;
+      ball.add_arc(leave.at, enter.at, *way);
+    }
+    return true;
+  }
+
+ private:
+  void add_chord(ShallowBall& ball, int k, Vec3 from, Vec3 to, bool from_sphere, bool to_sphere) {
+    ball.add_chord(from, to);
+    if (to_sphere) leaves.push_back({to, k});
+    if (from_sphere) enters.push_back({from, k});
+  }
+};
+
+/// A face that no edge parts is whole, or nothing: it is nothing if the middle of its disc is above the apex.
+bool is_whole(const Plane& face, Vec3 centre, double radius, Vec3 up, double apex_distance) {
+  const double height = -signed_distance(face, centre);
+  return height < radius && height * dot(face.normal, up) >= (1 - kNear) * apex_distance;
+}
+
+/// Adds a face that edges part. False where that leaves a decision open.
+bool add_face(int f, const WidePolyhedron& at, const WideVector& apex, const ApexAxes& axes,
+              std::span<const ShallowChord> chords, std::span<const SeenChord> seen, ShallowBall& ball,
+              ShallowPart& part) {
+  thread_local std::vector<ArcEnd> leaves, enters;
+  const auto of_face = at.plane(f);
+  if (!of_face) return false;
+  const DoubleDouble wide_radius{at.radius}, of_centre = -signed_distance(*of_face, at.centre);
+  const DoubleDouble square = (wide_radius - of_centre) * (wide_radius + of_centre);
+  if (!(square.head > 0)) return false;
+  const Vec3 n = axes.seen(of_face->normal);
+  ball.begin_face(n, rounded(of_centre - dot(of_face->normal, apex)), std::sqrt(square.head));
+  FaceBorder border{f, n, chords, seen, leaves, enters};
+  border.add_chords(ball);
+  if (!border.add_arcs(ball)) return false;
+  const double area = ball.end_face();
+  ++part.faces;
+  part.area += area;
+  part.flat += area * rounded(of_face->normal);
+  return true;
+}
+
+/// All faces and the curved part, seen from the apex at `distance` from the centre.
+std::optional<ShallowPart> measure_from(const WideVector& apex, const WidePolyhedron& at,
+                                        std::span<const int> reached) {
+  thread_local std::vector<ShallowChord> chords;
+  thread_local std::vector<SeenChord> seen;
+  const DoubleDouble from_centre = norm(apex);
+  const double depth = rounded(DoubleDouble{at.radius} - from_centre);
+  if (!(depth > 0)) return std::nullopt;
+  find_chords(at, reached, apex, chords);
+  const auto axes = axes_at(apex / from_centre, chords);
+  if (!axes) return std::nullopt;
+  seen.clear();
+  for (const ShallowChord& chord : chords)
+    seen.push_back({axes->seen(chord.from), axes->seen(chord.to), axes->seen(chord.along)});
+  const Vec3 up = rounded(axes->up);
+  ShallowBall ball(at.radius, depth);
+  ShallowPart part;
+  part.apex = rounded(apex);
+  for (int f = 0; f < static_cast<int>(at.polyhedron.planes.size()); ++f) {
+    const auto parts = [&](const ShallowChord& chord) { return chord.left == f || chord.right == f; };
+    if (std::ranges::any_of(chords, parts)) {
+      if (!add_face(f, at, apex, *axes, chords, seen, ball, part)) return std::nullopt;
+    } else if (is_whole(at.polyhedron.planes[f], at.c, at.radius, up, rounded(from_centre))) {
+      return std::nullopt;
+    }
+  }
+  part.area += ball.curved_area();
+  part.volume = ball.volume(), part.error = ball.error();
+  part.about_apex = ball.moments().along({rounded(axes->ahead), rounded(axes->aside), up});
+  part.first = part.about_apex.first + part.volume * part.apex;
+  return part;
+}
 
 }  // namespace
 
 std::optional<ShallowPart> measure_shallow_ball(const Polyhedron& polyhedron,
                                                 const std::function<std::optional<WidePlane>(int)>& plane,
                                                 const WideVector& centre, double radius) {
-  const Vec3 c = rounded(centre);
-  const double r2 = radius * radius;
-  int highest = 0;
-  double most = -std::numeric_limits<double>::infinity();
-  for (int f = 0; f < static_cast<int>(polyhedron.planes.size()); ++f) {
-    const double over = signed_distance(polyhedron.planes[f], c);
-    if (over >= radius) return std::nullopt;
-    if (over > most) most = over, highest = f;
-  }
-  if (!(most > 0)) return std::nullopt;
-
-  // The polyhedron's point that is nearest to the centre, as doubles see it: any near it would do.
   thread_local std::vector<int> reached;
-  reached.clear();
-  bool above = true;  // the face that is highest
-  int nearest = -1, nearest_end = -1;
-  double least = std::numeric_limits<double>::infinity();
-  const double reach2 = r2 * (1 + kNear);
-  for (int e = 0; e < static_cast<int>(polyhedron.edges.size()); ++e) {
-    const Edge& edge = polyhedron.edges[e];
-    const Vec3 from = polyhedron.corners[edge.from] - c, between = polyhedron.corners[edge.to] - c - from;
-    const double length2 = norm2(between), at = std::clamp(-dot(from, between) / length2, 0.0, 1.0);
-    if (!(length2 > 0)) return std::nullopt;
-    const double distance2 = norm2(from + at * between);
-    if (distance2 <= reach2) reached.push_back(e);
-    if (distance2 < least) least = distance2, nearest = e, nearest_end = at == 0 ? edge.from : at == 1 ? edge.to : -1;
-    const Vec3 n = polyhedron.planes[highest].normal;
-    if (edge.left == highest && dot(cross(between, n), from) < 0) above = false;
-    if (edge.right == highest && dot(cross(between, n), from) > 0) above = false;
-  }
-  if (reached.empty()) return std::nullopt;
-  const double distance = above ? most : std::sqrt(least);
+  const WidePolyhedron at{polyhedron, plane, centre, rounded(centre), radius};
+  const auto highest = highest_face(polyhedron, at.c, radius);
+  if (!highest) return std::nullopt;
+  const auto nearest = nearest_point(polyhedron, at.c, radius, highest->face, reached);
+  if (!nearest || reached.empty()) return std::nullopt;
+  const double distance = nearest->above ? highest->over : std::sqrt(nearest->least2);
   if (!(distance < radius && distance >= (1 - kShallow) * radius)) return std::nullopt;
-
-  const auto corner = [&](int i) { return wide(polyhedron.corners[i]) - centre; };
-  const auto foot_on = [&](const Edge& edge, WideVector& along, WideVector& from) {
-    along = unit(wide_difference(polyhedron.corners[edge.to], polyhedron.corners[edge.from]));
-    from = corner(edge.from);
-    return from - dot(from, along) * along;
-  };
-  WideVector apex, along, from;
-  if (above) {
-    const auto top = plane(highest);
-    if (!top) return std::nullopt;
-    apex = -signed_distance(*top, centre) * top->normal;
-  } else {
-    apex = nearest_end >= 0 ? corner(nearest_end) : foot_on(polyhedron.edges[nearest], along, from);
-  }
-  const DoubleDouble from_centre = norm(apex), wide_radius{radius};
-  const double depth = rounded(wide_radius - from_centre);
-  if (!(depth > 0)) return std::nullopt;
-  const WideVector up = apex / from_centre;
-
-  // Which corners are inside is decided once for all their edges.
-  thread_local std::vector<signed char> inside;
-  inside.assign(polyhedron.corners.size(), -1);
-  const auto is_inside = [&](int i) {
-    if (inside[i] >= 0) return inside[i] == 1;
-    const double distance2 = norm2(polyhedron.corners[i] - c);
-    bool in = distance2 < r2;
-    if (std::abs(distance2 - r2) <= kNear * r2) in = norm(corner(i)) < wide_radius;
-    inside[i] = in;
-    return in;
-  };
-  thread_local std::vector<Chord> chords;
-  chords.clear();
-  Vec3 farthest_at;
-  double farthest2 = 0;
-  for (const int e : reached) {
-    const Edge& edge = polyhedron.edges[e];
-    Chord chord{edge.left, edge.right, {}, {}, {}, !is_inside(edge.from), !is_inside(edge.to)};
-    const WideVector foot = foot_on(edge, chord.along, chord.from);
-    chord.to = corner(edge.to);
-    if (chord.from_sphere || chord.to_sphere) {
-      const DoubleDouble off = norm(foot), half2 = (wide_radius - off) * (wide_radius + off);
-      if (chord.from_sphere && chord.to_sphere) {
-        const bool crosses =
-            half2.head > 0 && dot(chord.from, chord.along).head < 0 && dot(chord.to, chord.along).head > 0;
-        if (!crosses) continue;
-      }
-      const WideVector half = sqrt(half2) * chord.along;
-      if (chord.from_sphere) chord.from = foot - half;
-      if (chord.to_sphere) chord.to = foot + half;
-    }
-    for (WideVector* end : {&chord.from, &chord.to}) {
-      *end = *end - apex;
-      const Vec3 at = rounded(*end);
-      if (const double far2 = norm2(at); far2 > farthest2) farthest2 = far2, farthest_at = at;
-    }
-    chords.push_back(chord);
-  }
-  if (chords.empty() || !(farthest2 > 0)) return std::nullopt;
-
-  // Axes, the first towards the farthest end: slender parts have the digits of their widths.
-  const WideVector across = wide(farthest_at) - dot(wide(farthest_at), up) * up;
-  if (!(norm2(rounded(across)) > 0)) return std::nullopt;
-  const WideVector ahead = unit(across), aside = cross(up, ahead);
-  const auto seen = [&](const WideVector& v) {
-    return Vec3{rounded(dot(v, ahead)), rounded(dot(v, aside)), rounded(dot(v, up))};
-  };
-  thread_local std::vector<std::array<Vec3, 3>> seen_chords;
-  seen_chords.clear();
-  for (const Chord& chord : chords) seen_chords.push_back({seen(chord.from), seen(chord.to), seen(chord.along)});
-
-  ShallowBall ball(radius, depth);
-  ShallowPart part;
-  part.apex = rounded(apex);
-  const double apex_distance = rounded(from_centre);
-  const Vec3 plain_up = rounded(up);
-  thread_local std::vector<End> leaves, enters;
-  for (int f = 0; f < static_cast<int>(polyhedron.planes.size()); ++f) {
-    leaves.clear(), enters.clear();
-    const auto begins = [&](const Chord& chord) { return chord.left == f || chord.right == f; };
-    if (std::ranges::none_of(chords, begins)) {
-      // A face that no edge parts is whole, or nothing: it is nothing if the middle of its disc is above the apex.
-      const Plane& whole = polyhedron.planes[f];
-      const double height = -signed_distance(whole, c);
-      if (height < radius && height * dot(whole.normal, plain_up) >= (1 - kNear) * apex_distance) return std::nullopt;
-      continue;
-    }
-    const auto of_face = plane(f);
-    if (!of_face) return std::nullopt;
-    const DoubleDouble of_centre = -signed_distance(*of_face, centre);
-    const DoubleDouble square = (wide_radius - of_centre) * (wide_radius + of_centre);
-    if (!(square.head > 0)) return std::nullopt;
-    const double disc_radius = std::sqrt(square.head);
-    const Vec3 n = seen(of_face->normal);
-    ball.begin_face(n, rounded(of_centre - dot(of_face->normal, apex)), disc_radius);
-    for (int k = 0; k < static_cast<int>(chords.size()); ++k) {
-      const auto& [chord_from, chord_to, chord_along] = seen_chords[k];
-      if (chords[k].left == f) {
-        ball.add_chord(chord_from, chord_to);
-        if (chords[k].to_sphere) leaves.push_back({chord_to, k});
-        if (chords[k].from_sphere) enters.push_back({chord_from, k});
-      }
-      if (chords[k].right == f) {
-        ball.add_chord(chord_to, chord_from);
-        if (chords[k].from_sphere) leaves.push_back({chord_from, k});
-        if (chords[k].to_sphere) enters.push_back({chord_to, k});
-      }
-    }
-    if (leaves.size() != enters.size()) return std::nullopt;
-    for (const End& leave : leaves) {
-      // The next of the ends where edges enter, counter-clockwise.
-      const End* next = &enters[0];
-      if (enters.size() > 1) {
-        const Vec3 middle = ball.disc();
-        double first = std::numeric_limits<double>::infinity();
-        for (const End& enter : enters) {
-          const Vec3 u = leave.at - middle, v = enter.at - middle;
-          double turn = std::atan2(dot(n, cross(u, v)), dot(u, v));
-          if (turn < 0) turn += 2 * kPi;
-          if (turn < first) first = turn, next = &enter;
-        }
-      }
-      const Vec3 between = next->at - leave.at;
-      const double length = std::sqrt(norm2(between));
-      Vec3 back;
-      if (next->chord == leave.chord) {
-        const bool is_left = chords[leave.chord].left == f;
-        back = is_left ? -seen_chords[leave.chord][2] : seen_chords[leave.chord][2];
-      } else {
-        if (!(length > kOneWay * (norm(leave.at) + norm(next->at)))) return std::nullopt;
-        back = between / length;
-      }
-      ball.add_arc(leave.at, next->at, back);
-    }
-    const double area = ball.end_face();
-    ++part.faces;
-    part.area += area;
-    part.flat += area * rounded(of_face->normal);
-  }
-  part.area += ball.curved_area();
-  part.volume = ball.volume(), part.error = ball.error();
-  part.about_apex = ball.moments().along({rounded(ahead), rounded(aside), plain_up});
-  part.first = part.about_apex.first + part.volume * part.apex;
-  return part;
+  const auto apex = apex_of(at, *nearest, highest->face);
+  return apex ? measure_from(*apex, at, reached) : std::nullopt;
 }
 
 }  // namespace overlapper::quadric
