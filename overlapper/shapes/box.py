@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from fractions import Fraction
 from functools import cached_property
 from itertools import product as combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from overlapper._core import Box
 from overlapper.rational import Exact, exact
+from overlapper.shapes.choices import Flat
 from overlapper.shapes.drawing import Facets, Tessellation, polyhedron, side_of_polyhedron
 from overlapper.shapes.facts import Block, FclModel, Floats
 from overlapper.shapes.planes import AXES, Planes
@@ -22,15 +21,10 @@ RINGS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (
 FACETS = [*np.array(RINGS)]
 
 
-class BoxFacts:
+class BoxFacts(Flat):
     name = "a box"
     bounded = True
-    isotropic = False
-    has_blocks = True
-    has_exits = True
     bullet_margin = False
-    rounding = 0.0
-    half_axes = None
 
     def __init__(self, shape: Box) -> None:
         self.shape = shape
@@ -65,16 +59,6 @@ class BoxFacts:
 
     def support(self, direction: Exact, scale: int) -> tuple[Fraction, Fraction]:
         return exact(self.shape.half_extents) @ abs(direction) / scale, Fraction(0)
-
-    def holds(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
-        room = [math.floor((half - margin) * scale) for half in exact(self.shape.half_extents)]
-        return np.asarray((abs(points) <= room).all(axis=1), bool)
-
-    def tightest(self, point: Exact) -> Exact:
-        return self.planes.tightest(point)
-
-    def exits(self, start: Exact, arms: Exact, scale: int, fine: int) -> Exact:
-        return self.planes.exits(start, arms, scale, fine)
 
     def blocks(self) -> list[Block]:
         half = exact(self.shape.half_extents)

@@ -11,20 +11,19 @@ from numpy.typing import NDArray
 from overlapper._core import Capsule
 from overlapper.rational import Exact, exact
 from overlapper.shapes.blocks import ball_block, tube_block, up
+from overlapper.shapes.choices import Round
 from overlapper.shapes.drawing import Tessellation, capped
 from overlapper.shapes.exits import in_units, out_of_ball
 from overlapper.shapes.facts import Block, FclModel, Floats
 from overlapper.shapes.sphere import outward
 
 
-class CapsuleFacts:
+class CapsuleFacts(Round):
     name = "a capsule"
-    bounded = True
     isotropic = False
     has_blocks = True
     has_exits = True
     bullet_margin = False
-    planes = None
     half_axes = None
 
     def __init__(self, shape: Capsule) -> None:
@@ -39,9 +38,6 @@ class CapsuleFacts:
 
     def tessellation(self) -> Tessellation:
         return capped(self.shape.radius, self.shape.length / 2)
-
-    def side(self, towards: Floats) -> None:
-        return None
 
     def ball(self) -> tuple[Floats, float]:
         return np.zeros(3), self.shape.radius + self.shape.length / 2

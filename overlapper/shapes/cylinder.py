@@ -11,21 +11,20 @@ from numpy.typing import NDArray
 from overlapper._core import Cylinder
 from overlapper.rational import Exact, exact
 from overlapper.shapes.blocks import tube_block
+from overlapper.shapes.choices import Round
 from overlapper.shapes.drawing import Tessellation, revolved
 from overlapper.shapes.exits import in_units, out_of_ball, share_to_plane
 from overlapper.shapes.facts import Block, FclModel, Floats
 from overlapper.shapes.sphere import outward
 
 
-class CylinderFacts:
+class CylinderFacts(Round):
     name = "a cylinder"
-    bounded = True
     isotropic = False
     has_blocks = True
     has_exits = True
     bullet_margin = False
     rounding = 0.0
-    planes = None
     half_axes = None
 
     def __init__(self, shape: Cylinder) -> None:
@@ -42,9 +41,6 @@ class CylinderFacts:
         slopes = np.deg2rad([-90, -90, 0, 0, 90, 90])
         radii, rims = self.shape.radius * np.array([0, 1, 1, 1, 1, 0]), (1, 4)
         return revolved(radii, np.repeat([-half, half], 3), slopes, rims, rims)
-
-    def side(self, towards: Floats) -> None:
-        return None
 
     def ball(self) -> tuple[Floats, float]:
         return np.zeros(3), math.hypot(self.shape.radius, self.shape.length / 2)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from overlapper._core import Ellipsoid
 from overlapper.rational import Exact, exact, integers
 from overlapper.shapes.blocks import ball_block, up
+from overlapper.shapes.choices import Round
 from overlapper.shapes.drawing import Tessellation, capped
 from overlapper.shapes.exits import out_of_ball
 from overlapper.shapes.facts import Block, Floats
@@ -21,15 +22,13 @@ from overlapper.shapes.words import times
 TINY = np.finfo(float).tiny
 
 
-class EllipsoidFacts:
+class EllipsoidFacts(Round):
     name = "an ellipsoid"
-    bounded = True
     isotropic = False
     has_blocks = True
     has_exits = True
     bullet_margin = False
     rounding = 0.0
-    planes = None
 
     def __init__(self, shape: Ellipsoid) -> None:
         self.shape = shape
@@ -49,9 +48,6 @@ class EllipsoidFacts:
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         vertices, edges, wires = (half_axes * points for points in (ball.vertices, ball.edges, ball.wires))
         return replace(ball, vertices=vertices, normals=normals, edges=edges, wires=wires)
-
-    def side(self, towards: Floats) -> None:
-        return None
 
     def ball(self) -> tuple[Floats, float]:
         return np.zeros(3), float(self.shape.half_axes.max())

@@ -7,24 +7,19 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from overlapper._core import HalfSpace
 from overlapper.rational import Exact, cross, exact
+from overlapper.shapes.choices import Flat
 from overlapper.shapes.drawing import Tessellation
 from overlapper.shapes.facts import Block, FclModel, Floats
 from overlapper.shapes.planes import Planes
 
 
-class HalfSpaceFacts:
+class HalfSpaceFacts(Flat):
     name = "a half-space"
     bounded = False
-    isotropic = False
-    has_blocks = True
-    has_exits = True
     bullet_margin = False
-    rounding = 0.0
-    half_axes = None
 
     def __init__(self, shape: HalfSpace) -> None:
         self.shape = shape
@@ -61,16 +56,6 @@ class HalfSpaceFacts:
         if any(cross(normal, direction)) or direction @ normal < 0:
             return None
         return offset * (direction @ normal) / (normal @ normal) / scale, Fraction(0)
-
-    def holds(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
-        return self.planes.hold(points, scale, margin)
-
-    def tightest(self, point: Exact) -> Exact:
-        normal: Exact = self.planes.normals[0]
-        return normal
-
-    def exits(self, start: Exact, arms: Exact, scale: int, fine: int) -> Exact:
-        return self.planes.exits(start, arms, scale, fine)
 
     def blocks(self) -> list[Block]:
         return [Block([(self.planes.normals[0], self.planes.offsets[0])], None)]

@@ -10,7 +10,6 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from overlapper._core import Hull
 from overlapper.rational import (
@@ -24,6 +23,7 @@ from overlapper.rational import (
     integers,
     is_closed,
 )
+from overlapper.shapes.choices import Flat
 from overlapper.shapes.drawing import Tessellation, polyhedron, side_of_polyhedron
 from overlapper.shapes.facts import Block, FclModel, Floats
 from overlapper.shapes.nearest import nearest_weights
@@ -33,15 +33,10 @@ from overlapper.shapes.words import times
 Row = tuple[int, ...]
 
 
-class HullFacts:
+class HullFacts(Flat):
     name = "a hull"
     bounded = True
-    isotropic = False
-    has_blocks = True
-    has_exits = True
     bullet_margin = True
-    rounding = 0.0
-    half_axes = None
 
     def __init__(self, shape: Hull) -> None:
         self.shape = shape
@@ -131,15 +126,6 @@ class HullFacts:
         shares = exact(weights[row])
         nearest: Exact = shares @ exact(corners[triangles[row]]) / shares.sum()
         return nearest
-
-    def holds(self, points: Exact, scale: int, margin: Fraction | int) -> NDArray[np.bool_]:
-        return self.planes.hold(points, scale, margin)
-
-    def tightest(self, point: Exact) -> Exact:
-        return self.planes.tightest(point)
-
-    def exits(self, start: Exact, arms: Exact, scale: int, fine: int) -> Exact:
-        return self.planes.exits(start, arms, scale, fine)
 
     def blocks(self) -> list[Block]:
         """The hull itself, if its corners are below all facets, so that it is no larger than they say."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from overlapper._core import Hull, RoundedHull
 from overlapper.rational import Exact, cross, exact, in_doubles
 from overlapper.shapes.blocks import ball_block
+from overlapper.shapes.choices import Round
 from overlapper.shapes.drawing import Tessellation
 from overlapper.shapes.facts import Block, Floats
 from overlapper.shapes.hull import HullFacts, Row
@@ -21,14 +22,12 @@ PRISM = 320
 Edge = tuple[int, int]
 
 
-class RoundedHullFacts:
+class RoundedHullFacts(Round):
     name = "a rounded hull"
-    bounded = True
     isotropic = False
     has_blocks = True
     has_exits = False
     bullet_margin = False
-    planes = None
     half_axes = None
 
     def __init__(self, shape: RoundedHull) -> None:
@@ -47,9 +46,6 @@ class RoundedHullFacts:
         core = self.core.shape
         outward = [core.vertices[ring] + self.rounding * plane[:3] for ring, plane in zip(core.facets, core.halfspaces)]
         return HullFacts(Hull(np.concatenate(outward))).tessellation()
-
-    def side(self, towards: Floats) -> None:
-        return None
 
     def ball(self) -> tuple[Floats, float]:
         centre, radius = self.core.ball()

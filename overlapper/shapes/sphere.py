@@ -11,19 +11,18 @@ from numpy.typing import NDArray
 from overlapper._core import Sphere
 from overlapper.rational import Exact, exact
 from overlapper.shapes.blocks import ball_block, up
+from overlapper.shapes.choices import Round
 from overlapper.shapes.drawing import Tessellation, capped
 from overlapper.shapes.exits import in_units, out_of_ball
 from overlapper.shapes.facts import Block, FclModel, Floats
 
 
-class SphereFacts:
+class SphereFacts(Round):
     name = "a sphere"
-    bounded = True
     isotropic = True
     has_blocks = True
     has_exits = True
     bullet_margin = False
-    planes = None
     half_axes = None
 
     def __init__(self, shape: Sphere) -> None:
@@ -38,9 +37,6 @@ class SphereFacts:
 
     def tessellation(self) -> Tessellation:
         return capped(self.shape.radius, 0.0)
-
-    def side(self, towards: Floats) -> None:
-        return None
 
     def ball(self) -> tuple[Floats, float]:
         return np.zeros(3), self.shape.radius
