@@ -37,7 +37,7 @@ FCL_TOLERANCE = 1e-6
 # The exact value is sought to this fraction of what the two sides differ by: enough to say who is nearer, and to print.
 RESOLUTION = 1e-3
 
-# What FCL says before it aborts, and else Python.
+# The message of FCL before it aborts, or of Python.
 CAUSE = r"Original error message: .*?\): (.*)|^(\w*(?:Error|Exception): .*)"
 
 
@@ -58,7 +58,7 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What FCL says of a pair, beside what we say.
+    """FCL's answer for a pair, beside ours.
 
     `fcl` is None where FCL gave nothing at all. `exact` = (lower, upper), in m, holds the exact signed distance; it is
     worked out unless the two sides agree at once. `nearer` is the winner of a disagreement, None if `exact` cannot
@@ -218,7 +218,7 @@ def _judged(overlap: Overlap, theirs: Figures | None, end: str | None) -> Compar
 
 
 def _difference(ours: Figures, theirs: Figures) -> float:
-    """What the two signed distances differ by, in m; 0 if one is missing."""
+    """The difference of the two signed distances, m; 0 if one is missing."""
     if ours.signed_distance is None or theirs.signed_distance is None:
         return 0.0
     return abs(ours.signed_distance - theirs.signed_distance)

@@ -13,7 +13,7 @@ import numpy as np
 from overlapper import Batch, Hull
 from overlapper.audit.audit import audit
 from overlapper.audit.robot import read_robot
-from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, Surface, decompose
+from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, WeldedMesh, decompose
 from overlapper.printable import first_line
 from overlapper.simulation.bullet.joints import ENDINGS
 from overlapper.simulation.bullet.model_file import NotRead
@@ -116,7 +116,7 @@ def _mesh(name: str, path: Path, units: str, least_depth: float, settings: dict[
     names = [part.name or name for part in parts]
     for number, part in enumerate(parts):
         try:
-            surface = Surface.of(part.triangles)
+            surface = WeldedMesh.of(part.triangles)
         except NotDecomposed as error:
             closed = False
             skipped.append(f"{names[number]}: {error}")

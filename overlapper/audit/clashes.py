@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from overlapper import Batch, Hull, Overlaps, Placed
 from overlapper.audit.allowed import is_allowed, must_name_some
 from overlapper.columns import measures_of
-from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, Surface, decompose
+from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, WeldedMesh, decompose
 from overlapper.polytopes.mesh_file import ASSEMBLIES, BODIES, MeshPart, read_parts
 from overlapper.polytopes.mesh_overlap import mesh_overlap, window
 from overlapper.printable import first_line
@@ -293,7 +293,7 @@ def _overlaps(hulls: Sequence[Hull]) -> Overlaps:
 def _with_surface(body: MeshBody) -> MeshBody:
     """With the triangles of its mesh, if that is closed, and as convex bodies, if it consists of these."""
     try:
-        surface = Surface.of(body.part.triangles)
+        surface = WeldedMesh.of(body.part.triangles)
     except NotDecomposed:  # no triangle has an area
         return body
     if surface.volume is None:

@@ -1,1 +1,1 @@
-"""Convex polytopes from files, from databases, from chance, and as parts of concave meshes."""
+"""Convex polytopes from mesh files, from databases, at random, and as parts of concave meshes."""

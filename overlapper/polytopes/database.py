@@ -1,4 +1,4 @@
-"""Polytopes in databases, through SQLAlchemy: SQLite files, PostgreSQL and whatever else it has a driver for.
+"""Polytopes in databases, through SQLAlchemy: SQLite files, PostgreSQL, and other databases that it has drivers for.
 
 Two tables hold them. `polytopes` has the column `id`, an integer, and any further columns that others keep there;
 `vertices` has `polytope_id`, `corner` (0, 1, 2, ...) and `x`, `y`, `z` in m, one row per corner. Facets are not kept,
@@ -37,14 +37,14 @@ VERTICES = sql.Table(
     sql.Column("corner", sql.Integer, primary_key=True, autoincrement=False),
     *(sql.Column(axis, sql.Double, nullable=False) for axis in "xyz"),
 )
-# A polytope without corners is no row of `vertices`; the outer join finds it, so that it is not lost in silence.
+# A polytope without corners has no row in `vertices`. The outer join finds it, so that it is not lost in silence.
 ALL = """
     SELECT polytopes.id, x, y, z FROM polytopes LEFT JOIN vertices ON polytope_id = polytopes.id
     ORDER BY polytopes.id, corner
 """
-# What SQLite may do for a query. VACUUM INTO, ATTACH and most pragmas write, too.
+# The actions that SQLite may do for a query. VACUUM INTO, ATTACH and most pragmas can write, too.
 READING = {sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ, sqlite3.SQLITE_FUNCTION, sqlite3.SQLITE_RECURSIVE}
-# What a session is told so that no transaction of it writes, by the package of the driver.
+# The statement that keeps a session from writing, by the package of the driver.
 POSTGRESQL = "SET SESSION CHARACTERISTICS AS TRANSACTION READ ONLY"
 READ_ONLY = dict.fromkeys(("psycopg", "psycopg2", "pg8000"), POSTGRESQL)
 READ_ONLY |= dict.fromkeys(("MySQLdb", "pymysql", "mariadb", "mysql"), "SET SESSION TRANSACTION READ ONLY")
@@ -63,10 +63,10 @@ def read_polytopes(
     writes is refused by SQLite and PostgreSQL; sessions of MySQL and MariaDB are told to refuse it, which no test has
     seen them do; any other database takes back what it wrote.
 
-    A polytope that is none (a coordinate missing, fewer than four points, all in one plane) raises ValueError with its
-    id; or `on_bad(id, reason)` is called, if given, and reading goes on. Raises FileNotFoundError if there is no such
-    SQLite file, ValueError if the query has other columns or another order, and sqlalchemy.exc.SQLAlchemyError for what
-    the database refuses.
+    An invalid polytope (a coordinate missing, fewer than four points, all in one plane) raises ValueError with its id.
+    If `on_bad` is given, `on_bad(id, reason)` is called instead, and reading goes on. Raises FileNotFoundError if there
+    is no such SQLite file, ValueError if the query has other columns or another order, and
+    sqlalchemy.exc.SQLAlchemyError if the database refuses the query.
     """
     _must_exist(sql.make_url(url))
     with ExitStack() as stack:
@@ -95,9 +95,9 @@ def read_polytopes(
 def write_polytopes(url: str, polytopes: Iterable[tuple[int, Hull | Overlap | ArrayLike]]) -> int:
     """Adds polytopes to a database, each with its id; returns how many.
 
-    Each is a Hull, an Overlap or (n, 3) points in m, of which the corners of the hull are written. The tables are made
-    if they are not there. All is one transaction: when something raises, nothing has been written. Raises ValueError
-    with the id for points that span no polytope, and sqlalchemy.exc.IntegrityError for an id that is taken.
+    Each is a Hull, an Overlap or (n, 3) points in m; the corners of the convex hull are written. Missing tables are
+    made. Everything is one transaction: if it raises, nothing has been written. Raises ValueError with the id for
+    points that span no polytope, and sqlalchemy.exc.IntegrityError for an id that is taken.
     """
     count = 0
     remaining = iter(polytopes)
@@ -121,7 +121,7 @@ def _engine(url: str) -> Iterator[sql.Engine]:
 
 
 def _read_only(connection: Any, record: Any) -> None:
-    """By the connection's own means; SQLAlchemy ends what remains by taking back all that was not committed."""
+    """Keeps a connection from writing by its own means. SQLAlchemy takes back whatever else was not committed."""
     if isinstance(connection, sqlite3.Connection):
         connection.set_authorizer(lambda action, *_: sqlite3.SQLITE_OK if action in READING else sqlite3.SQLITE_DENY)
         return
@@ -130,7 +130,7 @@ def _read_only(connection: Any, record: Any) -> None:
         cursor = connection.cursor()
         cursor.execute(words)
         cursor.close()
-        connection.commit()  # or it would be for this transaction alone
+        connection.commit()  # otherwise the statement would hold for this transaction alone
 
 
 def _must_exist(url: sql.URL) -> None:

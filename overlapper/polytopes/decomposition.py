@@ -1,8 +1,8 @@
-"""Closed triangle meshes as convex parts: as they are where convex, else by CoACD in a process of its own.
+"""Closed triangle meshes as convex parts. A convex mesh is its own part; others are cut by CoACD in a process apart.
 
 CoACD (X. Wei, M. Liu, Z. Ling, H. Su, "Approximate convex decomposition for 3D meshes with collision-aware concavity
 and tree search", SIGGRAPH 2022) takes seconds to minutes, ends the process on some meshes and never ends on others.
-What it finds is kept on disk, one file per mesh, threshold and version of CoACD.
+Its parts are kept on disk, in one file per mesh, threshold and version of CoACD.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from overlapper.union import union_volume
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
-# Part of the largest coordinate by which the corners of a mesh are off: half a unit of the sixth digit, with which text
-# formats are written, and half a unit of single precision, in which meshes are read.
+# The error of the corners of a mesh, as a share of the largest coordinate: half a unit of the sixth digit, because text
+# formats have six, and half a unit of single precision, in which meshes are read.
 ROUNDING = 5e-6 + 2.0**-24
 
 DIGEST = 32  # bytes of SHA-256
@@ -58,17 +58,17 @@ class Decomposition:
 
     @property
     def volume(self) -> float:
-        """Of the union of the parts, in m³."""
+        """The volume of the union of the parts, m³."""
         return union_volume([Placed(part) for part in self.parts])[0]
 
 
 @dataclass(frozen=True, slots=True)
-class Surface:
-    """The triangles of a mesh, each once, as `faces` (t, 3) over `vertices` (n, 3).
+class WeldedMesh:
+    """The triangles of a mesh, each once, as `faces` (t, 3) over `vertices` (n, 3); equal corners are one vertex.
 
-    `open_edges` is how many edges have an odd number of them. `volume` (m³) is what they bound, None if they are open
-    or turn both ways; where it is known, they are counter-clockwise from outside, those of a hole from within it, and
-    every edge is run along once in each direction.
+    `open_edges` counts the edges with an odd number of triangles. `volume` (m³) is the volume that the triangles bound,
+    None if they are open or turn both ways. If it is known, triangles are counter-clockwise from outside, those of a
+    hole from within it, and every edge is run along once in each direction.
     """
 
     vertices: Vertices
@@ -77,8 +77,8 @@ class Surface:
     volume: float | None
 
     @classmethod
-    def of(cls, triangles: ArrayLike) -> Surface:
-        """Of (t, 3, 3) triangles; corners that are equal to the bit are one. NotDecomposed if none has an area."""
+    def of(cls, triangles: ArrayLike) -> WeldedMesh:
+        """The mesh of (t, 3, 3) triangles; corners that are equal to the bit are one. NotDecomposed without an area."""
         corners = np.asarray(triangles, dtype=float)
         if corners.ndim != 3 or corners.shape[1:] != (3, 3):
             raise ValueError(f"triangles must have the shape (t, 3, 3), not {corners.shape}")
@@ -132,7 +132,7 @@ def decompose(
     NotDecomposed if the surface is open, or CoACD is not installed, fails, or takes longer than `time_limit` seconds.
     """
     check_threshold(threshold)
-    surface = Surface.of(triangles)
+    surface = WeldedMesh.of(triangles)
     if surface.open_edges and not enclose:
         raise NotDecomposed(
             f"the concave mesh bounds no volume: its surface is open along {surface.open_edges:,} edges"
@@ -195,7 +195,7 @@ def _convex_bodies(vertices: Vertices, faces: Faces) -> list[Hull] | None:
             hull = Hull(corners)
         except ValueError:
             return None
-        # Corners that moved by √3 roundings have taken the surface in, or that of the hull out, by as much.
+        # Corners that moved by √3 roundings have moved the surface inwards, or that of the hull outwards, by as much.
         layer = 2 * math.sqrt(3) * ROUNDING * float(np.abs(corners).max())
         missing = hull.volume - _volume(vertices, shell)
         if not missing <= layer * _area(hull.corners, hull.triangles) or _deepest(hull, corners) > layer:
@@ -213,7 +213,7 @@ def _shells(faces: Faces) -> list[Faces]:
 
 
 def _a_shell_is_inside_out(vertices: Vertices, faces: Faces) -> bool:
-    """Whether a connected part of a closed surface is clockwise from outside, and no hole within the box of another."""
+    """Whether a connected part of a closed surface is clockwise from outside, and in no other part's box as a hole."""
     shells = _shells(faces)
     if len(shells) == 1:
         return False
@@ -237,7 +237,7 @@ def _area(vertices: Vertices, faces: NDArray[np.integer]) -> float:
 
 
 def _components(groups: Faces, count: int) -> Faces:
-    """For each of `count` things the least that it is connected to; each row of `groups` connects what it names."""
+    """For each of `count` numbers, the least number that it is connected to; each row of `groups` connects numbers."""
     labels = np.arange(count)
     while True:
         least = labels.copy()
@@ -293,7 +293,7 @@ def packed(key: str, parts: list[Vertices]) -> bytes:
 
 
 def unpacked(key: str, data: bytes) -> list[Vertices] | None:
-    """The parts that `packed` wrote with this key; None if a bit is not as written."""
+    """The parts that `packed` wrote with this key; None if a bit has changed."""
     if hashlib.sha256(key.encode() + data[DIGEST:]).digest() != data[:DIGEST]:
         return None
     buffer = io.BytesIO(data[DIGEST:])
@@ -303,7 +303,7 @@ def unpacked(key: str, data: bytes) -> list[Vertices] | None:
 
 
 def _coacd(vertices: Vertices, faces: Faces, threshold: float, time_limit: float) -> list[Vertices]:
-    """CoACD's parts, from a process of its own. NotDecomposed says how that ended otherwise."""
+    """CoACD's parts, from a process of its own. NotDecomposed says how that process ended without them."""
     try:
         with Worker(_answers) as worker:
             worker.send((vertices, faces, float(threshold), math.ceil(time_limit) + 1))

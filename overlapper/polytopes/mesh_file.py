@@ -1,4 +1,4 @@
-"""Polytopes from and to mesh files, by trimesh: OBJ, STL, PLY and, to be read, whatever else it knows."""
+"""Polytopes from and to mesh files, by trimesh: OBJ, STL and PLY are written, and all that trimesh knows are read."""
 
 from __future__ import annotations
 
@@ -33,18 +33,17 @@ __all__ = ["MeshPart", "NotConvexWarning", "check_ending", "read_hull", "read_pa
 
 Array = NDArray[np.float64]
 
-# What can be written, and how: OBJ with sixteen digits after the point; STL and PLY are single precision, the one by
-# its nature, the other by trimesh's choice.
+# The formats that can be written. OBJ has sixteen digits after the point. STL and PLY are in single precision: STL by
+# its nature, PLY by the choice of trimesh.
 MESHES: dict[str, dict[str, Any]] = {".obj": {"digits": 16}, ".stl": {}, ".ply": {}}
 
-# What a file may have for its size: a little that is packed may be very much, and counts are only numbers.
+# Limits by the size of a file: a few packed bytes may unpack to very many, and counts are only numbers.
 PACKED = (".bz2", ".gz", ".tgz", ".zip")
 ZIPPED = (".3dxml", ".3mf", ".zae")  # formats that are packed files, mostly of text
 MOST_UNPACKED = 100  # bytes for each of the file; text of numbers has 3 to 20
 MOST_SHOWN = 30_000_000  # corners and indices of a glTF scene, in which a mesh may stand many times: some seconds
 
-# Formats that are read, of which the second kind has many bodies in a file, each with a name and a place; and what
-# trimesh needs for some.
+# Formats that are read. Assemblies have many bodies in a file, each with a name and a place. Some need other libraries.
 BODIES = (".obj", ".off", ".ply", ".stl")
 ASSEMBLIES = (".3mf", ".glb", ".gltf", ".step", ".stp")
 STEP = (".step", ".stp")
@@ -80,7 +79,7 @@ def read_parts(path: str | Path, units: str = "m") -> list[MeshPart]:
 
     `units`, a name that trimesh knows, are those of a file that does not say its own. STEP is read by OpenCASCADE, in a
     process of its own. Raises OSError if there is no such file, ImportError without a library that its format needs,
-    ValueError if it is no mesh.
+    ValueError if it is not a mesh.
     """
     path = Path(path)
     path.open("rb").close()
@@ -159,7 +158,7 @@ def _parts(path: Path, units: str) -> list[MeshPart]:
 
 
 def read_hull(path: str | Path) -> Hull:
-    """The convex hull of all that a mesh file shows, in the file's own frame and unit, which is taken for m.
+    """The convex hull of everything that a mesh file shows, in the file's own frame and unit, which is taken for m.
 
     Warns of a mesh with holes or dents (NotConvexWarning), as its hull is not the solid itself. Raises OSError if there
     is no such file, ValueError if it is no mesh or its points span no polytope.
@@ -185,7 +184,7 @@ def read_hull(path: str | Path) -> Hull:
 
 
 def _must_fit(path: Path) -> None:
-    """ValueError for what would take more time and memory than the size of the file tells."""
+    """ValueError for a file that would take much more time and memory than its size suggests."""
     size, ending = path.stat().st_size, path.suffix.lower()
     if ending in PACKED:
         raise ValueError("it is packed, and must be unpacked first")
@@ -267,17 +266,16 @@ def _must_show_few(shown: int) -> None:
 
 
 def check_ending(path: str | Path) -> None:
-    """Raises ValueError for a name of which `write_mesh` would not know what to write."""
+    """Raises ValueError for an ending that `write_mesh` cannot write."""
     if Path(path).suffix not in MESHES:
         raise ValueError(f"a mesh must end in {', '.join(MESHES)}, not {Path(path).name!r}")
 
 
 def write_mesh(path: str | Path, polytope: Hull | Overlap | Sequence[Hull | Overlap]) -> None:
-    """Writes a hull or what bodies share as a closed triangle mesh in m: .obj, .stl or .ply, as the name says; of
-    several, each as a closed surface of the one mesh.
+    """Writes hulls or overlaps as a triangle mesh in m, each as a closed surface. The name ends in .obj, .stl or .ply.
 
     OBJ keeps coordinates to 16 decimal places, STL and PLY in single precision, to one part in ten million.
-    Raises ValueError for another ending, and where there is nothing to write as the bodies share nothing.
+    Raises ValueError for another ending, and for bodies that share nothing.
     """
     check_ending(path)
     pieces = [each for each in (polytope if isinstance(polytope, Sequence) else [polytope]) if len(each.facets)]

@@ -1,10 +1,8 @@
 """The volume that two closed triangle meshes share, concave or not, as a sum over convex bodies.
 
-A point is inside of a closed mesh if the triangles above it, seen from outside as often as from inside for a point that
-is outside, say so: the solid is the sum of the prisms between its triangles and a plane below them, those of triangles
-that face up counted once and those of triangles that face down taken away. So the volume shared by two solids is the
-sum over pairs of prisms, with the product of their signs, of what these convex bodies share; each has an error bound of
-its own.
+A closed mesh is a signed sum of prisms between its triangles and a plane below them. The sign is plus for triangles
+that face up, and minus for those that face down. So the volume that two meshes share is a sum over pairs of prisms,
+each with the product of the two signs. Prisms are convex, so every summand has an error bound of its own.
 """
 
 from __future__ import annotations
@@ -16,15 +14,15 @@ from overlapper._core import Batch, Hull
 
 Array = NDArray[np.float64]
 
-MOST = 1_000_000  # pairs of prisms that are asked, which take half a minute
+MOST = 1_000_000  # pairs of prisms, which take half a minute
 
 
 def mesh_overlap(a: Array, b: Array, threads: int | None = None) -> tuple[float, float] | None:
     """Volume that closed meshes of triangles (t, 3, 3) and (u, 3, 3) share, and a bound of its error.
 
-    Every edge must be run along once in each direction, counter-clockwise from outside, in one unit, whose cube the
-    volume is in. Where shells of a mesh lie within each other, what they enclose counts as often. None if that would
-    take more than a million pairs of prisms.
+    Every edge must be run along once in each direction, counter-clockwise from outside. The volume is in the cube of
+    the unit of the meshes. A region inside several shells of a mesh counts as often. None if there are more than a
+    million pairs of prisms.
     """
     lower, upper = window(a, b)
     if (lower >= upper).any():
@@ -49,17 +47,17 @@ def mesh_overlap(a: Array, b: Array, threads: int | None = None) -> tuple[float,
 
 
 def window(a: Array, b: Array) -> tuple[Array, Array]:
-    """Lower and upper corner of what the boxes of two meshes share."""
+    """Lower and upper corner of the box that the boxes of two meshes share."""
     return np.maximum(a.min(axis=(0, 1)), b.min(axis=(0, 1))), np.minimum(a.max(axis=(0, 1)), b.max(axis=(0, 1)))
 
 
 def _prisms(mesh: Array, lower: Array, upper: Array, floor: float) -> tuple[list[Hull], Array, float]:
-    """The prisms above or below a box, their signs, and the volume of those that are too thin to be any."""
+    """The prisms above or below a box, their signs, and the volume of the prisms that are too thin for a hull."""
     low, high = mesh.min(axis=1), mesh.max(axis=1)
     mesh = mesh[((low < upper) & (high > lower))[:, :2].all(axis=1)]
     along, across = mesh[:, 1] - mesh[:, 0], mesh[:, 2] - mesh[:, 0]
     areas = (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]) / 2
-    # Whether a triangle that is nearly upright faces up or down is a matter of rounding, and of no volume.
+    # Rounding decides whether a nearly upright triangle faces up or down; its prism has next to no volume.
     doubt = 2.0**-49 * np.abs(mesh).max(initial=0.0) * (np.abs(along).max(axis=1) + np.abs(across).max(axis=1))
     heights = mesh[:, :, 2].max(axis=1) - floor
     hulls: list[Hull] = []

@@ -20,7 +20,7 @@ def random_polytope(n: int, source: Source = "cube", *, rng: np.random.Generator
     `source` says where they are drawn, uniformly: points in the "cube" [-1, 1]³, in the unit "ball", on the unit
     "sphere", where every one becomes a corner, or "halfspaces" that touch the unit sphere from outside, where every one
     becomes a facet. A cell that is unbounded or reaches beyond 10 is drawn again. Lengths are in m. `rng` is a numpy
-    Generator, a seed, or None for a polytope that is another one each time. Raises ValueError for n below 4.
+    Generator, a seed, or None for another polytope each time. Raises ValueError for n below 4.
     """
     if source not in get_args(Source):
         raise ValueError(f"source must be one of {', '.join(get_args(Source))}, not {source!r}")
@@ -38,7 +38,7 @@ def random_polytope(n: int, source: Source = "cube", *, rng: np.random.Generator
 
 
 def _directions(n: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """(n, 3) unit vectors, uniform on the sphere, as the normal distribution knows no direction."""
+    """(n, 3) unit vectors, uniform on the sphere, as the normal distribution has no preferred direction."""
     vectors = rng.normal(size=(n, 3))
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 

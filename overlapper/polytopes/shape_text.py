@@ -1,4 +1,4 @@
-"""Shapes as one line of text, so that a file can say what was simulated as well as where it was."""
+"""Shapes as one line of text, for files that record the shapes of a simulation as well as their poses."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _parameter_of_text(value: object) -> object:
 
 
 def _inflated(data: bytes) -> bytes:
-    """A little that is deflated may be very much."""
+    """The inflated data. ValueError beyond LARGEST, as a few deflated bytes may inflate to very many."""
     unpacker = zlib.decompressobj()
     inflated = unpacker.decompress(data, LARGEST)
     if not unpacker.eof:

@@ -1,7 +1,7 @@
 """The volume that a ball, a cylinder and a polytope share: a slice is a disc between two lines, cut by others.
 
-A line that cuts the disc takes a segment away. One of the polytope has an elementary integral, one of the strip has
-not.
+A line that cuts the disc takes a segment away. The integral of a segment is elementary for a line of the polytope, and
+not for a line of the cylinder.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from overlapper.proof.slices import (
     ZERO,
     Form,
     Line,
-    Outline,
     Parabola,
     Point,
+    SliceArea,
     Slices,
     T,
     along,
@@ -89,7 +89,7 @@ class BallAndTube(Slices):
         return u[0] * v[0] / self.tt + u[1] * v[1] / self.pp
 
     def is_outside(self, point: Point, flat: bool = False) -> bool:
-        """Certainly; a flat point stands for all that differ from it in q."""
+        """Whether the point is certainly outside. A flat point stands for all points that differ from it in q."""
         t, p, q = point
         off = p - self.level
         if t * t / self.tt + off * off / self.pp > self.thin:
@@ -139,9 +139,9 @@ class BallAndTube(Slices):
         for t in roots(self.disc):
             yield (t, arb(0), arb(0)), False
 
-    # Outlines
+    # Areas
 
-    def outline(self, t: arb) -> Outline | None:
+    def area(self, t: arb) -> SliceArea | None:
         disc = at(self.disc, t)
         if not is_positive(disc):
             return None
@@ -150,7 +150,7 @@ class BallAndTube(Slices):
         around = self.polygon(offsets)
         if not around:
             return None
-        found = Outline()
+        found = SliceArea()
         kept: list[tuple[int, int | None, int | None]] = []  # a line, and the lines that it meets in the disc
         for k, (line, end) in enumerate(around):
             before, start = around[k - 1]
@@ -166,7 +166,7 @@ class BallAndTube(Slices):
             by_disc = is_positive(-reach - here), is_positive(there - reach)
             kept.append((line, None if by_disc[0] else before, None if by_disc[1] else after))
         if not kept:
-            # A line through the centre, of which no bits tell the side, is in the disc but if others are beside it.
+            # No bits tell the side of a line through the centre. It is in the disc unless other lines cut it off.
             if any(offsets[line] < 0 for line, _ in around):
                 return None
             assert all(is_positive(offsets[line]) for line, _ in around)
@@ -196,7 +196,7 @@ class BallAndTube(Slices):
         return arb.atan2(y * root(self.qq), x * root(self.pp))
 
     def _turn(self, line: int, following: int, offsets: list[arb], disc: arb) -> arb:
-        """From the normal of a line to that of the next beyond an arc, as often around as the arc goes."""
+        """The angle from the normal of a line to that of the next beyond an arc, with all turns of the arc."""
         turn = self._direction(following) - self._direction(line) if following != line else arb(0)
         arc = turn
         for k in (line, following):
@@ -220,14 +220,14 @@ class BallAndTube(Slices):
             self._forms[key] = product(self.lines[line].offset, way)[:6]
         return self._forms[key]
 
-    def integral(self, outline: Outline, low: arb, high: arb, goal: int) -> arb:
+    def integral(self, area: SliceArea, low: arb, high: arb, goal: int) -> arb:
         moments = of_form(self.squares, low, high)
         total = arb(0)
-        for line, other, side in outline.forms:
+        for line, other, side in area.forms:
             total += side * sum((c * m for c, m in zip(self.form(line, other), moments) if c), arb(0))
         disc = self.disc[0] * moments[0] + self.disc[2] * moments[2]
-        round_part = outline.turn * disc
-        for line, count in outline.segments.items():
+        round_part = area.turn * disc
+        for line, count in area.segments.items():
             ends = low / root(self.tt), high / root(self.tt)
             segment = self._strip_segment(line, *ends, goal) if line < 4 else self._plane_segment(line, *ends)
             round_part -= count * root(self.tt) * segment
@@ -250,7 +250,7 @@ class BallAndTube(Slices):
         through_pole = offset[0] * offset[0] == offset[1] * offset[1] * self.tt * self.thick
         for side, pole in ((-1, radius), (1, -radius)):
             if through_pole and side * offset[0] * offset[1] >= 0:
-                continue  # the slack is zero, of which a ball may not see it, and with it the share of the pole
+                continue  # the slack and the share of the pole are zero, which balls may not see
             slack = d0 + d1 * pole
             slope = -2 * pole - 2 * slack * d1
             turns = [
@@ -266,7 +266,7 @@ class BallAndTube(Slices):
         away = arb(side * self.level) / root(self.pp)
         thin, thick = arb(self.thin), arb(self.thick)
         radius = root(self.thin)
-        # Where t is 0; what is less elsewhere is written without a difference, of which a ball would not see the sign.
+        # At t = 0. Elsewhere the loss is written without a difference, because a ball would not show its sign.
         rest = thick - thin - away * away - 2 * away * radius
         tube_is_thin = self.thin <= self.thick
         least = root(min(self.thin, self.thick))
@@ -289,7 +289,7 @@ class BallAndTube(Slices):
                 turn = arb.pi() + acb(0, 1) * ((other - height) / disc).log(analytic=analytic)
             found = (disc * disc * turn - height * reach) * short
             if not analytic and not found.is_finite():
-                # Near a pole of the ball no angle is known: between nothing and all of the disc.
+                # Near a pole of the ball the angle has no bounds: the area is between 0 and that of the disc.
                 return acb((arb.pi() * disc * disc * short).real.union(arb(0)))
             return found
 

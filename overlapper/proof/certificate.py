@@ -1,8 +1,8 @@
 """The certificate of an overlap: found in doubles, completed in rational arithmetic, so that its check is exact.
 
-Of the core's answer only the combinatorics are used (which facets there are, whose they are, where they meet) and
-directions of planes; offsets, corners and inner points are computed anew from the shapes. Coordinates are counted from
-a reference near the common part, which keeps the fractions short.
+The core's answer supplies only combinatorics (which facets there are, whose they are, where they meet) and directions
+of planes. Offsets, corners and inner points are computed anew from the shapes. Coordinates are counted from a reference
+near the common part, which keeps the fractions short.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from overlapper.rational import Exact, cross, exact, fans, integers, primitive, 
 
 Floats = NDArray[np.float64]
 
-# Bits of a coordinate below the thickness of the common part, and of a share below 1. Facets of hulls that differ only
-# by rounding meet in corners that the first number cannot tell apart.
+# Bits of a coordinate below the thickness of the common part, and of a share below 1. The second number is for facets
+# that differ only by rounding: the first cannot tell their corners apart.
 BITS = (64, 256)
 
 # Bits to which the volume of a pair with a round body is proved.
@@ -45,7 +45,7 @@ NARROW = 48
 
 
 def certificate(overlap: Overlap) -> Certificate:
-    """What proves the status of `overlap`, and bounds of its volume, to somebody who does not trust us.
+    """A proof of the status of `overlap`, and of bounds of its volume, for a reader who does not trust the core.
 
     `verify()` of the result checks it in rational arithmetic, without the core, and returns (lower, upper) bounds of
     the common volume in m³ as fractions. CertificateError says why there is no certificate.
@@ -110,7 +110,7 @@ def _touching(overlap: Overlap, bodies: list[RationalBody]) -> Touching:
 
 
 def _nearest(body: RationalBody, shape: Shape, point: Exact) -> Exact:
-    """A point of the body, next to a point that is next to it: on the way to the middle of the body."""
+    """A point of the body near a point just outside, on the way from there to the middle of the body."""
     if body.contains(point[None])[0]:
         return point
     if not body.facts.bounded:
@@ -131,7 +131,7 @@ def _nearest(body: RationalBody, shape: Shape, point: Exact) -> Exact:
 
 
 def _bracketed(overlap: Overlap) -> Bracketed:
-    """Bounds so narrow that with few digits they still are."""
+    """Bounds that stay narrow when they are rounded to a few digits."""
     a, b = overlap.shapes
 
     def is_narrow(bounds: Bounds) -> bool:
@@ -171,8 +171,8 @@ def _are_flat(bodies: list[RationalBody]) -> bool:
     return all(body.facts.planes for body in bodies)
 
 
-class Polyhedron(NamedTuple):
-    """Planes, polygons of corners, the number of each polygon's plane, the corners, and a point next to their mean."""
+class Star(NamedTuple):
+    """Polygons around a point: planes, rings of corners, the plane of each ring, the corners, and a point inside."""
 
     planes: list[OwnedPlane]
     rings: list[NDArray[np.int32]]
@@ -181,34 +181,34 @@ class Polyhedron(NamedTuple):
     middle: Exact
 
 
-def _published_polytope(overlap: Overlap, bodies: list[RationalBody], planes: list[OwnedPlane]) -> Polyhedron:
-    """The facets of the overlap, where their exact planes meet: of round bodies there are too many to clip.
+def _published_polytope(overlap: Overlap, bodies: list[RationalBody], planes: list[OwnedPlane]) -> Star:
+    """The facets of the overlap, with corners where their exact planes meet. Round bodies have too many to clip.
 
-    From the centroid, corners are pulled less than from the mean of them, as most of them are where bodies are round.
+    The point inside is the centroid. Most corners lie where bodies are round, so their mean would be pulled more.
     """
     return _about_middles(planes, overlap.facets, _corners(overlap, planes))._replace(middle=exact(overlap.centroid))
 
 
 def _on_fine_grid(points: Exact) -> tuple[Exact, int, Exact]:
-    """(numbers, scale, first): next to points (n, 3), which may have long denominators, are first + numbers / scale."""
+    """(numbers, scale, first): first + numbers / scale is near each of points (n, 3), whose fractions may be long."""
     arms = points - points[0]
     numbers, scale = integers(_rounded(arms, math.frexp(float(abs(arms).max()))[1] - BITS[-1]))
     return numbers, scale, points[0]
 
 
-def _about_middles(planes: list[OwnedPlane], rings: list[NDArray[np.int32]], corners: Exact) -> Polyhedron:
-    """Triangles about the middle of every facet, which on round bodies needs less pull than the corners."""
+def _about_middles(planes: list[OwnedPlane], rings: list[NDArray[np.int32]], corners: Exact) -> Star:
+    """Triangles about the middle of every facet. On round bodies the middle needs less pull than the corners."""
     numbers, scale, first = _on_fine_grid(corners)
     middles = np.array([numbers[ring].sum(axis=0) // len(ring) for ring in rings])
     fan = [(len(corners) + k, ring[i - 1], ring[i]) for k, ring in enumerate(rings) for i in range(len(ring))]
     facet = np.repeat(np.arange(len(middles), dtype=np.int32), [len(ring) for ring in rings])
     numbers = np.vstack([numbers, middles])
     middle = first + numbers.sum(axis=0) * Fraction(1, scale * len(numbers))
-    return Polyhedron(planes, list(np.array(fan, np.int32)), facet, first + numbers * Fraction(1, scale), middle)
+    return Star(planes, list(np.array(fan, np.int32)), facet, first + numbers * Fraction(1, scale), middle)
 
 
-def _common_polytope(overlap: Overlap, bodies: list[RationalBody], planes: list[OwnedPlane]) -> Polyhedron:
-    """What is below the planes of the overlap's facets and of all flat facets of the bodies, without rounding."""
+def _common_polytope(overlap: Overlap, bodies: list[RationalBody], planes: list[OwnedPlane]) -> Star:
+    """The polytope below the planes of the overlap's facets and of all flat sides of the bodies, without rounding."""
     box = exact(overlap.bounds)
     reference = box.sum(axis=0) / 2
     room = max(box[1] - box[0]) + max(abs(reference)) / 2**40
@@ -238,7 +238,7 @@ def _common_polytope(overlap: Overlap, bodies: list[RationalBody], planes: list[
         return _about_middles(planes, rings, corners + reference)
     numbers, scale, first = _on_fine_grid(corners)
     middle = reference + first + numbers.sum(axis=0) * Fraction(1, scale * len(numbers))
-    return Polyhedron(planes, rings, np.arange(len(rings), dtype=np.int32), corners + reference, middle)
+    return Star(planes, rings, np.arange(len(rings), dtype=np.int32), corners + reference, middle)
 
 
 def _row_about(reference: Exact, plane: OwnedPlane) -> tuple[int, ...]:
@@ -246,14 +246,14 @@ def _row_about(reference: Exact, plane: OwnedPlane) -> tuple[int, ...]:
 
 
 def _rounded(points: Exact, exponent: int) -> Exact:
-    """Down to multiples of 2^exponent."""
+    """The points rounded down to multiples of 2^exponent."""
     up, down, unit = max(-exponent, 0), max(exponent, 0), Fraction(2) ** exponent
     rounded: Exact = np.frompyfunc(lambda x: (x.numerator << up) // (x.denominator << down) * unit, 1, 1)(points)
     return rounded
 
 
 def _corners(overlap: Overlap, planes: Sequence[OwnedPlane]) -> Exact:
-    """Where the planes of the facets around each vertex meet, to rounding; the vertex itself where none of them do."""
+    """For each vertex, where the planes around it meet, to rounding; the vertex itself if they do not meet."""
     around = defaultdict(list)
     for facet, ring in enumerate(overlap.facets):
         for vertex in ring:

@@ -1,4 +1,4 @@
-"""What a certificate claims about the common part of bodies, and the check of it in rational arithmetic.
+"""The claims of a certificate about the common part of bodies, and their check in rational arithmetic.
 
 A check trusts the numbers that define the bodies (see `overlapper.proof.rational_body`), what `overlapper.shapes` says
 of them exactly, and what is written here. It trusts neither the core nor the search that found the certificate. It
@@ -24,7 +24,7 @@ from overlapper.proof.refusal import CertificateError as CertificateError
 from overlapper.rational import Exact, fans, integers, is_closed, root, triple
 from overlapper.shapes.planes import AXES
 
-# Bits below 1 to which shares of single cones are rounded, upwards: their sum then is as short as they are.
+# Bits below 1 to which shares of single cones are rounded upwards. Their sum is then as short as they are.
 ROUNDED = 128
 
 
@@ -34,7 +34,7 @@ def require(claim: bool | np.bool_, sentence: str) -> None:
 
 
 def require_number(number: object) -> None:
-    """Doubles would be rounded on the way, NaN would pass for anything, and a subclass may compare as it likes."""
+    """Refuses doubles, which would be rounded; NaN, for which no claim fails; subclasses, which compare at will."""
     whole = type(number) is int
     if type(number) is Fraction:
         over, under = number.numerator, number.denominator
@@ -43,7 +43,7 @@ def require_number(number: object) -> None:
 
 
 def require_array(name: str, value: object, *shape: int) -> None:
-    """Of numbers; a subclass of arrays may add and multiply as it likes."""
+    """Refuses subclasses of arrays, which may add and multiply as they like."""
     is_array = type(value) is np.ndarray and value.shape == shape
     require(is_array, f"{name} must be an array of shape {shape}")
     for number in np.asarray(value, object).flat:
@@ -57,14 +57,14 @@ def require_indices(name: str, value: object, below: int) -> None:
 
 
 def require_bodies(shapes: object) -> None:
-    """A subclass of Placed may tell of another body than the core has."""
+    """Refuses subclasses of Placed, which may describe another body than the core has."""
     require(type(shapes) is tuple and len(shapes) > 1, "shapes must be a tuple of two bodies or more")
     assert isinstance(shapes, tuple)
     require(all(type(shape) is Placed for shape in shapes), "shapes must be Placed")
 
 
 class Short:
-    """Says how much it holds, which may be thousands of numbers."""
+    """A claim whose text says how many numbers it holds, as there may be thousands."""
 
     def __repr__(self) -> str:
         assert is_dataclass(self)
@@ -85,7 +85,7 @@ def _in_short(name: str, value: object) -> str:
 
 
 def _rounded(number: Fraction) -> str:
-    """To twelve digits, of any exponent."""
+    """A number of any exponent, to twelve digits."""
     return f"{Decimal(number.numerator) / Decimal(number.denominator):.12g}"
 
 
@@ -138,7 +138,7 @@ class Separated(Short):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Touching(Short):
-    """Nearly a gap and nearly a common point.
+    """The bodies nearly have a gap, and nearly have a common point.
 
     At most four `planes` of `shapes`, whose normals add up to zero, leave no room for a ball larger than `inradius`.
     `point` (3,) is no farther than `miss` from each of the points `nearest` (m, 3), which lie one in each body.
@@ -254,8 +254,8 @@ class Overlapping(Short):
     def _check_star(self, triangles: NDArray[np.intp], corners: Exact, six: Exact) -> None:
         """The cones over the triangles, about the point, fill space once.
 
-        A closed surface winds about the point as often as a ray in general position leaves through it, each time
-        outwards if no triangle is seen from behind. A ray through an edge shows as zero.
+        A closed surface winds about the point as often as a ray in general position leaves through it. The ray leaves
+        outwards each time if no triangle is seen from behind. A ray through an edge gives a zero.
         """
         require(len(self.rings) == len(self.facet), "every polygon must have a plane")
         require(is_closed(triangles), "polygons must form a closed surface")
@@ -267,9 +267,9 @@ class Overlapping(Short):
         require(met.sum() == 1, "the surface must wind about the point once")
 
     def _reach(self, corners: Exact, unit: int) -> Exact:
-        """By how much a plane cuts off more, or less, of the cone over each of its triangles than the triangle does.
+        """For each triangle, the volume below its plane of the cone over it, as a share of the cone to the triangle.
 
-        Above the true share, by 2^-ROUNDED or less, and in units of that.
+        The shares are in units of 2^-ROUNDED, and rounded up.
         """
         facets = [facet for facet, ring in zip(self.facet, self.rings) for _ in ring[2:]]
         slack = [plane.offset - plane.normal @ self.point for plane in self.planes]
@@ -314,7 +314,7 @@ class Bracketed(Short):
 
 
 def volume_bounds(a: Placed, b: Placed, is_narrow: Callable[[Bounds], bool]) -> Bounds:
-    """Bounds of the volume that two bodies share, of which it was said that they are narrow."""
+    """Bounds of the volume that two bodies share, so narrow that `is_narrow` accepts them."""
     try:
         from overlapper.proof.volume import proved_bounds
     except ImportError as error:

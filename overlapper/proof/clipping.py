@@ -19,7 +19,7 @@ SIDES = ((0, 2, 6, 4), (1, 5, 7, 3), (0, 4, 5, 1), (2, 3, 7, 6), (0, 1, 3, 2), (
 
 
 class ClippedPolytope:
-    """Begins as a box (2, 3) whose sides have the label BORDER; every cut that removes something adds a facet."""
+    """A box (2, 3) at first, whose sides have the label BORDER. Every cut that removes something adds a facet."""
 
     def __init__(self, box: Exact) -> None:
         self.points = [primitive([*corner, Fraction(1)]) for corner in product(*box.T)]
@@ -41,7 +41,7 @@ class ClippedPolytope:
         return sorted(self._around)
 
     def reaches_past(self, planes: Exact) -> NDArray[np.bool_]:
-        """Which of the planes (k, 4) would remove something: doubles are sure of most."""
+        """Which of the planes (k, 4) would remove something. Doubles decide most of them."""
         corners = np.array([self.points[point] for point in self.used()], object)
         a, b = (np.array([in_doubles(row, 1 << bits(row)) for row in rows]) for rows in (planes, corners))
         value, doubt = a @ b.T, DOUBT * (abs(a) @ abs(b).T) + UNDERFLOW
@@ -52,7 +52,7 @@ class ClippedPolytope:
         return past
 
     def cut(self, plane: tuple[int, ...], label: int) -> None:
-        """Removes what is beyond the plane. Nothing is left, not even rings, if no point is strictly below it."""
+        """Removes everything beyond the plane. No ring is left if no point is strictly below the plane."""
         if not self._around:
             return
         used = [*self._around]
@@ -94,7 +94,7 @@ class ClippedPolytope:
     def _clip(
         self, ring: list[int], side: dict[int, int], crossings: dict[tuple[int, int], int]
     ) -> tuple[list[int], int, int]:
-        """What is left of a polygon, and the points at which it leaves through the plane and returns; or -1, -1."""
+        """The rest of a polygon, and the points at which it leaves through the plane and returns; or -1, -1."""
         clipped, leaves, returns = [], -1, -1
         for p, q in zip(ring, ring[1:] + ring[:1]):
             if side[p] <= 0:

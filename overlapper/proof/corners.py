@@ -15,7 +15,7 @@ from overlapper.proof.pieces import Floats, Plane
 from overlapper.proof.vectors import Vector, cross, dot, minus
 from overlapper.rational import exact
 
-# Planes that are cut with before it is asked again which of the others are needed.
+# Number of planes that cut before the rest are asked again whether they are needed.
 AT_ONCE = 16
 
 
@@ -46,7 +46,7 @@ class Polytope:
 
 
 def below(planes: Iterable[Plane], box: Floats) -> Polytope | None:
-    """What is below the planes in a box (2, 3); None if that has no inside."""
+    """The part of a box (2, 3) below the planes; None if it has no inside."""
     known = list(planes)
     rows = np.array([_row(plane) for plane in known], object).reshape(-1, 4)
     polytope = ClippedPolytope(exact(box))
@@ -71,7 +71,7 @@ def below(planes: Iterable[Plane], box: Floats) -> Polytope | None:
 
 
 def _through(ring: list[Vector]) -> Plane:
-    """The plane of a side of the box: two sides that meet there are orthogonal."""
+    """The plane of a side of the box, through three corners of a ring on it."""
     for a, b, c in zip(ring, ring[1:], ring[2:]):
         normal = cross(minus(b, a), minus(c, a))
         if any(normal):

@@ -12,7 +12,7 @@ from overlapper.proof.claims import CertificateError, OwnedPlane, support_above
 from overlapper.proof.rational_body import RationalBody
 from overlapper.rational import Exact
 
-# Kelley's method on round bodies has no end.
+# The most rounds: on round bodies Kelley's method never ends by itself.
 ROUNDS = 200
 
 
@@ -83,7 +83,7 @@ class DeepestBall:
         return found
 
     def exchange(self, entering: OwnedPlane | None) -> bool:
-        """Takes a plane into the basis for the one that keeps all weights from getting negative."""
+        """Puts a plane into the basis, in place of the plane that keeps all weights from getting negative."""
         if entering is None:
             return False
         share = self._solve(np.array([self._row(plane) for plane in self.basis]).T, self._row(entering))
@@ -101,7 +101,7 @@ class DeepestBall:
         return np.array([*plane.normal, Fraction(math.sqrt(plane.normal @ plane.normal))])
 
     def _simplex(self) -> list[OwnedPlane]:
-        """Around one of the bodies, or around everything if none is bounded: then owned by nobody."""
+        """Four planes around one of the bodies; if none is bounded, around everything, and owned by no body."""
         directions = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) * Fraction(1)
         for owner, body in enumerate(self.bodies):
             if body.facts.bounded:
@@ -112,7 +112,7 @@ class DeepestBall:
 
     @staticmethod
     def _solve(matrix: Exact, right: Iterable[Fraction | int]) -> Exact:
-        """Gaussian elimination."""
+        """Solves linear equations by Gaussian elimination."""
         rows: Exact = np.column_stack([matrix, np.array([*right], object)]) * Fraction(1)
         size = len(rows)
         for k in range(size):

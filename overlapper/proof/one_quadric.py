@@ -1,10 +1,10 @@
 """The volume that a ball or a cylinder shares with a polytope, by closed forms in ball arithmetic.
 
-Every edge of the polytope spans a triangle: of a ball with the foot of the centre on the plane of a facet, of a
-cylinder with the axis in a slice across it. In polar coordinates about the apex of a triangle all integrals are
-elementary, and the signed sum over all edges is the volume. Which case of a formula holds is decided in balls, and
-without rounding where these are too wide. No term jumps, so that nothing is lost where a corner or an edge lies on the
-quadric, and more bits are more digits.
+Every edge of the polytope spans a triangle. For a ball, the apex is the foot of the centre on the plane of a facet; for
+a cylinder, the axis in a slice across it. In polar coordinates about the apex all integrals are elementary, and the
+signed sum over all edges is the volume. The case of a formula is decided in balls, and without rounding where the balls
+are too wide. No term jumps. So no digits are lost where a corner or an edge lies on the quadric, and more bits give
+more digits.
 """
 
 from __future__ import annotations
@@ -25,14 +25,17 @@ Triple = tuple[Number, Number, Number]
 
 
 def root(square: Number) -> arb:
-    """Of what is not negative."""
+    """The square root of a number that is not negative."""
     found: arb = arb(square).nonnegative_part().sqrt()
     return found
 
 
 def in_ball(ball: Ball, polytope: Polytope) -> arb:
-    """A cone from the centre over a facet: as far as the facet is in the ball a third of height times area, and where
-    it is outside a third of the radius times the area of the sphere that is seen."""
+    """The sum of the cones from the centre over the facets.
+
+    Where a facet is in the ball, its cone has a third of height times area. Where the facet is outside, the cone has a
+    third of the radius times the area of the sphere that the facet covers.
+    """
     kinds = _in_balls_or_exactly(polytope, ball.centre)
     total = arb(0)
     for facet in range(len(polytope.facets)):
@@ -130,7 +133,7 @@ class _Over:
         return side * (high - low)
 
     def _sector(self, near: Number, along: Number, length: Number, end: Number) -> arb:
-        """From the foot on the edge, at the root of `near` from the foot on the plane, to the end, odd in `along`."""
+        """From the foot on the edge, at the root of `near` from the foot on the plane, to the end; odd in `along`."""
         side = sign(along)
         if side == 0:
             return arb(0)
@@ -150,7 +153,7 @@ class _Over:
 
 
 def _under(numbers: _Numbers, square: fmpq, edge: tuple[int, int, int, int]) -> arb:
-    """What the facets on both sides of an edge have above a triangle between the axis and the shadow of the edge."""
+    """The volume below the facets on both sides of an edge, over the triangle from the axis to the edge's shadow."""
     p, q, left, right = edge
     heights = numbers.height(left), numbers.height(right)
     total = arb(0)
@@ -177,7 +180,7 @@ class _Shadow:
             self.area, self.outwards, self.sideways = (self.side * (b - a) for a, b in zip(*ends))
 
     def integral(self, level: Number, slope: Triple) -> arb:
-        """Of level + slope · x."""
+        """The integral of level + slope · x."""
         outer, inner = arb(dot(slope, self.foot)), arb(dot(slope, self.edge)) / root(self.length)
         found: arb = arb(level) * self.area + outer * self.outwards + inner * self.sideways
         return found

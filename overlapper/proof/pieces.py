@@ -53,10 +53,10 @@ Quadric = Ball | Tube
 
 @dataclass(frozen=True)
 class Piece:
-    """What is in the quadric, if there is one, and below the planes.
+    """A block (see `overlapper.shapes.facts`) in common axes: the part of a quadric, if any, below planes.
 
-    It lies within `reach` of the hull of `spine` (k, 3), in doubles; `spine` is None of what has no end. Of the body
-    its planes cut off no more than the volume `lost`.
+    It lies within `reach` of the hull of `spine` (k, 3), in doubles; `spine` is None if the piece has no end. Its
+    planes cut off no more than the volume `lost` of the body.
     """
 
     quadric: Quadric | None
@@ -67,7 +67,7 @@ class Piece:
 
 
 class Frame:
-    """From the axes of a body to those of `home`: of a home with half axes, each in units of its half axis."""
+    """The map from the axes of a body to those of `home`. If home has half axes, they are the units there."""
 
     def __init__(self, body: RationalBody, home: RationalBody) -> None:
         turn = home.axes.T @ body.axes
@@ -104,7 +104,7 @@ def doubles(points: Iterable[Vector]) -> Floats:
 
 
 def pieces(body: RationalBody, home: RationalBody) -> list[Piece]:
-    """In the axes of `home`. In units of half axes only home itself, a ball there, and flat bodies have pieces."""
+    """The pieces of a body in the axes of `home`. If home has half axes, the other body must be flat."""
     if not body.facts.has_blocks:
         raise CertificateError(f"no volume is proved of {body.facts.name}, which is not made of balls and cylinders")
     assert home.facts.half_axes is None or body is home or body.facts.planes

@@ -1,4 +1,4 @@
-"""What a claim that is not proved raises, and how bounds are written."""
+"""The error of claims that are not proved, and the type of bounds."""
 
 from __future__ import annotations
 

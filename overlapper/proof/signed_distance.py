@@ -1,4 +1,4 @@
-"""Bounds on the signed distance of a pair that hold whoever is right: the arbiter when two programs differ.
+"""Proved bounds of the signed distance of a pair: the arbiter when two programs differ.
 
 The signed distance is positive apart (the distance) and negative in overlap (minus the depth). In the Minkowski
 difference D = A - B it is the distance from the origin to the boundary of D. So every direction gives a lower bound, by
@@ -8,9 +8,9 @@ bounds meet; it is built anew each time, because an arbiter is seldom asked.
 
 A ball is left out of each shape that is the sum of a ball and a core, and the radii are subtracted in the end.
 
-Doubles only propose: which directions, which vertices, which facets. What is returned was evaluated in rational
-arithmetic on the very doubles that describe the pair, and rounded once, outwards. Only the points on the rim of a
-cylinder are irrational; they are rounded to doubles in its own frame, 1e-16 of its size.
+Doubles only propose directions, vertices and facets. The bounds are evaluated in rational arithmetic on the very
+doubles that describe the pair, and rounded once, outwards. Only points on the rim of a cylinder are irrational; they
+are rounded to doubles in its own frame, to 1e-16 of its size.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 # Three exact divisions and roots, each rounded correctly, and their product.
 OUTWARDS = 4 * 2.0**-52
 
-# Polyhedra end by themselves. Rims gain about a digit in ten steps; coaxial ones need more, and keep wide bounds.
+# The most steps. Polyhedra end by themselves. Rims gain about a digit in ten steps; coaxial rims keep wide bounds.
 STEPS = 100
 
 # The directions to the 26 neighbours of a cell.
@@ -153,7 +153,7 @@ class Difference:
 
 
 def _gap(a: RationalBody, b: RationalBody, outward: Exact) -> tuple[float, float]:
-    """What the direction from A to B sees of the signed distance: the exact value, rounded down and up."""
+    """The gap of the supports along a direction from A to B, rounded down and up."""
     flat, curved = Fraction(0), 0.0
     for body, direction in ((a, outward), (b, -outward)):
         support = body.support(direction)

@@ -10,7 +10,7 @@ class Undecided(ArithmeticError):
 
 
 def is_positive(x: arb | fmpq) -> bool:
-    """Of what is not zero in a ball, for which there is no telling; exact numbers may be zero."""
+    """Whether a number is positive. Exact numbers may be zero; Undecided for a ball that holds zero."""
     if x > 0:
         return True
     if x < 0 or x == 0:

@@ -1,17 +1,17 @@
 """Volumes of two quadrics and a polytope, by slices, in ball arithmetic.
 
-Slices are orthogonal to the axes: of a cylinder they show a strip between two lines, of a ball a disc, of the polytope
-a polygon. Each of the lines keeps its direction and has the offset b₀ + b₁ t + b₂ ρ₁(t) + b₃ ρ₂(t), where t is along
-the normal of the slices and ρ(t)² is quadratic. The area of a polygon is thus a quadratic form in 1, t, ρ₁ and ρ₂, and
-has an elementary integral but for ρ₁ ρ₂. What is not elementary is integrated by `acb.integral` (Petras; Johansson,
-Numerical integration in arbitrary-precision ball arithmetic, 2018), whose error is proved.
+A slice is parallel to the axes of all cylinders. It shows a cylinder as a strip between two lines, a ball as a disc,
+and the polytope as a polygon. Each of the lines keeps its direction and has the offset b₀ + b₁ t + b₂ ρ₁(t) + b₃ ρ₂(t).
+Here t is along the normal of the slices, and ρ(t)² is quadratic. So the area of a polygon is a quadratic form in 1, t,
+ρ₁ and ρ₂. Its integral is elementary but for ρ₁ ρ₂. Integrals that are not elementary are computed by `acb.integral`
+(Petras; Johansson, Numerical integration in arbitrary-precision ball arithmetic, 2018), whose error is proved.
 
-The outline of a slice changes its sides or their order only at breakpoints: where three of the curves that bound slices
-meet in a point of the common body, where a line touches the disc in such a point, where parallel lines meet, or where a
-strip or the disc ends. These t are roots of polynomials with rational coefficients, of degree four or less, which FLINT
-encloses. Superfluous ones do no harm. Three sides of the polytope meet in its corners only, two in its edges, and those
-edges that lie in a slice are a place where parallel lines meet. What lies between bounds of breakpoints that are too
-close to each other has at most the widest slice.
+The sides of a slice and their order change only at breakpoints: where three of the curves that bound slices meet in a
+point of the common body, where a line touches the disc in such a point, where parallel lines meet, or where a strip or
+the disc ends. These t are roots of polynomials with rational coefficients, of degree four or less, which FLINT
+encloses. Superfluous breakpoints do no harm. Three sides of the polytope meet only in its corners, and two only in its
+edges; an edge that lies in a slice is a place where parallel lines meet. Between breakpoints too close to tell apart, a
+slice has at most the widest area.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ Point = tuple[arb, arb, arb]  # (t, p, q)
 ZERO = fmpq(0)
 T = fmpq_poly([0, 1])
 
-# Where between two breakpoints the outline is looked at: in the middle symmetry has other lines meet than elsewhere.
+# The share between two breakpoints at which a slice is looked at. In the middle, symmetry may make more lines meet.
 SHARE = fmpq(3331, 7919)
 
-# Of the bits of a number, those to which what is not elementary is integrated.
+# The share of the bits of a number to which an integral that is not elementary is computed.
 INTEGRATED = 0.75
-# Bits that roundings of what is integrated may take, by what the square of the bits is divided to be the number of
-# evaluations after which there is no hope of more, and the most of these, which take seconds.
+# SPARE: bits that rounding may take from an integral. The number of evaluations is limited to the square of the bits
+# divided by EVALUATIONS, and to MOST_EVALUATIONS, which take seconds.
 SPARE, EVALUATIONS, MOST_EVALUATIONS = 16, 2, 1 << 16
 
 Form = list[fmpq]  # coefficients of 1, t, t², ρ₁, t ρ₁, ρ₁², ρ₂, t ρ₂, ρ₂², ρ₁ ρ₂
@@ -52,8 +52,8 @@ class Line:
 
 
 @dataclass
-class Outline:
-    """What a slice is made of: quadratic forms, segments taken from the disc, and its angles."""
+class SliceArea:
+    """The area of a slice: quadratic forms, segments taken from the disc, and the angle of its arcs."""
 
     forms: list[tuple[int, ...]] = field(default_factory=list)
     segments: Counter[int] = field(default_factory=Counter)
@@ -61,15 +61,15 @@ class Outline:
 
 
 class Slices:
-    """What is common to both kinds. Coordinates t, p, q are rational combinations of those of space."""
+    """A volume by slices. Coordinates t, p, q are rational combinations of those of space."""
 
     corners: list[Vector]  # of the polytope
     edges: list[tuple[int, int, int, int]]
     lines: list[Line]  # of which the first four are a parallelogram, counter-clockwise
-    squares: tuple[fmpq_poly, ...]  # ρ₁² and ρ₂², of which a ball has none of its own
+    squares: tuple[fmpq_poly, ...]  # ρ₁² and, for two cylinders, ρ₂²
     steep: list[tuple[fmpq, fmpq]]  # (rate, offset) of planes rate t <= offset
 
-    scale: fmpq  # of the volume in these coordinates by that in space
+    scale: fmpq  # the volume in these coordinates divided by that in space
 
     def __call__(self, bits: int) -> arb:
         with ctx.workprec(bits):
@@ -92,13 +92,13 @@ class Slices:
                 return arb(0)
         if not all(is_positive(at(square, middle)) for square in self.squares):
             return arb(0)
-        outline = self.outline(middle)
-        return self.integral(outline, low, high, goal) if outline else arb(0)
+        area = self.area(middle)
+        return self.integral(area, low, high, goal) if area else arb(0)
 
-    # What the two kinds differ in.
+    # Answers that differ between the two kinds of slices.
 
     def candidates(self) -> Iterator[tuple[Point, Any]]:
-        """Where an outline may change, each with what `is_outside` is to know of it."""
+        """The points at which the sides of a slice may change, each with an argument for `is_outside`."""
         raise NotImplementedError
 
     def is_outside(self, point: Point, known: Any) -> bool:
@@ -108,13 +108,13 @@ class Slices:
         """More than the area of any slice."""
         raise NotImplementedError
 
-    def outline(self, t: arb) -> Outline | None:
+    def area(self, t: arb) -> SliceArea | None:
         raise NotImplementedError
 
-    def integral(self, outline: Outline, low: arb, high: arb, goal: int) -> arb:
+    def integral(self, area: SliceArea, low: arb, high: arb, goal: int) -> arb:
         raise NotImplementedError
 
-    # What they share.
+    # Steps that both kinds share.
 
     def marks(self) -> Iterator[arb]:
         yield from self.level_edges()
@@ -123,7 +123,7 @@ class Slices:
                 yield point[0]
 
     def is_cut_off(self, point: Point) -> bool:
-        """By a plane, certainly."""
+        """Whether a plane certainly cuts the point off."""
         t, p, q = point
         for line in self.lines[4:]:
             if line.normal[0] * p + line.normal[1] * q > line.offset[0] + line.offset[1] * t:
@@ -131,7 +131,7 @@ class Slices:
         return any(rate * t > offset for rate, offset in self.steep)
 
     def level_edges(self) -> Iterator[arb]:
-        """Of edges that lie in a slice, ends need not be in the quadrics for what is between them to be."""
+        """The slices that hold whole edges: a part of such an edge may be in the quadrics when its ends are not."""
         for i, j, _, _ in self.edges:
             if self.corners[i][0] == self.corners[j][0]:
                 yield arb(self.corners[i][0])
@@ -140,7 +140,7 @@ class Slices:
         return [arb(1), t, *(at(square, t).nonnegative_part().sqrt() for square in self.squares)]
 
     def polygon(self, offsets: list[arb]) -> list[tuple[int, tuple[arb, arb]]]:
-        """The lines around what is below all of them, and where each meets the next; empty if there is nothing."""
+        """The lines around the polygon below all of them, and where each meets the next; empty without a polygon."""
         around = [(k, self.meeting(k, (k + 1) % 4, offsets)) for k in range(4)]
         for new in range(4, len(self.lines)):
             x, y = self.lines[new].normal
@@ -164,7 +164,7 @@ class Slices:
         return (offsets[i] * d - offsets[j] * b) / det, (offsets[j] * a - offsets[i] * c) / det
 
     def corner(self, i: int, j: int) -> tuple[Combination, Combination]:
-        """Where two lines meet, as combinations."""
+        """The point where two lines meet, as combinations."""
         (a, b), (c, d) = self.lines[i].normal, self.lines[j].normal
         det = a * d - b * c
         e, f = self.lines[i].offset, self.lines[j].offset
@@ -192,7 +192,7 @@ def product(u: Combination, v: Combination) -> Form:
 
 
 def clusters(marks: Iterable[arb]) -> list[tuple[arb, arb]]:
-    """Bounds of the marks, in order, without those that overlap."""
+    """Bounds of the marks, in order; bounds that overlap are put together."""
     found: list[tuple[arb, arb]] = []
     for low, high in sorted(((mark.lower(), mark.upper()) for mark in marks), key=lambda pair: pair[0].mid()):
         if found and not found[-1][1] < low:
@@ -210,7 +210,7 @@ def at(poly: fmpq_poly, x: arb) -> arb:
 
 
 def roots(poly: fmpq_poly) -> list[arb]:
-    """The real ones; none of what is zero everywhere."""
+    """The real roots; an empty list for the zero polynomial."""
     match poly.degree():
         case -1 | 0:
             return []
@@ -235,7 +235,7 @@ def along(start: Vector, end: Vector, form: Callable[[Vector, Vector], fmpq], co
 
 
 def points_between(start: Vector, end: Vector, shares: Iterable[arb]) -> Iterator[Point]:
-    """At shares of the way, but those that are certainly beyond its ends."""
+    """The points at shares of the way, without those that are certainly beyond its ends."""
     for share in shares:
         if not (share < 0 or share > 1):
             t, p, q = (x + share * (y - x) for x, y in zip(start, end))
@@ -243,7 +243,7 @@ def points_between(start: Vector, end: Vector, shares: Iterable[arb]) -> Iterato
 
 
 class Parabola:
-    """R(t) = most - bend (t - peak)², of which the root has elementary integrals."""
+    """R(t) = most - bend (t - peak)². The integrals of its root are elementary."""
 
     def __init__(self, constant: arb, slope: arb, bend: arb) -> None:
         self.bend = bend
@@ -282,10 +282,10 @@ def of_form(squares: tuple[fmpq_poly, ...], low: arb, high: arb) -> list[arb]:
 
 
 def integrated(f: Callable[[acb, bool], acb], low: arb, high: arb, most: arb, goal: int) -> arb:
-    """Between ends that are known to rounding, of what is not more than `most`.
+    """The integral of a function that is not more than `most`, between ends that are known to rounding.
 
-    Below the rounding of the most there is nothing to be had by smaller steps, and of these there is an end. The worst
-    interval is halved first, so that where a root begins at an end, what is left when evaluations are spent is narrow.
+    Smaller steps gain nothing below the rounding of `most`, and the number of steps is limited. The worst interval is
+    halved first. So if a root begins at an end, the interval that is left when all steps are spent is narrow.
     """
     start, end = low.mid(), high.mid()
     rounding = most * (end - start) * arb(2) ** (SPARE - ctx.prec)
@@ -304,5 +304,5 @@ def integrated(f: Callable[[acb, bool], acb], low: arb, high: arb, most: arb, go
 
 
 def half_turn(y: arb, x: arb) -> arb:
-    """The angle of (x, y) in [0, π] for y that is not negative, but may be rounded to what is."""
+    """The angle of (x, y) in [0, π]. The true y is not negative, but its ball may hold negative numbers."""
     return arb.pi() / 2 - arb.atan2(x, y)

@@ -1,4 +1,4 @@
-"""The volume that two cylinders that cross share with a polytope: a slice is a parallelogram, cut by lines."""
+"""The volume that two crossing cylinders and a polytope share: a slice is a parallelogram, cut by lines."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from overlapper.proof.slices import (
     ZERO,
     Form,
     Line,
-    Outline,
     Point,
+    SliceArea,
     Slices,
     T,
     at,
@@ -72,7 +72,7 @@ class TwoTubes(Slices):
         return root(self.most)
 
     def is_outside(self, point: Point, unknown: int = -1) -> bool:
-        """Certainly, whatever the coordinate that is unknown is."""
+        """Whether the point is certainly outside, for every value of the coordinate that is unknown."""
         t, p, q = point
         for k, (x, level, square) in enumerate(zip((p, q), self.levels, self.squares)):
             off = arb(0) if k == unknown else x - level
@@ -114,26 +114,26 @@ class TwoTubes(Slices):
             for t in roots(square):
                 yield (t, arb(0), arb(level)), 1 - k
 
-    def outline(self, t: arb) -> Outline | None:
+    def area(self, t: arb) -> SliceArea | None:
         one, _, p_wide, q_wide = self.basis(t)
         bs = (line.offset for line in self.lines)
         around = self.polygon([b[0] * one + b[1] * t + b[2] * p_wide + b[3] * q_wide for b in bs])
         if not around:
             return None
         ids = [line for line, _ in around]
-        return Outline(forms=list(zip([ids[-1], *ids], ids, [*ids[1:], ids[0]])))
+        return SliceArea(forms=list(zip([ids[-1], *ids], ids, [*ids[1:], ids[0]])))
 
     def form(self, before: int, line: int, after: int) -> Form:
-        """Twice the area between the origin and what of a line is between two others."""
+        """Twice the area between the origin and the part of a line between two others."""
         key = (before, line, after)
         if key not in self._forms:
             (p, q), (u, v) = self.corner(before, line), self.corner(line, after)
             self._forms[key] = [x - y for x, y in zip(product(p, v), product(q, u))]
         return self._forms[key]
 
-    def integral(self, outline: Outline, low: arb, high: arb, goal: int) -> arb:
+    def integral(self, area: SliceArea, low: arb, high: arb, goal: int) -> arb:
         coefficients = [arb(0)] * 10
-        for before, line, after in outline.forms:
+        for before, line, after in area.forms:
             coefficients = [c + x for c, x in zip(coefficients, self.form(before, line, after))]
         moments = of_form(self.squares, low, high)
         total = sum((c * m for c, m in zip(coefficients, moments)), arb(0))
@@ -142,7 +142,7 @@ class TwoTubes(Slices):
         return total / 2
 
     def _of_both(self, low: arb, high: arb, goal: int) -> arb:
-        """The integral of ρ₁ ρ₂, elliptic unless they are proportional, in an angle in which it is analytic."""
+        """The integral of ρ₁ ρ₂: elliptic unless they are proportional, and analytic in the angle that is used."""
         p, q = self.squares
         if all(p[i] * q[2] == q[i] * p[2] for i in (0, 1)):
             share = root(q[2] / p[2])

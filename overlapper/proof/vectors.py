@@ -1,4 +1,4 @@
-"""Vectors of rational numbers of FLINT, which are some ten times as fast as fractions."""
+"""Vectors of FLINT's rational numbers, which are about ten times as fast as fractions."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def scaled(u: tuple[N, N, N], share: N | int) -> tuple[N, N, N]:
 
 
 def across(u: Vector) -> Vector:
-    """Some vector orthogonal to one that is not zero."""
+    """A vector orthogonal to one that is not zero."""
     least = min(range(3), key=lambda k: abs(u[k]))
     axis = [fmpq(0)] * 3
     axis[least] = fmpq(1)

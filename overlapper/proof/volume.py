@@ -1,6 +1,6 @@
-"""Bounds of the volume that two bodies share, as narrow as asked for: pieces of the one by pieces of the other.
+"""Bounds of the volume that two bodies share, as narrow as asked for: each piece of one with each piece of the other.
 
-Decisions are made without rounding or by balls that do not hold zero; where one holds it, more bits are taken.
+Decisions are made without rounding, or by balls that do not hold zero. Where a ball holds zero, more bits are taken.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from overlapper.proof.vectors import cross, dot, fraction, minus, plus, scaled
 
 # Bits of a first try, and of a last one, after which doubt is taken for a fault of the input.
 FIRST, LAST = 128, 1 << 11
-# What share of the whole the doubt of all parts together may be before any is computed again.
+# A summand is computed again while all doubts together exceed one part in ENOUGH of the volume.
 ENOUGH = 1 << 60
-# Bits at which a sign that is not decided is taken for one that never is.
+# Bits at which an undecided sign is taken for a sign that no bits decide.
 TIED = 512
 
 
 class Common:
-    """What two placed shapes share."""
+    """The common part of two placed shapes, as a sum of volumes."""
 
     def __init__(self, a: Placed, b: Placed) -> None:
         bodies = RationalBody(a), RationalBody(b)
@@ -59,9 +59,9 @@ class Common:
         self._known: list[arb | None] = [None] * len(self._summands)
 
     def bounds(self, bits: int) -> Bounds | None:
-        """With numbers of so many bits; None if these are too few for one of the parts.
+        """Bounds by numbers of so many bits; None if these are too few for one of the summands.
 
-        Of a part that is known well enough beside the whole, what was found before is kept.
+        A summand that is known well enough is not computed again.
         """
         with ctx.workprec(bits):
             wide = [k for k, volume in enumerate(self._known) if volume is None or volume.rad() > self._enough]
@@ -84,10 +84,10 @@ Summand = Callable[[int], arb]
 
 
 class OrBetween:
-    """What slices find, or bounds of it.
+    """A volume by slices, or bounds of it by a thinner and a thicker cylinder.
 
-    Where a plane goes through the curve in which the quadrics meet, three sides of a slice meet all the time, and no
-    bits tell their order. Of a thinner and a thicker cylinder they do.
+    Where a plane goes through the curve in which the quadrics meet, three sides of every slice meet, and no bits tell
+    their order. For the thinner and the thicker cylinder some bits do.
     """
 
     def __init__(self, slices: Callable[[Tube], Slices], tube: Tube) -> None:
@@ -106,7 +106,7 @@ class OrBetween:
 
 
 def finite(number: arb) -> arb:
-    """The number, of which something is known. Undecided if nothing is: two sides meet where an integral ends."""
+    """The number, if it has bounds. Undecided if it has none: two sides meet where an integral ends."""
     if not number.is_finite():
         raise Undecided
     return number
@@ -118,7 +118,7 @@ def dyadic(number: arb) -> Fraction:
 
 
 class _Pieces:
-    """Pieces of a body, with boxes around them."""
+    """The pieces of a body, with boxes around them."""
 
     def __init__(self, found: list[Piece]) -> None:
         self.pieces = found
@@ -126,7 +126,7 @@ class _Pieces:
         self._planes: dict[int, Floats] = {}
 
     def near(self, other: _Pieces) -> Iterator[tuple[int, int]]:
-        """Pairs of pieces that doubles do not see apart."""
+        """Pairs of pieces that are not apart as far as doubles can tell."""
         lower, upper = self.boxes[:, None, 0], self.boxes[:, None, 1]
         apart = (lower >= other.boxes[None, :, 1]) | (upper <= other.boxes[None, :, 0])
         for i, j in np.argwhere(~apart.any(axis=2)):
@@ -146,7 +146,7 @@ class _Pieces:
 
 
 def box(piece: Piece) -> Floats:
-    """Around a piece, in doubles that are rounded outwards."""
+    """The box (2, 3) around a piece, in doubles that are rounded outwards."""
     if piece.spine is None:
         return np.array([[-np.inf] * 3, [np.inf] * 3])
     low, high = piece.spine.min(axis=0) - piece.reach, piece.spine.max(axis=0) + piece.reach
@@ -155,14 +155,14 @@ def box(piece: Piece) -> Floats:
 
 
 def in_doubles(plane: Plane) -> list[float]:
-    """Normal and offset, by the largest coordinate of the normal."""
+    """Normal and offset, divided by the largest coordinate of the normal."""
     size = max(abs(x) for x in plane.normal)
     ratios = (number / size for number in (*plane.normal, plane.offset))
     return [int(x.p) / int(x.q) for x in ratios]
 
 
 def summands(one: Piece, other: Piece) -> list[Summand]:
-    """What two pieces share, as volumes that wait to be computed."""
+    """The common part of two pieces, as volumes that wait to be computed."""
     around = np.array([f(p, q) for f, p, q in zip((np.maximum, np.minimum), box(one), box(other))])
     planes = (*one.planes, *other.planes)
     quadrics = [piece.quadric for piece in (one, other) if piece.quadric is not None]
@@ -187,7 +187,7 @@ def _of_one(quadric: Quadric | None, planes: tuple[Plane, ...], around: Floats) 
 
 
 def _below(quadric: Quadric | None, planes: tuple[Plane, ...], around: Floats) -> Polytope | None:
-    """Without the planes that leave all of a ball, and nothing if one leaves nothing of it."""
+    """The polytope below the planes that cut a ball; None if one of them leaves nothing of the ball."""
     if isinstance(quadric, Ball):
         kept = []
         for plane in planes:
@@ -229,7 +229,7 @@ def is_within(between: fmpq, small: fmpq, large: fmpq) -> bool:
 
 
 def _split(one: Quadric, other: Quadric, planes: tuple[Plane, ...], around: Floats) -> list[Summand]:
-    """Two balls or two parallel tubes: on each side of the plane of the circle or lines in which they meet is one."""
+    """Two balls or two parallel tubes. Their surfaces meet in a plane, and on each side of it one of them bounds."""
     if isinstance(one, Ball) and isinstance(other, Ball):
         centre, arm = one.centre, minus(other.centre, one.centre)
     else:

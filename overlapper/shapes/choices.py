@@ -1,4 +1,4 @@
-"""What several kinds of shapes answer alike. A kind inherits what is true of it; `Facts` has the questions."""
+"""Answers that several kinds of shapes share. A kind inherits what is true of it; `Facts` has the questions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Python asks of a shape. Each kind answers in a file of its own, and `table` says which file that is."""
+"""The questions that Python asks of a shape. Each kind answers in a file of its own, which `table` names."""
 
 from __future__ import annotations
 

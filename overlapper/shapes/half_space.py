@@ -26,7 +26,7 @@ class HalfSpaceFacts(Flat):
 
     @cached_property
     def planes(self) -> Planes:
-        """Of the normal and the offset as given, which are not rounded."""
+        """The plane as given, without rounding."""
         return Planes.of(exact(self.shape.given_normal)[None], exact([self.shape.given_offset]))
 
     def parameters(self) -> list[float | Floats]:

@@ -27,5 +27,5 @@ KINDS: dict[type, type[Facts]] = {
 
 
 def facts(shape: Shape) -> Facts:
-    """What Python knows of a shape."""
+    """The answers for a shape."""
     return KINDS[type(shape)](shape)

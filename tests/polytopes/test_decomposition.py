@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from overlapper import Hull
-from overlapper.polytopes.decomposition import NotDecomposed, Surface, cache_folder, decompose, packed, unpacked
+from overlapper.polytopes.decomposition import NotDecomposed, WeldedMesh, cache_folder, decompose, packed, unpacked
 
 CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 HULL = Hull(CORNERS)
@@ -216,9 +216,9 @@ def test_a_hole_is_not_filled_by_the_convex_body_around_it(coacd_is):
 
 def test_a_shell_that_is_inside_out_and_no_hole_leaves_the_volume_open():
     hollow = np.concatenate([CUBE, (CUBE / 2 + 0.25)[:, ::-1]])
-    assert Surface.of(hollow).volume == pytest.approx(7 / 8)
+    assert WeldedMesh.of(hollow).volume == pytest.approx(7 / 8)
     for beside in (CUBE + 3, CUBE / 2 + 0.75):
-        surface = Surface.of(np.concatenate([CUBE, beside[:, ::-1]]))
+        surface = WeldedMesh.of(np.concatenate([CUBE, beside[:, ::-1]]))
         assert surface.volume is None and surface.convex_bodies() is None and surface.open_edges == 0
 
 
