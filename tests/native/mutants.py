@@ -18,6 +18,7 @@ import random
 import re
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import venv
@@ -29,6 +30,7 @@ ROOT = Path(__file__).resolve().parents[2]
 WORK = ROOT / "build" / "mutants"
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.csv")
 NOT_THE_CORE = ("python", "fuzz")
+PATIENCE = 10  # times the processor time that tests may take: a mutant may wait for ever
 ADDRESS_SPACE = 6 << 30  # bytes: a mutant may ask for memory without end
 
 SWAPS = {
@@ -48,7 +50,7 @@ TOKEN = re.compile(
 )
 NOT_RUN = re.compile(r"^\s*(#|assert\(|static_assert|throw |using |template|///|\*|case )")
 
-# Of the tests of the core, those about what no such fault changes: the stub, memory and signals.
+# Tests of the core that such faults cannot change: those of the stub, memory and signals.
 LEFT_OUT = ("test_stub.py", "test_out_of_memory.py", "test_mutants.py")
 NOT_ASKED = "not memory and not ctrl_c and not spawn and not process"
 QUICK = "tests/native/test_recorded_answers.py"
@@ -80,7 +82,7 @@ class Mutant:
 
     @property
     def name(self) -> tuple[str, str, str]:
-        """What it is known by while lines move."""
+        """The mutant without its line number, which changes with the file."""
         return self.file, self.before.strip(), self.after.strip()
 
 
@@ -124,7 +126,7 @@ OPENING, CLOSING = "([{", ")]}"
 
 
 def expression_around(text: str, start: int, end: int) -> tuple[int, int]:
-    """Where the whole expression begins and ends that has an operator or constant at start:end."""
+    """The begin and end of the whole expression around an operator or constant at start:end."""
     depth, left = 0, start
     while left > 0:
         c = text[left - 1]
@@ -216,7 +218,8 @@ class Bench:
         self.texts = {mutant.file: (self.native / mutant.file).read_text() for mutant in mutants.values()}
         if not self.python.exists():
             venv.create(folder / "venv", symlinks=True)
-        # What a .pth names is on the path, but its own .pth are not read: so the tree comes before an editable package.
+        # Folders that a .pth names are on the path, but their own .pth are not read: the tree comes before an editable
+        # package.
         site = next((folder / "venv").glob("lib/python*/site-packages"))
         others = [path for path in sys.path if path.endswith("site-packages")]
         (site / "tree.pth").write_text("\n".join([str(self.tree), *others]) + "\n")
@@ -265,7 +268,7 @@ class Bench:
             if failed := self.complaint(0, tests, seconds=600):
                 raise SystemExit(f"without a mutant: {failed}")
 
-    def complaint(self, number: int, tests: list[str], seconds: float) -> str:
+    def complaint(self, number: int, tests: list[str], seconds: int) -> str:
         """The test that fails with the mutant of that number, or nothing if all pass."""
         left_out = [f"--ignore-glob=*/{name}" for name in LEFT_OUT]
         command = [str(self.python), "-m", "pytest", "-q", "-x", "--tb=no", "-p", "no:cacheprovider"]
@@ -273,9 +276,11 @@ class Bench:
         try:
             done = run(command, self.tree, seconds, check=False, mutant=number)
         except subprocess.TimeoutExpired:
-            return f"no end in {seconds:.0f} s"
+            return f"no end in {PATIENCE * seconds} s"
         if done.returncode == 0:
             return ""
+        if done.returncode == -signal.SIGXCPU:
+            return f"no end in {seconds} s of processor time"
         noticed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
         if noticed:
             return noticed[1]
@@ -290,14 +295,17 @@ class Bench:
         )
 
 
-def run(command, folder, seconds=None, check=True, mutant=None):
+def run(command, folder, seconds=0, check=True, mutant=None):
+    """With a mutant, for so many seconds of processor time, as others may use the machine."""
+
     def limit():
         resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
 
     alone = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OVERLAPPER_MUTANT": f"{mutant or 0}"}
     return subprocess.run(
         command, cwd=folder, env={**os.environ, **alone}, capture_output=True, text=True, errors="replace", check=check,
-        timeout=seconds, preexec_fn=None if mutant is None else limit,
+        timeout=PATIENCE * seconds or None, preexec_fn=None if mutant is None else limit,
     )  # fmt: skip
 
 

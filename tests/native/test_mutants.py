@@ -32,7 +32,7 @@ def test_each_operator_and_constant_is_changed_once():
         "template <int N>",
     ],
 )
-def test_what_is_not_run_is_not_changed(line):
+def test_comments_strings_and_templates_are_not_changed(line):
     assert changed(line) == set()
 
 

@@ -139,7 +139,7 @@ def moving() -> dict[str, dict[str, object]]:
     shapes = [SHAPES[name](rng) for name in names * 2] + [Box((1, 1, 1)), Hull(ball_of_points(rng, 300))]
     where = np.array([vector(rng, 1.6) for _ in shapes])
     turns = np.array([quaternion(rng) for _ in shapes], float)
-    # Of other sizes, and a pile whose boxes touch, high up.
+    # Boxes of other sizes, and a pile of boxes that touch, high up.
     shapes += [Box(np.full(3, 2.0**-k)) for k in range(3, 9)] + [Box((0.25, 0.125, 0.5))] * 6
     where = np.vstack([where, [vector(rng, 1.0) for _ in range(6)], [(k % 2 * 1e-3, 9, 1e3 + k) for k in range(6)]])
     turns = np.vstack([turns, [(0, 0, 0, 1)] * 12])
@@ -162,7 +162,7 @@ def moving() -> dict[str, dict[str, object]]:
 
 
 def crowds() -> dict[str, dict[str, object]]:
-    """What is found of many cases of a sort, all together."""
+    """The answers of all cases of a sort, added up."""
     sorts: dict[str, list[dict[str, object]]] = {}
     for case in plain_crowds():
         sorts.setdefault(case.name, []).append(answer_of(case))

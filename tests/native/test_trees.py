@@ -97,7 +97,7 @@ def test_a_plane_tree_knows_the_plane_that_a_vertex_misses_most(trees, family, s
     found = np.empty(len(vertices))
     trees.misfits(duals, len(duals), vertices, len(vertices), np.inf, found)
     np.testing.assert_allclose(found, most, rtol=1e-12)
-    # Where that is enough, less may be said than the most, but not less than that.
+    # An answer that is enough may be less than the most, but not less than enough.
     enough = float(np.median(most))
     trees.misfits(duals, len(duals), vertices, len(vertices), enough, found)
     np.testing.assert_allclose(found[most < enough * (1 - 1e-12)], most[most < enough * (1 - 1e-12)], rtol=1e-12)

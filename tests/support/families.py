@@ -78,7 +78,7 @@ class Case:
 
     @property
     def placed(self) -> list:
-        """What `overlap` is given."""
+        """The arguments of `overlap`."""
         return [placed(body) for body in self.bodies]
 
     @cached_property
@@ -106,12 +106,12 @@ class Case:
 
     @property
     def size(self) -> float:
-        """Of the smallest body."""
+        """The diagonal of the smallest body's box."""
         return min((float(np.linalg.norm(box[1] - box[0])) for box in self.boxes), default=1.0)
 
     @property
     def extent(self) -> float:
-        """Of all bodies together, wherever they are in the world."""
+        """The diagonal of the box around all bodies, wherever they are in the world."""
         if not self.boxes:
             return 1.0
         lower, upper = np.min([b[0] for b in self.boxes], 0), np.max([b[1] for b in self.boxes], 0)

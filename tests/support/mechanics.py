@@ -186,7 +186,7 @@ class Patch:
         return False, self.centre + (off * REACH / far if far > 0 else 0)
 
     def points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where friction that is distributed acts, (16, 3) from the centroid, and the share of the pressure there."""
+        """The points of distributed friction, (16, 3) from the centroid, and their shares of the pressure."""
         nodes, weights = np.polynomial.legendre.leggauss(4)
         radii, axes = self.radii
         grid = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 2)

@@ -1,5 +1,5 @@
-"""What must hold for `auto`, whatever the case: rules that take a case of families.py with the core's answer and return
-a complaint, or nothing if they are kept."""
+"""Rules that `auto` keeps in every case. A rule takes a case of families.py with the core's answer, and returns a
+complaint, or nothing if the rule is kept."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def reached(case: Case, found: Overlap) -> dict[str, float]:
     return {name.split(" on ")[0]: float(Fraction(by) / Fraction(error)) for name, (by, error) in off.items() if error}
 
 
-# What is exactly true of a case
+# The exact truth of a case
 
 
 def holds_a_ball(case: Case, radius: float) -> bool:
@@ -255,7 +255,7 @@ def errors_of_depth_and_distance_are_small(case: Case, found: Overlap) -> str:
 
 
 def way_bodies(case: Case, found: Overlap) -> list[exact.Polytope | Placed]:
-    """What exact_distance knows how to measure."""
+    """The pair as exact_distance takes it."""
     return [
         placed if isinstance(placed.shape, (Sphere, Capsule, Cylinder, RoundedHull)) else body_of(case, i, placed)
         for i, placed in enumerate(found.shapes)
@@ -320,7 +320,7 @@ def slopes_off(truth: exact.Polytope, body: int, position: exact.Vector, slopes:
 
 
 def hausdorff_distance_at_least(found: Overlap, truth: exact.Polytope) -> float:
-    """Of the hull of the vertices from the common part, by how far each reaches along some directions."""
+    """The distance of the hull of the vertices from the common part, by supports along some directions."""
     ours = np.array([exact.subtract(exact.vector(v), truth.centroid) for v in found.vertices.tolist()], float)
     theirs = np.array([exact.subtract(exact.coordinates(p), truth.centroid) for p in truth.vertices], float)
     return float(np.abs((ours @ DIRECTIONS.T).max(0) - (theirs @ DIRECTIONS.T).max(0)).max())
@@ -489,7 +489,7 @@ def turned_pairs(shapes: tuple[Placed, ...], turn: tuple[int, ...]) -> tuple[lis
 
 
 def to_46_bits(values: np.ndarray) -> np.ndarray:
-    """Of the largest."""
+    """Values rounded to 46 bits of the largest."""
     return coarse(values, 46 - int(np.frexp(np.abs(values).max())[1]))
 
 

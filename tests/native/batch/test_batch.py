@@ -210,7 +210,7 @@ def test_no_more_threads_work_than_are_asked_for(threads):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_remembered_changes_no_bit(seed):
+def test_remembered_rows_have_the_same_bits(seed):
     """Along a walk, with pairs and tolerances that come and go."""
     rng = np.random.default_rng(seed)
     shapes, positions, orientations = scene(rng, 25)
@@ -270,7 +270,7 @@ def test_a_refused_pose_leaves_the_batch_as_it_was():
 
 
 def in_another_process(start, function, *arguments):
-    """What the function returns there. A process that hangs or dies fails the test."""
+    """The answer of the function in another process. A process that hangs or dies fails the test."""
     with multiprocessing.get_context(start).Pool(1) as pool:
         return pool.apply_async(function, arguments).get(timeout=HANG)
 
@@ -363,7 +363,7 @@ def test_a_bad_argument_is_named(change, sentence):
         overlaps([Sphere(1), Sphere(1)], **arguments)
 
 
-def test_what_is_no_shape_is_named():
+def test_an_argument_that_is_not_a_shape_is_named():
     with pytest.raises(TypeError, match=re.escape("shapes[1] must be a shape or an (n, 3) array of points, not str")):
         overlaps([Sphere(1), "ball"], *POSES)
     with pytest.raises(TypeError, match="shapes must be a sequence"):
@@ -379,7 +379,7 @@ def test_half_spaces_that_overlap_without_bound_are_a_value_error():
     assert len(overlaps([ground, HalfSpace([1, 0, 0], 0)], *POSES)) == 0
 
 
-def test_boxes_that_touch_but_for_rounding_are_a_pair():
+def test_boxes_that_touch_within_rounding_are_a_pair():
     cube, beside = Box([1, 1, 1]), np.nextafter(2.0, 3.0)
     assert overlap(cube, Placed(cube, (beside, 0, 0))).status == "touching"
     assert len(overlaps([cube, cube], [[0, 0, 0], [beside, 0, 0]], [[0, 0, 0, 1]] * 2)) == 1

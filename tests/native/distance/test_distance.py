@@ -503,7 +503,7 @@ def test_bare_shapes_and_arrays_stand_at_the_origin():
 
 @pytest.mark.parametrize("function", [overlap, distance, penetration_depth, iou])
 @pytest.mark.parametrize("other", [None, 3, "box", object()])
-def test_what_is_no_shape_is_a_type_error(function, other):
+def test_an_argument_that_is_not_a_shape_is_a_type_error(function, other):
     with pytest.raises(TypeError):
         function(CUBE, other)
 

@@ -119,7 +119,7 @@ def shape_of(rng, kind, size=1.0):
 
 
 def orientations(rng, axes):
-    """Of two bodies whose axes are crossed anyhow, parallel, or nearly so; of any length."""
+    """Quaternions, of any length, of two bodies whose axes are at random, parallel or nearly parallel."""
     one = quaternion(rng)
     if axes == "crossed":
         return one * 10 ** rng.uniform(-3, 3), quaternion(rng)
@@ -173,7 +173,7 @@ def test_the_distance_lies_between_planes_and_points_that_its_error_reaches(kind
             else:
                 a = Placed(shape_of(rng, kind, scale), (0, 0, 0), p)
                 a = Placed(a.shape, up * (float(support(a, -up)) + height), p)
-            # Where caps that are nearly level meet at their rims, GJK sees no more than a cap.
+            # GJK sees only a cap where caps that are nearly level meet at their rims.
             check_distance(a, b, 1e-9 if kind == other == "cylinder" and axes == "nearly parallel" else 1e-12)
 
 
@@ -290,7 +290,7 @@ def test_the_errors_of_bodies_that_touch_bound_how_deep_and_how_far_apart_they_m
 
 
 @pytest.mark.parametrize("seed", [500064, 500112, 500152])
-def test_rims_that_are_parallel_but_for_rounding_leave_the_depth_as_right_as_others(seed):
+def test_the_depth_of_rims_that_are_parallel_within_rounding_is_as_right_as_others(seed):
     found = overlap(*(families.placed(body) for body in families.make("prisms", seed).bodies))
     assert found.depth == pytest.approx(1e-9, rel=1e-5)
     assert found.errors.depth <= 1e-15 * found.depth

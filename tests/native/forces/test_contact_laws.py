@@ -157,7 +157,7 @@ def test_held_bodies_are_pressed_and_do_not_move():
 
 
 def distance_share(found):
-    """What spin is of what slips, by its mean distance."""
+    """The spin at the mean distance, as a fraction of the slip."""
     (patch,) = found.scene.patches()
     rows = found.scene.jacobian((1, 0), patch.found.centroid)
     slip = rows @ found.velocity
@@ -188,8 +188,8 @@ def test_pressure_on_a_blade_has_no_torque_about_the_blade():
     assert 0.1 * HALF * force < abs(across) <= (1 + 1e-9) * HALF * force
 
 
-def test_what_is_inside_another_body_is_pushed_where_it_was_pushed_last():
-    """Nothing says where out is; its force does not depend on how it moves, and has no torque."""
+def test_a_body_inside_another_is_pushed_in_its_last_direction():
+    """Its area vector is zero: the force does not depend on the motion, and has no torque."""
     inside, leaving = (Placed(Sphere(0.02), (x, 0.01, 0)) for x in (0, 0.1))
     links = at_rest(Link(mass=0), Link(), Link())
     velocity = np.arange(18) / 30
@@ -213,7 +213,7 @@ def told(solution):
     return dict(zip(names, solution, strict=True))
 
 
-# What is known of the last step, and how often patches are gone through
+# The last solution, and the number of sweeps
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -111,7 +111,7 @@ def test_a_half_space_far_from_a_tiny_ball_cuts_off_all_or_nothing():
     assert len(inside.vertices) - ridges + len(inside.facets) == 2
 
 
-def test_what_it_calls_apart_and_is_not_is_no_distance_away():
+def test_overlapping_bodies_that_it_calls_separated_have_distance_zero():
     capsule = Placed(Capsule(1, 1), (0, -(2.0**-32), 0))
     corners = [(-0.25, -1.1444091796875e-05, 3.0000000000000004), (1, 3, 0.75), (-3, -0.5, -3)]
     corners += [(3.0000000000000004, 2.9999999999999996, 0.25), (-2.0000000000000004, -2, -0.25)]
@@ -119,7 +119,7 @@ def test_what_it_calls_apart_and_is_not_is_no_distance_away():
     assert overlap(capsule, hull, tolerance=0.1, method="paper").distance == 0
 
 
-def test_what_it_calls_apart_and_touches_has_a_normal():
+def test_touching_bodies_that_it_calls_separated_have_a_normal():
     cylinder = Placed(Cylinder(0.020492852902879832, 0.5), (0.5, 0.5, 0.5), (0.5, 0.5, 0.5, 0.5))
     box = Placed(Box([0.5, 0.5, 0.5]), (0.5, 0.5, 1.0204928529028798))
     answer = overlap(cylinder, box, tolerance=0.0125, method="paper")
@@ -127,7 +127,7 @@ def test_what_it_calls_apart_and_touches_has_a_normal():
     assert answer.normal == pytest.approx([0, 0, -1], abs=1e-9)
 
 
-def test_what_rounding_has_turned_inside_out_is_not_a_solid():
+def test_a_polytope_that_rounding_turned_inside_out_is_not_a_solid():
     thick_and_thin = (
         Placed(Capsule(3, 0.5), (-0.25, 1.75, 1.75)),
         Placed(Capsule(2.3283064365386963e-10, 0.25), (0, 0.75, 0), (3, 5, 11, 3)),

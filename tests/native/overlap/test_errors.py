@@ -71,7 +71,7 @@ def test_bodies_apart_have_no_errors_and_bodies_that_touch_may_share_what_roundi
     assert 0 < found.errors.inertia < 1e-10
 
 
-def test_who_owns_a_facet_that_two_bodies_share_is_in_the_error_of_the_gradient():
+def test_the_error_of_the_gradient_includes_facets_that_both_bodies_may_own():
     flush = overlap(CUBE, Placed(CUBE, (1, 0, 0)))
     assert_allclose(flush.errors.gradient[:, 0], 4 * 2, rtol=1e-6)  # four walls of 2 m² in common
     drum = overlap(Cylinder(1, 2), Placed(Box([2, 2, 0.75]), (0, 0, 0.25)))  # the lid, in the plane of a facet
@@ -82,7 +82,7 @@ def test_who_owns_a_facet_that_two_bodies_share_is_in_the_error_of_the_gradient(
     assert (beyond.errors.gradient < 1e-10).all()
 
 
-def test_the_strip_in_which_surfaces_are_tangent_but_for_rounding_is_in_the_error_of_the_gradient():
+def test_the_error_of_the_gradient_includes_strips_where_surfaces_are_tangent_within_rounding():
     lying = overlap(Capsule(0.5, 2), Box([0.5, 1, 2]))
     slopes = lying.errors.gradient[:, 0]
     assert (slopes > 1e-8).all() and (slopes < 1e-5).all()  # as wide as the root of 1e-16, on either side
@@ -143,13 +143,13 @@ def test_a_tolerance_that_is_not_kept_is_said_by_name():
 
 
 def prism(sides, low):
-    """Of height 1 on the unit circle."""
+    """The corners of a prism of height 1 on the unit circle."""
     angle = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
     return np.vstack([np.column_stack([circle, np.full(sides, z)]) for z in (low, low + 1)])
 
 
-def test_two_lids_of_many_corners_in_one_plane_but_for_rounding_are_one_facet_that_is_shared():
+def test_two_lids_of_many_corners_in_one_plane_within_rounding_are_one_shared_facet():
     found = overlap(Hull(prism(400, 0)), Hull(prism(400, 1 - 1e-6)))
     walls = 1e-6 * 800 * np.sin(np.pi / 400)
     assert found.errors.gradient[0, 0] == pytest.approx(walls, rel=1e-2)

@@ -1,4 +1,4 @@
-"""What holds for every pair and every group of bodies, however hard, against the exact truth."""
+"""The rules that every pair and every group of bodies keeps, however hard, against the exact truth."""
 
 import csv
 from fractions import Fraction

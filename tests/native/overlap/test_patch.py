@@ -1,4 +1,4 @@
-"""What is said of the patch that two bodies share a border along: its area vector, centre, second moments and mean
+"""The patch within the line where the surfaces of two bodies cross: its area vector, centre, second moments and mean
 distance from the centroid."""
 
 import operator
@@ -59,7 +59,7 @@ def test_patches_of_simple_bodies(a, b, patch):
     assert_allclose(answer.patch_centre, answer.centroid, atol=1e-12)
 
 
-def test_of_a_plate_pierced_the_patch_is_what_two_lines_leave():
+def test_the_patch_of_a_pierced_plate_is_the_difference_of_two_discs():
     answer = overlap(Placed(Sphere(0.5), (1, 2, 0.4)), Box([9, 9, 1e-3]))
     assert len(answer.patch) == 2
     assert answer.patch_area == pytest.approx([0, 0, np.pi * (0.401**2 - 0.399**2)], abs=1e-12)
@@ -284,7 +284,7 @@ def test_a_round_body_inside_another_has_no_patch_but_rounding():
                 assert found.patch_centre is found.patch_distance is None
 
 
-def test_where_there_is_no_patch():
+def test_bodies_apart_inside_each_other_or_three_have_no_patch():
     apart, inside = overlap(CUBE, Placed(CUBE, (3, 0, 0))), overlap(Placed(Sphere(0.1), (0.1, 0, 0)), CUBE)
     for answer in (apart, inside):
         assert_array_equal(answer.patch_area, np.zeros(3))
@@ -313,8 +313,8 @@ def test_patches_of_a_batch_are_those_of_its_pairs():
     assert nothing.patch_distance.shape == (0,)
 
 
-def test_patches_of_a_batch_have_the_bits_of_single_answers_whatever_way_they_came():
-    """Of rows that their batch remembers, of rows of a batch that is gone, and of few of them."""
+def test_patches_of_a_batch_have_the_bits_of_single_answers_by_every_way():
+    """Rows that their batch remembers, rows of a batch that is gone, and selected rows."""
     rng = np.random.default_rng(3)
     shapes, pairs = [FLOOR], []
     bodies = [(make, depth) for make in SHAPES for depth in (0.3, 1e-2, 1e-5)]

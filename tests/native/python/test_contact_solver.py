@@ -1,4 +1,4 @@
-"""The solver of contact forces by itself: its law in closed form, where links go, and what it refuses."""
+"""The solver of contact forces by itself: its law in closed form, the motion of links, and refused arguments."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ TURN = (0.0, 0.0, 0.0, 1.0)
 
 
 def solver_of(*bodies):
-    """Of single links."""
+    """A solver for bodies of one link each."""
     count = len(bodies)
     masses, inertias = zip(*bodies)
     return _core.ContactSolver([-1] * count, [0] * count, np.zeros((count, 3)), np.zeros((count, 3)), masses, inertias)
@@ -79,7 +79,7 @@ def test_links_go_on_as_they_move():
         ({"axes": np.zeros((1, 3))}, "links must have a row in each array"),
     ],
 )
-def test_links_that_are_none_are_refused(wrong, said):
+def test_invalid_links_are_refused(wrong, said):
     given = {
         "parents": [-1, 0],
         "joints": [0, 1],
@@ -104,7 +104,7 @@ def test_links_that_are_none_are_refused(wrong, said):
         ({"friction": [[1, 2]]}, "friction must have 1 numbers, not 2"),
     ],
 )
-def test_places_that_are_none_are_refused(wrong, said):
+def test_invalid_places_are_refused(wrong, said):
     poses = [(0, 0, 0), (0, 0, HALF - 1e-4)]
     given = {
         "frames": [(pose, TURN) for pose in poses],
@@ -118,7 +118,7 @@ def test_places_that_are_none_are_refused(wrong, said):
         solver_of(HELD, FREE).place(**(given | wrong))
 
 
-def test_steps_that_are_none_are_refused():
+def test_invalid_steps_are_refused():
     solver, _ = placed(1e-4)
     rest, undamped = np.zeros(12), np.array([False])
     with pytest.raises(ValueError, match=r"^velocity must have 12 numbers, not 6$"):

@@ -164,7 +164,7 @@ def test_an_ellipsoid_says_what_it_is():
         (1e25, "half_axes must be between 1e-25 and 1e25 m"),
     ],
 )
-def test_half_axes_that_are_none_are_refused(axis, value, message):
+def test_invalid_half_axes_are_refused(axis, value, message):
     half_axes = np.ones(3)
     half_axes[axis] = value
     with pytest.raises(ValueError, match=message):

@@ -384,14 +384,14 @@ def test_numbers_that_make_no_shape_are_a_value_error(make, arguments, name):
         (lambda: Hull([["a", "b", "c"]] * 4), "vertices"),
     ],
 )
-def test_what_is_no_number_is_refused_by_name(call, name):
+def test_an_argument_that_is_not_a_number_is_refused_by_name(call, name):
     with pytest.raises((TypeError, ValueError), match=name) as caught:
         call()
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("other", ["sphere", None, 3.0, object()])
-def test_what_is_no_shape_cannot_be_placed(other):
+def test_only_shapes_can_be_placed(other):
     with pytest.raises(TypeError, match="shape"):
         Placed(other)
 
