@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 from families import prism
-from ways import AROUND, CUBE, FLOOR, TURN, TYPICAL
 
 from overlapper import Box, Hull, Overlaps, Placed, overlap, overlaps, random_polytope
+from speed.ways import AROUND, CUBE, FLOOR, TURN, TYPICAL
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "how.md").read_text(encoding="utf-8")
