@@ -15,7 +15,7 @@ import numpy as np
 from overlapper import Overlap, Placed
 from overlapper.shapes.drawing import triangles
 from overlapper.shapes.table import facts
-from overlapper.viewer.labels import Bodies, Contact
+from overlapper.viewer.labels import Bodies, Contact, key_of
 from overlapper.viewer.look import FIELD_OF_VIEW, Array
 
 GROUND = 30.0  # times as large as all other bodies: a ground. The plane of pybullet is a ground for bodies under 9 m.
@@ -91,7 +91,7 @@ class Framing:
             box = np.asarray(each.overlap.bounds)
             if _extent(box) >= self._ground_size:
                 continue  # both are grounds
-            pair = each.bodyA, each.linkA, each.shapeA, each.bodyB, each.linkB, each.shapeB
+            pair = key_of(each)
             self._met |= {each.bodyA, each.bodyB}
             self._shared[pair] = around([self._shared.get(pair, box), box])
             if self.largest is None or each.overlap.volume > self.largest.volume:

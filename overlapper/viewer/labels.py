@@ -11,6 +11,7 @@ from overlapper import Overlap, Placed
 ROOT = "/overlapper/bodies"
 Pair = tuple[str, str]
 LinkName = tuple[str, str]  # body and link
+Key = tuple[int, ...]  # bodyA, linkA, shapeA, bodyB, linkB, shapeB
 
 # meshcat's tree and panel look names up in JavaScript objects, which have these names from the start. "<object>" is
 # meshcat's name for the drawing at a node.
@@ -71,9 +72,8 @@ def body_paths(bodies: Bodies) -> list[str]:
     return [f"{ROOT}/{'/'.join(names[body, link])}/{shape}" for body, link, shape in bodies.keys]
 
 
-def pairs(bodies: Bodies, contacts: Iterable[Contact]) -> dict[Pair, Overlap]:
-    """The overlapping pairs by name. A link or shape is named only if its body or link has more than one."""
-    return {pair: contact.overlap for pair, _, contact in labelled(bodies, contacts)}
+def key_of(contact: Contact) -> Key:
+    return contact.bodyA, contact.linkA, contact.shapeA, contact.bodyB, contact.linkB, contact.shapeB
 
 
 def labelled(bodies: Bodies, contacts: Iterable[Contact]) -> Iterator[tuple[Pair, tuple[LinkName, LinkName], Contact]]:

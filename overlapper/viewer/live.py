@@ -19,9 +19,9 @@ import numpy as np
 
 from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker
 from overlapper.viewer.framing import Framing
-from overlapper.viewer.labels import Bodies, Contact, body_paths, labelled
+from overlapper.viewer.labels import Bodies, Contact, body_paths, key_of, labelled
 from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, volume_text
-from overlapper.viewer.pressure import DrawnForces, Forces, Scale, force_text, key_of
+from overlapper.viewer.pressure import DrawnForces, Forces, Scale, force_text
 from overlapper.viewer.recording import Recording
 from overlapper.viewer.stage import Stage, matrix, set_room
 
@@ -83,20 +83,14 @@ class Viewer:
             if self._server:
                 self._framing.see(bodies, contacts)
                 set_room(self.visualizer, self._framing.whole())  # nothing has moved yet
-        seen = self._seen(self._stage, self._framing, bodies, contacts, forces)
+        if forces is not None:
+            self._framing.see(bodies, contacts)
+        drawn = forces if self._looks[1].forces else None
+        seen = DrawnForces.of(bodies, contacts, drawn, 0.15 * self._stage.size, self._framing, self._scale)
+        self._scale = seen.scale if seen.arrows else self._scale
         self._show_bodies(self._stage, bodies)
         self._show_overlaps(self._stage, bodies, contacts, seen)
         self._show_forces(self._stage, seen)
-
-    def _seen(
-        self, stage: Stage, framing: Framing, bodies: Bodies, contacts: list[Contact], forces: Forces | None
-    ) -> DrawnForces | None:
-        if forces is None or not self._looks[1].forces:
-            return None
-        framing.see(bodies, contacts)
-        seen = DrawnForces.of(bodies, contacts, forces, 0.15 * stage.size, framing, self._scale)
-        self._scale = seen.scale
-        return seen
 
     def _show_bodies(self, stage: Stage, bodies: Bodies) -> None:
         paths, colors = body_paths(bodies), bodies.colors
@@ -113,22 +107,19 @@ class Viewer:
                 self.visualizer[path].set_transform(pose)
                 self._poses[path] = pose
 
-    def _show_overlaps(self, stage: Stage, bodies: Bodies, contacts: list[Contact], seen: DrawnForces | None) -> None:
+    def _show_overlaps(self, stage: Stage, bodies: Bodies, contacts: list[Contact], seen: DrawnForces) -> None:
         for pair in self._pairs:
             self.visualizer[_path(pair)].delete()
         self._pairs = set()
         for pair, _, contact in labelled(bodies, contacts):
-            press = seen.pressed.get(key_of(contact)) if seen else None
-            drawn = stage.overlap(contact.overlap, press, seen.scale if seen else None)
+            drawn = stage.overlap(contact.overlap, seen.pressed.get(key_of(contact)), seen.scale)
             self.visualizer[f"{_path(pair)}/{volume_text(contact.overlap.volume)}"].set_object(drawn)
             self._pairs.add(pair)
 
-    def _show_forces(self, stage: Stage, seen: DrawnForces | None) -> None:
+    def _show_forces(self, stage: Stage, seen: DrawnForces) -> None:
         if self._pushing:
             self.visualizer[FORCES].delete()
-        self._pushing = seen is not None and bool(seen.arrows)
-        if seen is None:
-            return
+        self._pushing = bool(seen.arrows)
         scale = f"{FORCES}/{seen.scale}, {seen.scale.pressure}"
         for each in seen.arrows:
             pair = "-".join(".".join(filter(None, link)) for link in each.links)

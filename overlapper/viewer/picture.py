@@ -18,7 +18,7 @@ from overlapper.install import hint
 from overlapper.quaternion import rotated
 from overlapper.shapes.drawing import triangles
 from overlapper.viewer.framing import Framing, View
-from overlapper.viewer.labels import Bodies, Contact, Pair, labelled
+from overlapper.viewer.labels import Bodies, Contact, Pair, key_of, labelled
 from overlapper.viewer.look import (
     BODIES,
     BOTTOM,
@@ -32,7 +32,7 @@ from overlapper.viewer.look import (
     to_draw,
     volume_text,
 )
-from overlapper.viewer.pressure import FORCE, FRICTION, DrawnForces, Forces, Press, Scale, colors, force_text, key_of
+from overlapper.viewer.pressure import FORCE, FRICTION, DrawnForces, Forces, Press, Scale, colors, force_text
 from overlapper.viewer.primitives import BACK, BOTH, Dots, Drawing, Faces, Primitive
 from overlapper.viewer.raster import painted
 from overlapper.whole_file import beside
@@ -80,22 +80,18 @@ def save(
     picture = _Picture(_Camera.of(framing, here.side(), near))
     drawing = Drawing(framing.center, framing.size, framing.is_ground, *looks)
     height = 2 * picture.camera.distance * SLOPE  # m, seen where the camera looks at
-    drawn = None
-    if forces is not None and looks[1].forces:
-        drawn = DrawnForces.of(bodies, contacts, forces, height / 4, framing)
+    drawn = DrawnForces.of(bodies, contacts, forces if looks[1].forces else None, height / 4, framing)
     for key, placed in zip(bodies.keys, bodies.placed, strict=True):
         picture.add(drawing.body(placed, bodies.colors[key[:2]]), SOLID, placed.position, placed.orientation)
     table = []
     for pair, _, contact in shared:
-        press = drawn.pressed.get(key_of(contact)) if drawn else None
+        press = drawn.pressed.get(key_of(contact))
         coarse = to_draw(contact.overlap, framing.size)
-        primitives = drawing.overlap(coarse, press, drawn.scale if drawn else None)
-        picture.add(primitives, SHARED, np.asarray(coarse.centroid))
+        picture.add(drawing.overlap(coarse, press, drawn.scale), SHARED, np.asarray(coarse.centroid))
         table.append((pair, contact.overlap, press))
-    if drawn:
-        for arrow in drawn.arrows:
-            picture.add(drawing.force(arrow, drawn.scale, 2 * height), SHINING, arrow.start)
-    picture.save(Path(path), title, table, drawn.scale if drawn else None)
+    for arrow in drawn.arrows:
+        picture.add(drawing.force(arrow, drawn.scale, 2 * height), SHINING, arrow.start)
+    picture.save(Path(path), title, table, drawn.scale if drawn.pressed else None)
     return Path(path)
 
 

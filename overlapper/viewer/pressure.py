@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from overlapper import Overlap
 from overlapper.shapes.drawing import polytope_edges, triangles
 from overlapper.viewer.framing import Framing
-from overlapper.viewer.labels import Bodies, Contact, LinkName, labelled
+from overlapper.viewer.labels import Bodies, Contact, Key, LinkName, key_of, labelled
 from overlapper.viewer.look import Array, channels, to_draw
 
 COLORS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21908c", "#27ad81", "#5dc863", "#aadc32", "#fde725")
@@ -26,8 +26,6 @@ STEP = 1 / 25  # of the scale: a triangle is cut in four if its pressures differ
 HALVINGS = 4  # the most times that the sides of a triangle are halved
 RIM = 0.01  # of the way to the middle: pressures of a facet are taken so far within its rim, where they may jump to 0
 ALONG = 1e-6  # the sine of the least angle between a facet and the pressures by which the facet ends a depth
-
-Key = tuple[int, ...]  # bodyA, linkA, shapeA, bodyB, linkB, shapeB
 
 
 class Forces(Protocol):
@@ -78,10 +76,6 @@ def presses(forces: Forces | None) -> dict[Key, Press]:
         tuple(key): Press(forces.force[row], torque[row], forces.energy[row], slip[row], forces.normal[row], stiffness)
         for row, (key, stiffness) in enumerate(zip(forces.pairs.tolist(), forces.stiffness.tolist(), strict=True))
     }
-
-
-def key_of(contact: Contact) -> Key:
-    return contact.bodyA, contact.linkA, contact.shapeA, contact.bodyB, contact.linkB, contact.shapeB
 
 
 def depths(overlap: Overlap, normal: Array, points: Array) -> Array:

@@ -58,14 +58,15 @@ class Primitive:
 class Faces(Primitive):
     """Convex `facets`, rings of indices, counter-clockwise from outside, over `points` (n, 3).
 
-    A face shows `glow` times its colour in the dark, and in full light `lit` times its colour besides.
+    A face shows `glow` times its colour in the dark, and in full light `lit` times its colour besides; by default its
+    own colour in any light.
     `normals` (n, 3) are the directions to shade by; None if facets are flat.
     """
 
     facets: Facets
     normals: Array | None = None
-    glow: float = 0.0
-    lit: float = 1.0
+    glow: float = 1.0
+    lit: float = 0.0
     side: int = FRONT
 
     def shade(self, normals: Array) -> Array:
@@ -111,6 +112,7 @@ class Drawing:
         shape = pickle.dumps(placed.shape)
         solid = self._known[shape] = self._known.get(shape) or tessellation(placed.shape)
         skin = partial(Faces, points=solid.vertices, facets=solid.faces, opacity=look.opacity, visible=look.faces)
+        skin = partial(skin, glow=0.0, lit=1.0)
         front = channels(look.front) if look.front else own
         inside = [skin(color=channels(look.back), side=BACK, name="inside")] if look.back else []
         return [
@@ -156,7 +158,7 @@ class Drawing:
             own = channels(look.front) if look.front else owner_color(owner)
             if look.opacity < 1:
                 back = channels(look.back) if look.back else 0.5 * own
-                drawn.append(skin(color=back, side=BACK, glow=1.0, lit=0.0, order=0.5))
+                drawn.append(skin(color=back, side=BACK, order=0.5))
             # Mostly of its own light, so that the owner is known from the shaded side, too.
             drawn.append(skin(color=own, glow=0.4, lit=0.7, order=1))
         return drawn
@@ -190,8 +192,6 @@ def _plane(seen: Ground, look: Look) -> list[Primitive]:
         color=np.array(GROUND),
         opacity=GROUND_OPACITY,
         strength=seen.strength(seen.vertices),
-        glow=1.0,
-        lit=0.0,
         side=BOTH,
         order=-2,
         name="faces",
@@ -217,8 +217,6 @@ def _pressed(overlap: Overlap, press: Press, scale: Scale, opacity: float) -> Fa
         facets=np.arange(len(corners)).reshape(-1, 3),
         color=colors(found, scale.top),
         opacity=opacity,
-        glow=1.0,
-        lit=0.0,
         order=1,
     )
 
@@ -234,8 +232,6 @@ def _cones(upright: Sequence[Tessellation], along: Array, color: Sequence[float]
         points=np.concatenate([each.vertices for each in upright]) @ rotation_from_z(along / np.linalg.norm(along)).T,
         facets=np.concatenate([each.faces + first for each, first in zip(upright, firsts)]),
         color=np.array(color),
-        glow=1.0,
-        lit=0.0,
         order=order,
         through=True,
     )

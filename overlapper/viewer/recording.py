@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from overlapper import Overlap, Placed
 from overlapper.shapes.table import facts
 from overlapper.viewer.framing import Framing, View
-from overlapper.viewer.labels import ROOT, Bodies, Contact, LinkName, Pair, body_paths, labelled
+from overlapper.viewer.labels import ROOT, Bodies, Contact, LinkName, Pair, body_paths, key_of, labelled
 from overlapper.viewer.look import (
     BODIES,
     INK,
@@ -46,7 +46,6 @@ from overlapper.viewer.pressure import (
     Press,
     arrows,
     deepest,
-    key_of,
     presses,
     rounded_up,
     usual,

@@ -13,7 +13,18 @@ from overlapper import Overlap, Placed
 from overlapper.install import hint
 from overlapper.shapes.drawing import triangles
 from overlapper.viewer.framing import Framing, View
-from overlapper.viewer.look import AMBIENT, BOTTOM, DIFFUSE, FIELD_OF_VIEW, LIGHT, TOP, Array, Look, to_draw
+from overlapper.viewer.look import (
+    AMBIENT,
+    BOTTOM,
+    DIFFUSE,
+    FIELD_OF_VIEW,
+    LIGHT,
+    TOP,
+    Array,
+    Look,
+    hexadecimal,
+    to_draw,
+)
 from overlapper.viewer.pressure import Arrow, Press, Scale
 from overlapper.viewer.primitives import Dots, Drawing, Faces, Lines, Primitive
 
@@ -22,6 +33,9 @@ try:
     from meshcat.transformations import quaternion_matrix, rotation_matrix, translation_matrix
 except ImportError as missing:
     raise ImportError(f"overlapper.viewer needs {hint('meshcat')}") from missing
+
+
+ORIGIN = np.zeros(3)
 
 
 class Stage:
@@ -36,22 +50,22 @@ class Stage:
         """A shape in its own frame. Equal shapes share their geometries, which a page keeps once."""
         primitives = self.drawing.body(placed, color)
         if self.drawing.ground(placed):
-            return _group(primitives)
+            return Group(primitives)
         shape = pickle.dumps(placed.shape)
         if shape not in self._known:
             # Faces, their inside and the dots at their corners share one geometry.
             known: dict[int, _Buffers] = {}
             self._known[shape] = [known.setdefault(id(each.points), _Buffers(each)) for each in primitives]
-        return _group(primitives, self._known[shape])
+        return Group(primitives, buffers=self._known[shape])
 
     def overlap(self, overlap: Overlap, press: Press | None = None, scale: Scale | None = None) -> Group:
         """An overlap by its owners; with the forces of the pair and a scale, by its pressures."""
         coarse = to_draw(overlap, self.size)
-        return _placed(self.drawing.overlap(coarse, press, scale), np.asarray(coarse.centroid))
+        return Group(self.drawing.overlap(coarse, press, scale), np.asarray(coarse.centroid))
 
     def force(self, arrow: Arrow, scale: Scale) -> Group:
         """The force of a pair of links."""
-        return _placed(self.drawing.force(arrow, scale, self.size), arrow.start)
+        return Group(self.drawing.force(arrow, scale, self.size), arrow.start)
 
 
 def set_room(visualizer: Any, view: View) -> None:
@@ -78,46 +92,35 @@ def set_room(visualizer: Any, view: View) -> None:
 
 
 class Group(geometry.Object):  # type: ignore[misc]
-    """Several objects in one node of the tree, each with more attributes of three.js's object format."""
+    """Primitives in one node of the tree, about a position, m; with `buffers`, their geometries are known."""
 
-    def __init__(self, *parts: tuple[geometry.Object, dict[str, Any]]) -> None:
+    def __init__(
+        self, primitives: Sequence[Primitive], position: Array = ORIGIN, buffers: Sequence[_Buffers] = ()
+    ) -> None:
         geometry.SceneElement.__init__(self)
-        self.parts = parts
+        kinds = {Faces: geometry.Mesh, Lines: geometry.LineSegments, Dots: geometry.Points}
+        shapes = buffers or list(map(_Buffers, primitives))
+        self._objects = [kinds[type(each)](shape, _material(each)) for each, shape in zip(primitives, shapes)]
+        self._more = [
+            {"name": each.name, "visible": each.visible, "renderOrder": each.order, "position": position.tolist()}
+            for each in primitives
+        ]
 
     def lower(self) -> dict[str, Any]:
-        lowered = [part.lower() for part, _ in self.parts]
+        lowered = [each.lower() for each in self._objects]
+        for each, more in zip(lowered, self._more):
+            del each["object"]["matrix"]  # the identity, which three.js would take instead of the position
+            each["object"] |= more
         return {
             "metadata": {"version": 4.5, "type": "Object"},
             "geometries": _once(each for part in lowered for each in part["geometries"]),
             "materials": _once(each for part in lowered for each in part["materials"]),
-            "object": {
-                "uuid": self.uuid,
-                "type": "Group",
-                "children": [_with(part["object"], more) for part, (_, more) in zip(lowered, self.parts, strict=True)],
-            },
+            "object": {"uuid": self.uuid, "type": "Group", "children": [part["object"] for part in lowered]},
         }
-
-
-def _with(child: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
-    """The object with more attributes; without meshcat's matrix, the identity, which would replace a position."""
-    return {key: value for key, value in child.items() if key != "matrix"} | more
 
 
 def _once(elements: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     return list({each["uuid"]: each for each in elements}.values())
-
-
-def _placed(primitives: Sequence[Primitive], position: Array) -> Group:
-    return Group((_group(primitives), {"position": position.tolist()}))
-
-
-def _group(primitives: Sequence[Primitive], buffers: Sequence[_Buffers] = ()) -> Group:
-    parts: list[tuple[geometry.Object, dict[str, Any]]] = []
-    for each, shape in zip(primitives, buffers or map(_Buffers, primitives)):
-        kind = {Faces: geometry.Mesh, Lines: geometry.LineSegments, Dots: geometry.Points}[type(each)]
-        more = {"name": each.name, "visible": each.visible, "renderOrder": each.order}
-        parts.append((kind(shape, _material(each)), more))
-    return Group(*parts)
 
 
 def _material(primitive: Primitive) -> geometry.Material:
@@ -187,5 +190,4 @@ def matrix(placed: Placed) -> Array:
 
 def rgb(color: Sequence[float] | Array) -> int:
     """Red, green and blue in 0..1 as three.js's one number."""
-    red, green, blue = (round(255 * min(max(part, 0.0), 1.0)) for part in color[:3])
-    return red << 16 | green << 8 | blue
+    return int(hexadecimal(np.clip(color[:3], 0, 1))[1:], 16)

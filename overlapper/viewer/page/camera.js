@@ -1,6 +1,6 @@
 // Where the scene is seen from, and what is clicked upon in it.
 
-// In the page's own frame, where the camera moves: y is up and the middle of what is framed is the origin.
+// The camera moves in the page's own frame: y is up, and the middle of what is framed is the origin.
 function onPage(point) {
   viewer.scene.updateMatrixWorld();
   return viewer.scene.localToWorld(new THREE.Vector3(...point));
@@ -102,7 +102,7 @@ function pickAt(x, y) {
   ray.setFromCamera(point, viewer.camera);
   const [hit] = ray.intersectObject(drawn.faces);
   if (hit) return sighted[lastUpTo(triangles, hit.faceIndex)];
-  // A small one is hard to hit: what is nearest to the click.
+  // A small overlap is hard to hit: the one nearest to the click is meant.
   let best = -1, nearest = 14;
   for (const s of sighted) {
     const at = onPage(measured(s).centroid).project(viewer.camera);

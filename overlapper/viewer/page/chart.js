@@ -1,7 +1,7 @@
-// What is shared over time: of each pair or of all, as volume, as depth or as force, linear or logarithmic.
+// The chart over time: volume, depth or force of each pair or of all pairs, linear or logarithmic.
 
 const LEFT = 60, RIGHT = 12, TOP = 20, BOTTOM = 20;  // px; the slider's ends are at the same places
-const CURVES = 200;  // the largest; among more, none would be told from another
+const CURVES = 200;  // the largest: more curves cannot be told apart
 const kind = {by: "volume", total: false, logarithmic: false};
 let curves = [], drawnCurves = [], largest = 0, smallest = 0, unit = [];  // [frame, value], ... of each pair, or one of all
 const charted = ["volume", "depth", ...film.forces ? ["force"] : []];
@@ -26,7 +26,7 @@ function traceAll() {
   }
   const values = curves.flatMap(curve => curve.map(([, value]) => value)).filter(Boolean);
   largest = values.reduce((a, b) => Math.max(a, b), 0);
-  // As small as is of interest: nobody looks for a millionth of the largest.
+  // The smallest value shown: a millionth of the largest is of no interest.
   smallest = 10 ** Math.floor(Math.log10(Math.max(values.reduce((a, b) => Math.min(a, b), largest), largest * 1e-6)));
   unit = kind.by === "depth" ? ["mm", 1e-3] : inUnit(largest, kind.by === "volume" ? units : newtons, 3).slice(1);
   for (const curve of curves) curve.peak = curve.reduce((peak, [, value]) => Math.max(peak, value), 0);
@@ -34,7 +34,7 @@ function traceAll() {
   awaitChart();
 }
 
-// Once before the next picture, however much has changed.
+// Draws once before the next picture, however many changes there were.
 let awaited = false;
 function awaitChart() {
   if (!awaited) requestAnimationFrame(sizeChart);
@@ -189,7 +189,7 @@ chart.onpointerdown = event => {
 };
 new ResizeObserver(awaitChart).observe(chart);
 
-// Pairs of buttons, of which one is pressed.
+// Groups of buttons; one of each group is pressed.
 function chartOf(change) {
   Object.assign(kind, change);
   const pressed = {"of-volume": kind.by === "volume", "of-depth": kind.by === "depth", "per-pair": !kind.total};

@@ -4,7 +4,7 @@ const byId = id => document.getElementById(id);
 const [slider, play, speed, numbers, chart, pane] = ["slider", "play", "speed", "numbers", "chart", "meshcat-pane"].map(byId);
 const output = document.querySelector("#bar output");
 
-// What is told in the page's texts, which come from files of others, is always text.
+// Texts come from files of others, so they are never taken for HTML.
 function element(kind, properties = {}, ...children) {
   const made = Object.assign(document.createElement(kind), properties);
   made.append(...children);
@@ -20,7 +20,7 @@ function unpacked(id) {
   return new Response(packed.stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
 }
 
-// The heading with the arrays in it; these come byte by byte, all first bytes before all second ones.
+// The heading with its arrays. The bytes of an array come in the order: all first bytes, all second bytes, ...
 function read(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const film = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
@@ -35,7 +35,7 @@ function read(buffer) {
   return film;
 }
 
-// The sums of all counts before each.
+// For each count, the sum of the counts before it.
 function starts(counts) {
   const sums = new Uint32Array(counts.length + 1);
   for (let i = 0; i < counts.length; i++) sums[i + 1] = sums[i] + counts[i];
@@ -44,7 +44,7 @@ function starts(counts) {
 
 const viewer = new MeshCat.Viewer(pane);
 viewer.gui.domElement.remove();  // the panels are in its place
-const known = new Map();  // geometries by uuid: those used again come without their data
+const known = new Map();  // geometries by uuid: a geometry that is used again comes without its data
 for (const command of JSON.parse(new TextDecoder().decode(await unpacked("commands")))) {
   for (const geometry of command.object?.geometries ?? []) {
     geometry.data ??= known.get(geometry.uuid);
@@ -70,13 +70,13 @@ film.polytope_previous.forEach((like, k) => {
   for (let i = 3 * firstVertex[k]; i < 3 * firstVertex[k + 1]; i++) film.vertices[i] += film.vertices[i + shift];
 });
 
-// What a sighting, a pair in a frame, has for numbers; the centroid is in the world.
+// The numbers of a sighting, which is a pair in a frame; the centroid is in the world.
 function measured(sighting) {
   const [volume, error, depth, area, x, y, z, ...normal] = Array.from({length: 10}, (_, k) => film.numbers[k * count + sighting]);
   return {volume, error, depth, area, centroid: [x, y, z].map((part, k) => part + center[k]), normal};
 }
 
-// What the two do to each other, of a film with forces; null of two that are not said to.
+// The forces of a sighting; null if the film has none for it.
 function pressOf(sighting) {
   if (!film.forces) return null;
   const [x, y, z, torque, energy, slip, u, v, w, stiffness] = Array.from({length: 10}, (_, k) => film.presses[k * count + sighting]);

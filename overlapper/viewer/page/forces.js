@@ -1,4 +1,4 @@
-// Forces, of a film that has some: pressures as colours of what is shared, and an arrow for each pair of links.
+// Forces, if the film has them: pressures as colours of overlaps, and an arrow for each pair of links.
 
 const forcesSeen = () => film.forces !== null && looks.overlaps.forces;
 const ramp = film.forces?.colors.map(color => paint(color).toArray()) ?? [];
@@ -8,7 +8,7 @@ function colored(pressure) {
   return ramp[below].map((part, k) => part + (at - below) * (ramp[below + 1][k] - part));
 }
 
-// The pressure at a point about a polytope's middle: stiffness times how far it reaches along the normal, there.
+// The pressure at a point about a polytope's middle: stiffness times the polytope's extent along the normal there.
 function pressureIn(sighting, polytope) {
   const press = pressOf(sighting), total = film.owners.length, planes = [];
   const unit = film.polytope_frame[3 * film.polytope_previous.length + polytope];
@@ -29,7 +29,7 @@ function pressureIn(sighting, polytope) {
 }
 
 // A triangle is cut in four until pressures differ by little in each; `at` has its corners about the polytope's middle.
-// On the very rim of a facet there may be no pressure: it is that of a little further in.
+// Pressures are taken a little within the rim of a facet, where they may jump to 0.
 function paintFacet(ring, middle, pressure, halvings) {
   const facet = [0, 1, 2].map(k => ring.reduce((sum, point) => sum + point[k], 0) / ring.length);
   const within = point => pressure(point.map((part, k) => part + 0.01 * (facet[k] - part)));
@@ -48,7 +48,7 @@ function paintPressure(at, middle, pressure, halvings) {
   paintPressure(half, middle, pressure, halvings - 1);
 }
 
-// Sums by pairs of links, on one of the two, the largest first: force, friction, and where they are in the mean.
+// Sums of force and friction on one of two links, the largest first, and the mean of their places.
 function pushes(some) {
   const sums = new Map();
   for (const sighting of some) {
@@ -70,27 +70,27 @@ function pushes(some) {
   return [...sums.values()].sort((a, b) => Math.hypot(...b.force) - Math.hypot(...a.force));
 }
 
-// How much is seen from bottom to top, in m, where the camera turns about.
+// The height that is seen, in m, at the point that the camera turns about.
 function seenHeight() {
   return 2 * viewer.camera.position.distanceTo(viewer.controls.target) * Math.tan(viewer.camera.fov * Math.PI / 360);
 }
 
-// To one digit.
+// Rounded to one digit.
 function roundedUp(value) {
   const power = 10 ** Math.floor(Math.log10(value));
   return power * Math.ceil(value / power * (1 - 1e-9));
 }
 
-// A power of ten.
+// Rounded to a power of ten.
 function inLengths(length) {
   return length >= 0.999 ? `${plain(length, 1)} m` : length >= 0.00999 ? `${plain(100 * length, 1)} cm` : `${plain(1000 * length, 1)} mm`;
 }
 
 let fitted = 0, about = null, pushed = [];  // the height that arrows are drawn for, where they are from, and what they show
-const [LONGEST, SHORTEST] = [0.45, 0.01];  // of that height: what is shorter would be a speck
-const MANY = 40;  // arrows, of which more are thinner
+const [LONGEST, SHORTEST] = [0.45, 0.01];  // of that height: a shorter arrow would be a speck
+const MANY = 40;  // arrows: if there are more, they are thinner
 
-// As long as it suits what is seen: the usual force is a quarter of it at most.
+// The length of an arrow: the usual force is a quarter of the height at most.
 function drawForces(middle) {
   [about, fitted] = [middle, seenHeight()];
   batches.forces.length = batches.friction.length = 0;
@@ -106,7 +106,7 @@ function drawForces(middle) {
   }
 }
 
-// Before each picture: whoever comes near sees arrows of a scale for there.
+// Called before each picture, as arrows follow the distance of the camera.
 function fitForces() {
   if (shown < 0 || !forcesSeen() || Math.abs(seenHeight() / fitted - 1) < 0.02) return;
   drawForces(about);

@@ -2,7 +2,7 @@
 
 const ROWS = 200, FEW = 12, columns = film.forces ? 3 : 2;
 const [rows, heading] = [document.querySelector("#list tbody"), document.querySelector("#list th")];
-const opened = new Map();  // whether a group is open, by its key; those that nobody touched are if there are few
+const opened = new Map();  // whether a group is open, by its key; the others are open if there are few
 let most = 0;
 for (let frame = 0; frame <= last; frame++) most = Math.max(most, film.sighting_start[frame + 1] - film.sighting_start[frame]);
 
@@ -26,7 +26,7 @@ function grouped(some, keys) {
   return [...groups.values()].sort((a, b) => b.volume - a.volume);
 }
 
-// A part of a body is called by what its name has after that of the body; one shape of several has a number.
+// A link is called by its name without the name of its body. A shape has a number if there are several.
 function within(name, whole) {
   const rest = name.startsWith(`${whole}.`) ? name.slice(whole.length + 1) : name;
   return /^\d+$/.test(rest) ? `part ${rest}` : rest;
@@ -148,7 +148,7 @@ if (film.forces) {
   document.querySelector("#list thead tr").append(element("th", {textContent: "force", scope: "col"}));
 }
 
-// All follows the filter; its controls say what it is.
+// Applies the filter, and shows it in its controls.
 function leaveOut(kind, smallest) {
   Object.assign(filter, {by: kind, least: smallest > 0 ? smallest : 0});
   by.value = kind;

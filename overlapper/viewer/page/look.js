@@ -1,4 +1,4 @@
-// What is drawn, and how: the panel of controls.
+// The panel that controls how bodies and overlaps are drawn.
 
 const solid = actors.filter((_, node) => !film.grounds.includes(node)), grounds = actors.filter((_, node) => film.grounds.includes(node));
 for (const {drawing} of solid) for (const part of drawing.children) part.userData.own = part.material.color.clone();
@@ -101,7 +101,7 @@ for (const kind of kinds) {
   resets.insertCell().append(reset);
 }
 
-// The controls say what the looks are, and all is drawn so.
+// Shows the looks in the controls, and draws by them.
 function renew() {
   for (const kind of ["overlaps", "bodies"]) {
     for (const name of details) {

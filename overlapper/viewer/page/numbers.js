@@ -15,7 +15,7 @@ function told(value, choices, digits = 4) {
   return inUnit(value, choices, digits).slice(0, 2).join(" ");
 }
 
-// As %g has it.
+// Writes a number as %g does.
 function plain(value, digits) {
   const text = value.toPrecision(digits);
   return text.includes("e") && Math.abs(value) >= 1 ? String(+text) : text.replace(/(\.\d*?)0+(e|$)/, "$1$2").replace(/\.(e|$)/, "$1");
@@ -25,8 +25,7 @@ function named([first, second]) {
   return [element("span", {className: "first", textContent: first}), " – ", element("span", {className: "second", textContent: second})];
 }
 
-// What is left out of the list, the scene and the chart: overlaps with less than so much volume in m³, depth in m, or
-// force in N.
+// The filter: the list, the scene and the chart leave out overlaps with less volume in m³, depth in m, or force in N.
 const filter = {by: "volume", least: 0};
 const row = {volume: 0, depth: 2};  // among the numbers of a sighting
 
@@ -58,7 +57,7 @@ function choose(pair) {
   viewer.set_dirty();
 }
 
-// What has nothing in it takes no room; where there is little, the panels on the right come before the numbers.
+// Empty panels take no room. Where there is little room, the panels on the right come before the numbers.
 function fold() {
   const none = each => [...each.children].every(section => section.hidden);
   byId("right").hidden = none(byId("right"));

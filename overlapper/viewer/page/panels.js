@@ -3,7 +3,7 @@
 const narrow = matchMedia("(max-width: 900px)");
 const panels = {overlaps: byId("overlaps"), bodies: byId("bodies"), look: byId("look")};
 
-// Overlaps are on the left, one of the others on the right; where there is little room, one of them all.
+// Overlaps are on the left, one other panel on the right. Where there is little room, one panel is open.
 function showPanel(name, wanted = panels[name].hidden) {
   const others = narrow.matches ? ["overlaps", "bodies", "look"] : name === "overlaps" ? [] : ["bodies", "look"];
   if (wanted) for (const other of others) panels[other].hidden = true;

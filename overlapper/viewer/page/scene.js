@@ -69,7 +69,7 @@ class Batch {
 const paint = color => new THREE.Color(color);
 const through = {color: film.colors.ink, transparent: true, depthTest: false};
 const line = {color: film.colors.line, transparent: true};
-const apart = {polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1};  // from the edges upon them
+const apart = {polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1};  // so that edges lie in front of faces
 const batches = {faces: new Batch(["position", "color"])};
 for (const name of ["edges", "vertices", "marks", "arrows", "dots", "specks", "picked", "forces", "friction"]) batches[name] = new Batch(["position"]);
 const facets = batches.faces.geometry;

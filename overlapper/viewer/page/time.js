@@ -1,4 +1,4 @@
-// What frame is shown: slider, keys and address. A frame is shown as a whole, so that nothing is of another.
+// Chooses the frame: slider, keys and address. Everything shown belongs to one frame.
 
 function frameAt(time) {
   return Math.max(lastUpTo(times, time), 0);
@@ -46,7 +46,7 @@ slider.max = times[last];
 slider.oninput = () => pauseAt(frameAt(+slider.value));
 play.onclick = () => run(!playing);
 play.hidden = speed.hidden = names !== null;
-byId("time").hidden = last === 0;  // there is one moment, and nothing over time
+byId("time").hidden = last === 0;  // there is a single moment
 
 const keys = {
   " ": ["play or pause", () => run(!playing)],
@@ -94,19 +94,19 @@ for (const [key, [what, , sign]] of Object.entries(keys)) {
 }
 document.onkeydown = event => {
   if (event.ctrlKey || event.metaKey || event.altKey || byId("keys").open || !Object.hasOwn(keys, event.key)) return;
-  // Controls keep what the keyboard does with them.
+  // Controls keep their own keys.
   const target = event.target.closest?.("input, select, button, summary");
   if (target?.matches("select, input[type=number]") && event.key !== "Escape") return;
   if (target && target !== slider && (event.key === " " || target.type === "range" && /^(Arrow|Home|End)/.test(event.key))) return;
   event.preventDefault();
   keys[event.key][1]();
 };
-// What was clicked with a mouse would else be pressed once more by the space bar.
+// Without this, the space bar would press once more what the mouse clicked last.
 document.addEventListener("click", event => {
   if (event.detail) document.activeElement?.closest("button, summary, input[type=checkbox]")?.blur();
 });
 
-// What the address asks for; also of a page that is open already.
+// Follows the address, also in a page that is open already.
 function follow() {
   const wanted = new URLSearchParams(location.hash.slice(1));
   const by = Object.keys(scales).find(each => wanted.has(each)) ?? "volume";
@@ -125,5 +125,5 @@ requestAnimationFrame(now => {
   before = now;
   tick(now);
 });
-// What is packed has checksums: all of it was read, and nothing is missing.
+// The packed data has checksums, so all of it was read.
 byId("unread").remove();
