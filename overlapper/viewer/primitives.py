@@ -90,11 +90,10 @@ class Dots(Primitive):
 class Drawing:
     """How bodies and overlaps are drawn in a scene with this `center` and `size`, m."""
 
-    def __init__(
-        self, center: Array, size: float, is_ground: Callable[[Placed], bool], bodies: Look, overlaps: Look
-    ) -> None:
+    def __init__(self, center: Array, size: float, is_ground: Callable[[Placed], bool], *looks: Look) -> None:
+        """`looks` are those of the bodies and of the overlaps."""
         self.center, self.size, self._is_ground = center, size, is_ground
-        self._bodies, self._overlaps = bodies, overlaps
+        self._bodies, self._overlaps = looks
         self._known: dict[bytes, Tessellation] = {}
 
     def ground(self, placed: Placed) -> Ground | None:
@@ -186,39 +185,19 @@ class Drawing:
 
 def _plane(seen: Ground, look: Look) -> list[Primitive]:
     """A ground in colours of its own, before all that stands on it."""
-    face = Faces(
-        points=seen.vertices,
-        facets=seen.faces,
-        color=np.array(GROUND),
-        opacity=GROUND_OPACITY,
-        strength=seen.strength(seen.vertices),
-        side=BOTH,
-        order=-2,
-        name="faces",
-        visible=look.faces,
-    )
-    lines = Lines(
-        points=seen.edges,
-        color=np.array(GRID),
-        opacity=GRID_OPACITY,
-        strength=seen.strength(seen.edges),
-        order=-1,
-        name="edges",
-        visible=look.edges,
-    )
-    return [face, lines]
+    plane = partial(Faces, color=np.array(GROUND), opacity=GROUND_OPACITY, side=BOTH, order=-2, name="faces")
+    grid = partial(Lines, color=np.array(GRID), opacity=GRID_OPACITY, order=-1, name="edges")
+    return [
+        plane(points=seen.vertices, facets=seen.faces, strength=seen.strength(seen.vertices), visible=look.faces),
+        grid(points=seen.edges, strength=seen.strength(seen.edges), visible=look.edges),
+    ]
 
 
 def _pressed(overlap: Overlap, press: Press, scale: Scale, opacity: float) -> Faces:
     """The surface coloured by pressure."""
     corners, found = (each.reshape(-1, *each.shape[2:]) for each in pressures(overlap, press, scale.top))
-    return Faces(
-        points=corners - np.asarray(overlap.centroid),
-        facets=np.arange(len(corners)).reshape(-1, 3),
-        color=colors(found, scale.top),
-        opacity=opacity,
-        order=1,
-    )
+    points, facets = corners - np.asarray(overlap.centroid), np.arange(len(corners)).reshape(-1, 3)
+    return Faces(points=points, facets=facets, color=colors(found, scale.top), opacity=opacity, order=1)
 
 
 def _shining_line(segments: Array, name: str) -> Lines:
@@ -227,11 +206,8 @@ def _shining_line(segments: Array, name: str) -> Lines:
 
 def _cones(upright: Sequence[Tessellation], along: Array, color: Sequence[float], order: float) -> Faces:
     """Cones about z, turned to point along a vector, that shine through everything."""
+    turn = rotation_from_z(along / np.linalg.norm(along))
     firsts = np.cumsum([0, *(len(each.vertices) for each in upright[:-1])])
-    return Faces(
-        points=np.concatenate([each.vertices for each in upright]) @ rotation_from_z(along / np.linalg.norm(along)).T,
-        facets=np.concatenate([each.faces + first for each, first in zip(upright, firsts)]),
-        color=np.array(color),
-        order=order,
-        through=True,
-    )
+    points = np.concatenate([each.vertices for each in upright]) @ turn.T
+    facets = np.concatenate([each.faces + first for each, first in zip(upright, firsts)])
+    return Faces(points=points, facets=facets, color=np.array(color), order=order, through=True)
