@@ -46,6 +46,13 @@ def test_python_imports_only_downwards_and_each_library_in_one_room():
         ("union.py", "import overlapper.reference", "union -> overlapper.reference"),
         ("viewer/live.py", "from overlapper.simulation import Bodies", "viewer.live -> overlapper.simulation"),
         ("viewer/live.py", "import pybullet", "viewer.live -> pybullet"),
+        ("scenes/run.py", "import pybullet", "scenes.run -> pybullet"),
+        ("simulation/bodies.py", "import pybullet", "simulation.bodies -> pybullet"),
+        (
+            "simulation/bodies.py",
+            "from overlapper.simulation.bullet.recorder import Recorder",
+            "simulation.bodies -> overlapper.simulation.bullet.recorder",
+        ),
         ("simulation/links.py", "import fcl", "simulation.links -> fcl"),
         ("cli/view.py", "import meshcat.geometry", "cli.view -> meshcat"),
         ("cli/refusals.py", "from sqlalchemy.exc import SQLAlchemyError", "cli.refusals -> sqlalchemy"),

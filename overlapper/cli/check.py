@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say, scene_refusals, without_banner
+from overlapper.cli.refusals import Interrupted, Refused, import_engine, input_refusals, quiet, say, scene_refusals
 from overlapper.jobs.worker import NotStarted
 from overlapper.scenes.scene import SceneError, scenes_in
 
@@ -120,8 +120,9 @@ def prepared(setup: tuple[Path, bool]) -> Callable[[Path], _Held]:
 def _held(scene: Path, out: Path, record: bool) -> _Held:
     try:
         with quiet() as noise, scene_refusals(noise):
-            with without_banner():
-                from overlapper.scenes.check import hold
+            import_engine(scene)
+            from overlapper.scenes.check import hold
+
             outcome = hold(scene, out, record)
     except Refused as error:
         return _refused(str(error))

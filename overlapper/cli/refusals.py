@@ -8,13 +8,15 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
+from pathlib import Path
 from typing import BinaryIO, NoReturn, TextIO
 
 from overlapper.jobs.worker import NotStarted
 from overlapper.printable import first_line, printable
-from overlapper.scenes.scene import SceneError
+from overlapper.scenes.scene import SceneError, engine_in, find_scene
 from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning
+from overlapper.simulation.engine import engine
 
 LIBC = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
 
@@ -115,8 +117,10 @@ def diverted(descriptor: int, file: BinaryIO) -> Iterator[None]:
         os.close(kept)
 
 
-@contextmanager
-def without_banner() -> Iterator[None]:
-    """What goes to stderr is lost meanwhile: pybullet says on import when it was built."""
-    with open(os.devnull, "wb") as nowhere, diverted(2, nowhere):
-        yield
+def import_engine(scene: str | Path) -> None:
+    """Import what simulates a scene, if there is that scene. ImportError says what to install.
+
+    What goes to stderr is lost meanwhile: pybullet says on import when it was built.
+    """
+    with suppress(SceneError, OSError), open(os.devnull, "wb") as nowhere, diverted(2, nowhere):
+        engine(engine_in(find_scene(scene)))

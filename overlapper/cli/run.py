@@ -29,7 +29,7 @@ from overlapper.cli.options import (
     refuse_out_of_range,
 )
 from overlapper.cli.recorded import with_progress
-from overlapper.cli.refusals import Refused, quiet, say, scene_refusals, without_banner
+from overlapper.cli.refusals import Refused, import_engine, quiet, say, scene_refusals
 from overlapper.scenes.parameters import heading_of
 from overlapper.scenes.scene import Scene, load_scene
 
@@ -123,9 +123,9 @@ def _measure(
     `written` gets the files that there are in the end: in their place, or, if the run fails, beside it.
     """
     with quiet() as noise, scene_refusals(noise), ExitStack() as stack:
-        with without_banner():
-            from overlapper.scenes.run import run as frames_of
+        import_engine(name)
         from overlapper.reference import Fcl
+        from overlapper.scenes.run import run as frames_of
         from overlapper.tables.outputs import outputs
         from overlapper.tables.summary import Summary
 

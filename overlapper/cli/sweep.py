@@ -26,7 +26,7 @@ from overlapper.cli.options import (
     given_parameters,
     refuse_out_of_range,
 )
-from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
+from overlapper.cli.refusals import Refused, import_engine, input_refusals, quiet, say, scene_refusals
 
 if TYPE_CHECKING:
     from overlapper.jobs.engines import Engine
@@ -139,8 +139,7 @@ def sweep(
         noise = stack.enter_context(quiet())
         stack.enter_context(scene_refusals(noise))
         stack.enter_context(input_refusals())
-        with without_banner():
-            import overlapper.simulation.bullet.bodies  # noqa: F401  # which says now what to install
+        import_engine(scene)
         from overlapper.scenes.scene import find_scene, load_scene
         from overlapper.sweep import charts, page
         from overlapper.sweep.comparison import Recorded

@@ -15,7 +15,7 @@ import typer
 
 from overlapper.cli.options import ContactOption, SetOption, given_parameters
 from overlapper.cli.recorded import with_progress
-from overlapper.cli.refusals import Refused, input_refusals, quiet, say, scene_refusals, without_banner
+from overlapper.cli.refusals import Refused, import_engine, input_refusals, quiet, say, scene_refusals
 
 if TYPE_CHECKING:
     from overlapper.scenes.playback import Playback, View
@@ -82,8 +82,9 @@ def view(
     finished = True
     page = html or Path("out") / f"{Path(source).stem}.html"
     with quiet() as noise, scene_refusals(noise), input_refusals():
-        with without_banner():
-            from overlapper.scenes.playback import play
+        import_engine(scene or source)
+        from overlapper.scenes.playback import play
+
         playback = play(source, steps, scene, given_parameters(given), contact)
         with closing(playback.views):
             if live:

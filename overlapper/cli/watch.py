@@ -90,6 +90,9 @@ def watch(
     try:
         from overlapper.reference import Fcl
         from overlapper.scenes.watching import Watches
+        from overlapper.simulation.engine import engine
+
+        engine("bullet")  # says what to install
         from overlapper.simulation.bullet.windows import open_no_window, tell_of_windows
         from overlapper.tables.outputs import can_be_written
 

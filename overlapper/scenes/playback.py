@@ -15,7 +15,7 @@ from overlapper.printable import printable
 from overlapper.scenes.parameters import read_heading
 from overlapper.scenes.run import run
 from overlapper.scenes.scene import ContactModel, Scene, load_scene
-from overlapper.simulation import Bodies
+from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.links import link_contacts
 from overlapper.tables.frame import Frame
 from overlapper.tables.still import Still
@@ -26,7 +26,7 @@ from overlapper.verdicts.expected import HUNDREDTHS, Expected, expected_in, has_
 
 STEP = 1 / 240  # s, what pybullet takes for a step; an expected file says nothing of time
 
-View = Frame[Bodies] | Frame[Still]
+View = Frame[AnyBodies] | Frame[Still]
 
 
 @dataclass

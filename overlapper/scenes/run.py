@@ -1,4 +1,4 @@
-"""A scene run: built in a client of its own and stepped, frame by frame."""
+"""A scene run: built in a simulation of its own and stepped, frame by frame."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from contextlib import ExitStack
 from typing import Literal, get_args
 
 from overlapper.scenes.scene import ContactModel, Scene, SceneError, Step, broken
-from overlapper.simulation import Among, Bodies, Concave, Recorder, Surface, VolumetricContact
-from overlapper.simulation.bullet.saved_scene import NotSaved
+from overlapper.simulation.asked_pairs import Among
+from overlapper.simulation.bodies import AnyBodies
+from overlapper.simulation.engine import Simulation, engine
+from overlapper.simulation.forces.contact import VolumetricContact
+from overlapper.simulation.model import Concave, Surface
 from overlapper.simulation.naming import named
+from overlapper.simulation.source import Unreadable
 from overlapper.tables.frame import Frame
 from overlapper.tables.still import Still
-
-import pybullet  # isort: skip  # after the simulation, which says what to install
 
 
 def run(
@@ -27,57 +29,53 @@ def run(
     surface: Surface = "nominal",
     pairs: Among | None = None,
     contact: ContactModel | None = None,
-) -> Generator[Frame[Bodies], None, None]:
-    """Build the scene in a client of its own and step it, `scene.steps` times by default.
+) -> Generator[Frame[AnyBodies], None, None]:
+    """Build the scene in a simulation of its own and step it, `scene.steps` times by default.
 
     Every step is a frame, the first has number 1; or only those in `only`, if given. `tolerance` and `method` are those
     of `overlapper.overlap`, `concave`, `concave_threshold` and `surface` of `Bodies`, `pairs` of `Bodies.overlaps`, by
     default as the scene says; a recorder hears all that it tells pybullet. `contact` is what pushes bodies apart, by
     default as the scene says: "bullet", contact points, or "volumetric", a `VolumetricContact` of what the simulator
-    lets collide. SceneError if the scene itself fails, ValueError for an argument that is none.
+    lets collide. SceneError if the scene itself fails, ValueError for an invalid argument.
     """
     model = scene.contact if contact is None else contact
     if model not in get_args(ContactModel):
         raise ValueError(f"contact must be 'bullet' or 'volumetric', not {model!r}")
-    client = pybullet.connect(pybullet.DIRECT)
-    recorder = Recorder(client)
+    simulation = engine(scene.engine).begin()
     among = scene.pairs if pairs is None else pairs
     stack = ExitStack()
     try:
-        step = _built(scene, client)
-        bodies = Bodies(
-            client,
+        step = _built(scene, simulation)
+        bodies = simulation.bodies(
             concave=concave,
             concave_threshold=concave_threshold,
             surface=surface,
-            recorder=recorder,
             names=scene.names,
         )
-        seconds = pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"]
+        seconds = simulation.time_step
         volumetric = stack.enter_context(_volumetric(scene, bodies)) if model == "volumetric" else None
         for i in range(steps or scene.steps):
             _controlled(scene, step, i)
             if volumetric is not None:
                 volumetric.step()
             else:
-                pybullet.stepSimulation(client)
+                simulation.step()
             if only is None or i + 1 in only:
                 bodies.update()
                 contacts = bodies.overlaps(tolerance, method, pairs=among)
                 forces = None if volumetric is None else volumetric.mean()
                 yield Frame(i + 1, (i + 1) * seconds, bodies, contacts, forces)
-    except NotSaved as error:
+    except Unreadable as error:
         raise SceneError(f"the scene {scene.path} cannot be read: {error}") from error
     finally:
         stack.close()
-        recorder.close()
-        pybullet.disconnect(client)
+        simulation.end()
 
 
-def _built(scene: Scene, client: int) -> Step | None:
+def _built(scene: Scene, simulation: Simulation) -> Step | None:
     scene.names.clear()
     try:
-        step = scene.build(client, **scene.parameters)
+        step: Step | None = simulation.build(scene.build, scene.parameters)
     except Exception as error:
         raise broken(scene.path, "cannot be built", error) from error
     try:
@@ -89,7 +87,7 @@ def _built(scene: Scene, client: int) -> Step | None:
     return step
 
 
-def _volumetric(scene: Scene, bodies: Bodies) -> VolumetricContact:
+def _volumetric(scene: Scene, bodies: AnyBodies) -> VolumetricContact:
     try:
         return VolumetricContact(bodies, **scene.volumetric)
     except ValueError as error:

@@ -6,7 +6,8 @@ pybullet client and may return `step(i)`, called before every stepSimulation. Wh
 are looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
 apart. `CONTACT`, if it is there, says what pushes them: "bullet", as by default, or "volumetric", for
 `simulation.VolumetricContact`, or a dictionary of what that is told of its contacts, as {"stiffness": 1e8}. `NAMES`, a
-dictionary that `build` fills, has names of bodies by their numbers, as `simulation.Bodies` takes them.
+dictionary that `build` fills, has names of bodies by their numbers, as `simulation.Bodies` takes them. `ENGINE`, if it
+is there, names the simulator, "bullet" by default; `build` is called with what that engine fills.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from types import CodeType, ModuleType
 from typing import Any, Literal, get_args
 
 from overlapper.scenes.parameters import Parameter, described, parameters_of, values_of
+from overlapper.simulation.engine import ENGINES
 
 Step = Callable[[int], object]
 ContactModel = Literal["bullet", "volumetric"]
@@ -53,6 +55,7 @@ class Scene:
     parameters: dict[str, Parameter] = field(default_factory=dict)
     contact: ContactModel = "bullet"
     volumetric: dict[str, Any] = field(default_factory=dict)
+    engine: str = "bullet"
 
     @property
     def expected(self) -> Path:
@@ -74,13 +77,14 @@ def scene_paths() -> dict[str, Path]:
 
 
 def is_scene(path: Path) -> bool:
-    """True for a Python file with a docstring, STEPS and build(client); it is read, not run.
+    """True for a Python file with a docstring, STEPS and build(client), or build() and ENGINE; it is read, not run.
 
     A file with the last two that is not Python at all counts as one, so that it is refused and not overlooked.
     """
     source = path.read_bytes()
     # Most files are no scenes, and are not worth parsing.
-    if not all(re.search(pattern, source, re.MULTILINE) for pattern in (rb"^STEPS\b", rb"^def build\(\s*client\b")):
+    patterns = rb"^STEPS\b", rb"^def build\(\s*client\b|^ENGINE\b"
+    if not all(re.search(pattern, source, re.MULTILINE) for pattern in patterns):
         return False
     try:
         module = ast.parse(source)
@@ -144,8 +148,18 @@ def scene_of(path: Path, source: bytes) -> Scene:
     names = getattr(module, "NAMES", {})
     if not isinstance(names, dict):
         raise SceneError(f"{path} has NAMES = {names!r}, which must be a dictionary of names by the numbers of bodies")
+    if (named := getattr(module, "ENGINE", "bullet")) not in ENGINES:
+        known = ", ".join(map(repr, ENGINES))
+        raise SceneError(f"{path} has ENGINE = {named!r}, which must be one of {known}")
     difficulty = (module.__doc__ or "").strip()
-    return Scene(path.stem, path, difficulty, steps, build, pairs, names, parameters_of(build), model, volumetric)
+    parameters = parameters_of(build)
+    return Scene(path.stem, path, difficulty, steps, build, pairs, names, parameters, model, volumetric, named)
+
+
+def engine_in(path: Path) -> str:
+    """The ENGINE that a scene file names; the file is read, not run."""
+    found = re.search(rb"^ENGINE\s*=\s*[\"'](\w+)[\"']", path.read_bytes(), re.MULTILINE)
+    return found[1].decode() if found else "bullet"
 
 
 def find_scene(name_or_path: str | Path) -> Path:

@@ -10,7 +10,8 @@ from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType, TracebackType
 
-from overlapper.simulation.bullet import calls
+STANDS_IN = "__stands_in__"
+"""A global name of modules whose functions stand in for those of a simulator, in order to be heard."""
 
 
 def run_script(path: Path, arguments: Sequence[str]) -> BaseException | None:
@@ -54,13 +55,12 @@ def _wait_for_threads() -> None:
 
 
 def _of_script(trace: TracebackType | None, place: str) -> TracebackType | None:
-    """The part from the script's first line to the call of pybullet, if there is one that is heard."""
+    """The part from the script's first line to the call of a simulator, if there is one that is heard."""
     entries: list[TracebackType] = []
     while trace:
-        file = trace.tb_frame.f_code.co_filename
-        if entries and file == calls.__file__:
+        if entries and STANDS_IN in trace.tb_frame.f_globals:
             break
-        if entries or file == place:
+        if entries or trace.tb_frame.f_code.co_filename == place:
             entries.append(trace)
         trace = trace.tb_next
     kept = None

@@ -6,21 +6,25 @@ import os
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import Any, Literal, TypedDict, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, get_args
 
 from overlapper.reference import Fcl
-from overlapper.simulation import Among, Bodies, Concave, Recorder, SelfCollisionWarning, SkippedShapeWarning, Surface
-from overlapper.simulation.bullet.calls import Arguments, listen, unlisten
-from overlapper.simulation.model import Settings
+from overlapper.simulation.asked_pairs import Among
+from overlapper.simulation.bodies import AnyBodies
+from overlapper.simulation.cautions import SelfCollisionWarning, SkippedShapeWarning
+from overlapper.simulation.engine import Happening
+from overlapper.simulation.engine import engine as engine_of
+from overlapper.simulation.model import Concave, Settings, Surface
 from overlapper.tables.frame import Frame
 from overlapper.tables.outputs import Per, can_be_written, outputs
 from overlapper.tables.summary import Summary
 
-import pybullet  # isort: skip  # after the simulation, which says what to install
+if TYPE_CHECKING:
+    from overlapper.simulation import Recorder
 
 
 class How(TypedDict, total=False):
@@ -78,9 +82,9 @@ class Watch:
         recorder: Recorder | None = None,
         names: Mapping[int, str] | None = None,
         name: str = "the simulation",
+        engine: str = "bullet",
     ) -> None:
-        if not pybullet.isConnected(physicsClientId):
-            raise ValueError(f"physicsClientId {physicsClientId} is not connected to a physics server")
+        of_engine = engine_of(engine)
         if every < 1:
             raise ValueError(f"every must be a number of steps from 1, not {every}")
         if check not in (None, "fcl"):
@@ -100,38 +104,35 @@ class Watch:
         self.written: list[Path] = []
         """The files that there are, once the watch is over."""
         self.open = True
-        self._read: Callable[[], Bodies] = lambda: Bodies(
-            physicsClientId,
-            concave=concave,
-            concave_threshold=concave_threshold,
-            surface=surface,
-            recorder=self._recorder,
-            names=names,
-        )
+        self._how_read = {
+            "concave": concave,
+            "concave_threshold": concave_threshold,
+            "surface": surface,
+            "names": names,
+        }
         self._asked: dict[str, Any] = {"tolerance": tolerance, "method": method, "pairs": pairs}
         self._fcl = Fcl() if check else None
-        self._recorder = recorder or Recorder(physicsClientId)
-        self._own_recorder = recorder is None
-        self._bodies: Bodies | None = None
+        self._simulation = of_engine.running(physicsClientId, recorder)
+        self._bodies: AnyBodies | None = None
         self._files = ExitStack()
-        self._take: Callable[[Frame[Bodies]], None] | None = None
+        self._take: Callable[[Frame[AnyBodies]], None] | None = None
         self._rhythm = 0, 0.0, 0.0  # steps and time since which a step takes so many seconds
         self._lock = threading.RLock()
         self._process = os.getpid()
-        listen(self._hear)
+        self._unlisten = of_engine.listen(self._hear)
 
-    def _hear(self, name: str, arguments: Arguments, result: Any) -> None:
+    def _hear(self, happening: Happening, which: Hashable) -> None:
         # A process that was forked off has simulations of its own, and no business in our files.
-        if arguments.get("physicsClientId", 0) != self.physicsClientId or os.getpid() != self._process:
+        if which != self.physicsClientId or os.getpid() != self._process:
             return
-        if name == "stepSimulation":
+        if happening == "stepped":
             with self._lock:
                 self._stepped()
-        elif name == "disconnect":
+        elif happening == "ended":
             self.close()
 
     def _stepped(self) -> None:
-        seconds = pybullet.getPhysicsEngineParameters(self.physicsClientId)["fixedTimeStep"]
+        seconds = self._simulation.time_step
         if seconds != self._rhythm[2]:
             self._rhythm = self.steps, self.time, seconds
         self.steps += 1
@@ -152,7 +153,7 @@ class Watch:
             # The summary names what is left out. Only what is told here is not said.
             for kind in (SkippedShapeWarning, SelfCollisionWarning):
                 warnings.filterwarnings("ignore", category=kind, module=rf"{__name__}$")
-            self._bodies = self._read()
+            self._bodies = self._simulation.bodies(**self._how_read)
         else:
             self._bodies.update()
         contacts = self._bodies.overlaps(**self._asked)
@@ -162,7 +163,7 @@ class Watch:
             self._take(Frame(self.steps, self.time, self._bodies, contacts))
             self.measured += 1
 
-    def _begun(self, bodies: Bodies) -> Callable[[Frame[Bodies]], None]:
+    def _begun(self, bodies: AnyBodies) -> Callable[[Frame[AnyBodies]], None]:
         """What takes the frames; the files are there from now on."""
         settings = {"simulation": self.summary.scene, "every": self.every, **self._asked, **bodies.settings}
         files = outputs(self.summary, settings, self.written, self.out, self.html, self._per, self._fcl)
@@ -180,9 +181,8 @@ class Watch:
 
     def _end(self) -> None:
         self.open = False
-        unlisten(self._hear)
-        if self._own_recorder:
-            self._recorder.close()
+        self._unlisten()
+        self._simulation.leave()
         if self._bodies:
             self._bodies.close()
         if self._fcl:
@@ -216,21 +216,21 @@ class Watches:
         """Of all clients, measured or not."""
         self.in_real_time = False
         """Whether a simulation was let run by the clock."""
-        self._of: dict[int, Watch] = {}
+        self._of: dict[Hashable, Watch] = {}
         self._process = os.getpid()
-        listen(self._hear)
+        self._unlisten = engine_of("bullet").listen(self._hear)
 
-    def _hear(self, name: str, arguments: Arguments, result: Any) -> None:
+    def _hear(self, happening: Happening, which: Hashable) -> None:
         if os.getpid() != self._process:
             return
-        if name == "connect" and result >= 0:
-            self._of[result] = _Kept(result, self._number, self.failed, name=self._name, **self._how)
-        elif name == "stepSimulation":
+        if happening == "began":
+            self._of[which] = _Kept(which, self._number, self.failed, name=self._name, **self._how)
+        elif happening == "stepped":
             self.steps += 1
-        elif name == "setRealTimeSimulation":
-            self.in_real_time |= bool(arguments.get("enableRealTimeSimulation"))
-        elif name == "disconnect":
-            self._of.pop(arguments.get("physicsClientId", 0), None)
+        elif happening == "run by the clock":
+            self.in_real_time = True
+        else:
+            self._of.pop(which, None)
 
     def _number(self, watch: Watch) -> None:
         """Give a watch its files, as it is about to measure."""
@@ -247,7 +247,7 @@ class Watches:
         """End all watches; their files stay beside their places if what was watched has `failed`."""
         if os.getpid() != self._process:
             return
-        unlisten(self._hear)
+        self._unlisten()
         for watch in self._of.values():
             if watch.open:
                 watch.leave() if failed else watch.close()
@@ -257,7 +257,7 @@ class _Kept(Watch):
     """A watch that keeps its failures from the code that makes the steps."""
 
     def __init__(
-        self, client: int, number: Callable[[Watch], None], failed: list[tuple[Watch, Exception]], **how: Any
+        self, client: Any, number: Callable[[Watch], None], failed: list[tuple[Watch, Exception]], **how: Any
     ) -> None:
         super().__init__(client, **how)
         self._number, self._failed = number, failed
@@ -268,7 +268,7 @@ class _Kept(Watch):
         except Exception as error:
             self._failed.append((self, error))
 
-    def _begun(self, bodies: Bodies) -> Callable[[Frame[Bodies]], None]:
+    def _begun(self, bodies: AnyBodies) -> Callable[[Frame[AnyBodies]], None]:
         self._number(self)
         return super()._begun(bodies)
 

@@ -15,6 +15,10 @@ from overlapper.simulation.mechanics import Mechanics
 from overlapper.simulation.model import ModelledBody, Skipped
 
 
+class Unreadable(RuntimeError):
+    """A simulator cannot hand over its shapes; the text is one sentence."""
+
+
 class Source(Protocol):
     """A simulator's answers. A class that inherits from `Source` has the plain answers, where there are any."""
 

@@ -9,9 +9,10 @@ from overlapper.simulation.contacts import Contacts
 from overlapper.tables.still import Still
 
 if TYPE_CHECKING:
-    from overlapper.simulation import Bodies, Forces
+    from overlapper.simulation import Forces
+    from overlapper.simulation.bodies import AnyBodies
 
-Shown = TypeVar("Shown", bound="Bodies | Still", covariant=True)
+Shown = TypeVar("Shown", bound="AnyBodies | Still", covariant=True)
 
 
 @dataclass(frozen=True, slots=True)

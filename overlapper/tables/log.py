@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from overlapper.tables.outputs import StepTable
 
-import pybullet  # isort: skip  # after what says what to install
-
 if TYPE_CHECKING:
-    from overlapper.simulation import Bodies, Forces
+    from overlapper.simulation import Forces
+    from overlapper.simulation.bodies import AnyBodies
     from overlapper.simulation.contacts import Contacts
 
 
@@ -41,7 +40,7 @@ class Log:
     def __init__(
         self,
         path: str | Path,
-        bodies: Bodies,
+        bodies: AnyBodies,
         *,
         per: Literal["shape", "link"] = "shape",
         forces: bool = False,
@@ -60,7 +59,7 @@ class Log:
         """Write what `bodies.overlaps()` has found, before the next `bodies.update()`.
 
         `forces` are those between these bodies, as `VolumetricContact.mean()` has them; of pairs without any they are
-        empty. `step` is the one after the last by default, `time`, in s, that of so many of pybullet's time steps.
+        empty. `step` is the one after the last by default, `time`, in s, that of so many time steps of the simulator.
         ValueError if a step comes no later than the last, if `time` is not finite, if `contacts` are not of these
         bodies, if there are `forces` and no columns for them, or if the log is closed; OSError if it cannot be written.
         """
@@ -72,7 +71,7 @@ class Log:
         if step <= self.steps:
             raise ValueError(f"step must be larger from one add() to the next: {step} came after {self.steps}")
         if time is None:
-            time = step * pybullet.getPhysicsEngineParameters(self._bodies.physicsClientId)["fixedTimeStep"]
+            time = step * self._bodies.time_step
         if not math.isfinite(time):
             raise ValueError(f"time must be finite, not {time}")
         strange = {key for row in contacts.keys.tolist() for key in (tuple(row[:3]), tuple(row[3:]))}

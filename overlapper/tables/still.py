@@ -15,7 +15,8 @@ from overlapper.simulation.contacts import Contacts
 from overlapper.tables.table import Key, Row, key, placements, poses, rows
 
 if TYPE_CHECKING:
-    from overlapper.simulation import Bodies, Forces
+    from overlapper.simulation import Forces
+    from overlapper.simulation.bodies import AnyBodies
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,7 @@ class Still:
     forces: Forces | None = None
 
     @classmethod
-    def of(cls, bodies: Bodies, forces: Forces | None = None) -> Still:
+    def of(cls, bodies: AnyBodies, forces: Forces | None = None) -> Still:
         """The bodies as they are now, unmoved by what the simulation does next."""
         return cls(
             list(bodies.keys),

@@ -13,7 +13,8 @@ from overlapper.simulation.links import LinkContact, link_contacts
 
 if TYPE_CHECKING:
     from overlapper.reference import Comparison
-    from overlapper.simulation import Bodies, Decomposed, Report, Skipped
+    from overlapper.simulation import Decomposed, Report, Skipped
+    from overlapper.simulation.bodies import AnyBodies
     from overlapper.tables.frame import Frame
 
 
@@ -80,7 +81,7 @@ class Summary:
     disagreements: list[Disagreement] = field(default_factory=list)
     forces: bool = False
 
-    def add(self, frame: Frame[Bodies], opinions: Sequence[Comparison] = ()) -> None:
+    def add(self, frame: Frame[AnyBodies], opinions: Sequence[Comparison] = ()) -> None:
         """Take in a frame; `opinions` are FCL's of its contacts, if it was asked."""
         self.steps, self.seconds = frame.step, frame.time
         self.report = _sum(self.report, frame.bodies.report())

@@ -12,9 +12,9 @@ import pytest
 from simulated import box
 
 import overlapper
-from overlapper import Log
 from overlapper.scenes import watching
 from overlapper.simulation import Bodies, Recorder, VolumetricContact
+from overlapper.tables import log
 from overlapper.tables.table import rows
 from overlapper.tables.table_file import read_metadata, read_table
 
@@ -165,7 +165,7 @@ def test_an_interruption_in_the_middle_of_reading_costs_no_later_step(pile, monk
 
 
 def test_the_names_are_offered_by_the_package():
-    assert overlapper.Log is Log
+    assert overlapper.Log is log.Log
     assert overlapper.watch is overlapper.watch
 
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import pybullet
 
+__stands_in__ = "pybullet"  # so that tracebacks of scripts end before the frames of this module
+
 # The calls that can be heard, with their parameters in pybullet's order, as far as they are needed.
 CALLS: dict[str, tuple[str, ...]] = {
     "connect": ("method",),

@@ -13,12 +13,9 @@ import pybullet
 from overlapper.printable import first_line
 from overlapper.simulation.bullet.bullet_file import BulletFile
 from overlapper.simulation.model import BASE
+from overlapper.simulation.source import Unreadable
 
 MULTIBODY, SOFT_BODY = 2, 3  # of getDynamicsInfo; 1 is a rigid body in maximal coordinates
-
-
-class NotSaved(RuntimeError):
-    """The shapes of a client cannot be had; the text is one sentence."""
 
 
 def body_ids(client: int) -> set[int]:
@@ -60,13 +57,13 @@ def _base_position(client: int, id: int) -> tuple[float, ...]:
 
 
 def save(client: int) -> BulletFile:
-    """NotSaved if pybullet cannot write the file, or not whole, as on a disk that is full: it does not say so."""
+    """Unreadable if pybullet cannot write the file, or not whole, as on a disk that is full: it does not say so."""
     try:
         # A file and no folder, whose removal takes as long as all the rest.
         descriptor, name = tempfile.mkstemp(prefix="overlapper-", suffix=".bullet")
         os.close(descriptor)
     except OSError as error:
-        raise NotSaved(
+        raise Unreadable(
             f"the physics server of physicsClientId {client} cannot hand over its shapes, as there can be no temporary "
             f"file: {error.strerror}"
         ) from error
@@ -79,7 +76,7 @@ def save(client: int) -> BulletFile:
         reason = error
     finally:
         os.unlink(name)
-    raise NotSaved(
+    raise Unreadable(
         f"the physics server of physicsClientId {client} could not hand over its shapes in {name}: "
         "it must run on this machine, be allowed to write there and have room for them"
         + (f" ({first_line(reason)})" if isinstance(reason, ValueError) else "")

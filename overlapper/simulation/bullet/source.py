@@ -13,7 +13,7 @@ from overlapper.simulation.bullet.contact_points import links_in_contact_with_ea
 from overlapper.simulation.bullet.known_bodies import KnownBodies
 from overlapper.simulation.bullet.recorder import Recorder
 from overlapper.simulation.bullet.rules_in_force import RulesInForce
-from overlapper.simulation.bullet.stepping import Stepping
+from overlapper.simulation.bullet.stepping import Stepping, time_step
 from overlapper.simulation.cautions import SelfCollisionWarning
 from overlapper.simulation.collision_rules import CollisionRules, Mask
 from overlapper.simulation.contacts import Contacts
@@ -38,7 +38,7 @@ class BulletSource(Source):
 
     @property
     def time_step(self) -> float:
-        return float(pybullet.getPhysicsEngineParameters(self._client)["fixedTimeStep"])
+        return time_step(self._client)
 
     @property
     def settings(self) -> dict[str, str | float]:

@@ -13,6 +13,12 @@ from overlapper.simulation.bullet.dynamics import BulletDynamics
 from overlapper.simulation.bullet.recorder import Recorder
 from overlapper.simulation.model import Link
 
+
+def time_step(client: int) -> float:
+    """s that a step of the client takes."""
+    return float(pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"])
+
+
 _INSIDE: WeakValueDictionary[int, Stepping] = WeakValueDictionary()
 """Who has entered, by client."""
 
@@ -50,8 +56,7 @@ class Stepping:
             unlisten(self._commands.hear)
         if pybullet.isConnected(self._client):
             self._response.turn_on(self._recorder)
-            duration = pybullet.getPhysicsEngineParameters(self._client)["fixedTimeStep"]
-            self._commands.prepare(duration, first=True)
+            self._commands.prepare(time_step(self._client), first=True)
 
     def begin(self, length: float, duration: float, first: bool) -> None:
         pybullet.setTimeStep(length, self._client)

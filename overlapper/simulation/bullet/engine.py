@@ -1,0 +1,67 @@
+"""The engine of pybullet: scenes run in clients of their own, and the steps of a client are noticed by its calls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from overlapper.simulation import Bodies, Recorder
+from overlapper.simulation.bullet import calls
+from overlapper.simulation.bullet.stepping import time_step
+from overlapper.simulation.engine import Happening, Listener
+
+import pybullet  # isort: skip  # after the simulation, which says what to install
+
+HAPPENINGS: dict[str, Happening] = {"stepSimulation": "stepped", "disconnect": "ended"}
+
+
+class Client:
+    """See `Simulation`."""
+
+    def __init__(self, client: int, recorder: Recorder | None = None) -> None:
+        if not pybullet.isConnected(client):
+            raise ValueError(f"physicsClientId {client} is not connected to a physics server")
+        self._client = client
+        self._own = None if recorder else Recorder(client)
+        # A partial is no frame of its own: warnings name the line that calls it.
+        self.bodies = partial(Bodies, client, recorder=recorder or self._own)
+
+    @property
+    def time_step(self) -> float:
+        return time_step(self._client)
+
+    def build(self, build: Callable[..., Any], parameters: Mapping[str, Any]) -> Any:
+        return build(self._client, **parameters)
+
+    def step(self) -> None:
+        pybullet.stepSimulation(self._client)
+
+    def leave(self) -> None:
+        if self._own:
+            self._own.close()
+
+    def end(self) -> None:
+        self.leave()
+        pybullet.disconnect(self._client)
+
+
+def begin() -> Client:
+    return Client(pybullet.connect(pybullet.DIRECT))
+
+
+def running(which: int, recorder: Recorder | None = None) -> Client:
+    return Client(which, recorder)
+
+
+def listen(listener: Listener) -> Callable[[], None]:
+    def hear(name: str, arguments: calls.Arguments, result: Any) -> None:
+        if name == "connect" and result >= 0:
+            listener("began", result)
+        elif name in HAPPENINGS:
+            listener(HAPPENINGS[name], arguments.get("physicsClientId", 0))
+        elif name == "setRealTimeSimulation" and arguments.get("enableRealTimeSimulation"):
+            listener("run by the clock", arguments.get("physicsClientId", 0))
+
+    calls.listen(hear)
+    return lambda: calls.unlisten(hear)

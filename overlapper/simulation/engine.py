@@ -1,0 +1,69 @@
+"""Engines: how each simulator runs scenes, and how its steps are noticed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+if TYPE_CHECKING:
+    from overlapper.simulation.bodies import AnyBodies
+
+ENGINES = {"bullet": "overlapper.simulation.bullet.engine"}
+"""The module of each engine by the name that a scene's ENGINE has."""
+
+Happening = Literal["began", "stepped", "ended", "run by the clock"]
+Listener = Callable[[Happening, Hashable], None]
+"""Told what has happened to a simulation, and which it is."""
+
+
+class Simulation(Protocol):
+    """A simulation that runs."""
+
+    @property
+    def bodies(self) -> Callable[..., AnyBodies]:
+        """Reads the bodies; takes the keywords `concave`, `concave_threshold`, `surface` and `names` of `Bodies`."""
+        ...
+
+    @property
+    def time_step(self) -> float:
+        """s that a step takes."""
+        ...
+
+    def build(self, build: Callable[..., Any], parameters: Mapping[str, Any]) -> Any:
+        """Call the `build` of a scene with what it fills, and with the scene's parameters; returns its answer."""
+        ...
+
+    def step(self) -> None:
+        """Go on by a time step."""
+        ...
+
+    def leave(self) -> None:
+        """Let the simulation go on alone."""
+        ...
+
+    def end(self) -> None:
+        """End the simulation."""
+        ...
+
+
+class Engine(Protocol):
+    """What a module of ENGINES has."""
+
+    def begin(self) -> Simulation:
+        """A new, empty simulation."""
+        ...
+
+    def running(self, which: Any, recorder: Any = None) -> Simulation:
+        """The simulation of somebody else, with the `recorder` that it has already. ValueError if it does not run."""
+        ...
+
+    def listen(self, listener: Listener) -> Callable[[], None]:
+        """Tell a listener what happens to all simulations, until the function that is returned is called."""
+        ...
+
+
+def engine(name: str) -> Engine:
+    """The engine of that name. ImportError says what to install for it."""
+    module: Any = import_module(ENGINES[name])
+    return module  # type: ignore[no-any-return]
