@@ -13,7 +13,7 @@ from overlapper import Batch, Shape, _core
 from overlapper.shapes.table import facts
 from overlapper.simulation.model import BASE, Array, Link, ModelledBody
 
-Frame = Sequence[Sequence[float]]
+Pose = Sequence[Sequence[float]]
 """Begins with a position in m and a quaternion xyzw."""
 
 
@@ -25,7 +25,7 @@ class Poses(Protocol):
         """(body, link) of each frame, in the order of `read`."""
         ...
 
-    def read(self) -> Sequence[Frame]:
+    def read(self) -> Sequence[Pose]:
         """Where they are now."""
         ...
 
@@ -54,7 +54,7 @@ class Layout:
         self.orientations: Array = np.full_like(self._local_orientations, np.nan)
         links = {id: sorted({each.link for each in shapes} - {BASE}) for id, shapes in shaped.items()}
         self.poses = poses(links)
-        self._read: Sequence[Frame] = ()
+        self._read: Sequence[Pose] = ()
         self.collider_rows = {each: row for row, each in enumerate(sorted(self.poses.colliders))}
         self.colliders = np.array([self.collider_rows[id, link] for id, link, _ in self.keys], dtype=int)
         self._place = {each: row for row, each in enumerate(self.poses.colliders)}

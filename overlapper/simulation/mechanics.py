@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol
 
 from overlapper._core import ContactSolver
-from overlapper.simulation.layout import Frame
+from overlapper.simulation.layout import Pose
 from overlapper.simulation.model import Array, Link
 
 
@@ -42,7 +42,7 @@ class Dynamics(Protocol):
         """The acceleration of all coordinates that is known before anything has moved."""
         ...
 
-    def frames(self) -> Sequence[Frame]:
+    def frames(self) -> Sequence[Pose]:
         """The inertial frames of `links`, now."""
         ...
 
@@ -50,7 +50,7 @@ class Dynamics(Protocol):
         """Of all coordinates: of bases in m/s and rad/s, in the world, and of joints in rad/s or m/s."""
         ...
 
-    def apply(self, wrenches: Array, frames: Sequence[Frame]) -> None:
+    def apply(self, wrenches: Array, frames: Sequence[Pose]) -> None:
         """Let forces and torques (n, 6) act on `links` in the next step, about the origins of their `frames`."""
         ...
 

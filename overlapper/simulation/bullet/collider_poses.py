@@ -10,7 +10,7 @@ import pybullet
 
 from overlapper.simulation.bullet.bullet_file import orientations
 from overlapper.simulation.bullet.saved_scene import save
-from overlapper.simulation.layout import Frame
+from overlapper.simulation.layout import Pose
 from overlapper.simulation.model import BASE
 
 
@@ -29,14 +29,14 @@ class ColliderPoses:
         self.bodies = [*self._seen, *(id for id in links if id in hidden)]
         self.colliders = [(id, BASE) for id in self.bodies]
         self.colliders += [(id, link) for id in self.bodies for link in links[id]]
-        self._latest: list[Frame] = []
+        self._latest: list[Pose] = []
         self.static = [True] * len(self.bodies)
 
-    def read(self) -> list[Frame]:
+    def read(self) -> list[Pose]:
         """Read the frames again, and which bases are static."""
         client, before = self._client, self._latest or [()] * len(self.bodies)
         saved = self._saved_frames() if self._hidden else {}
-        frames: list[Frame] = list(map(pybullet.getBasePositionAndOrientation, self._seen, repeat(client)))
+        frames: list[Pose] = list(map(pybullet.getBasePositionAndOrientation, self._seen, repeat(client)))
         frames += [saved[row, BASE] for row, _ in self._hidden]
         for id, links in self._jointed:
             # Without forward kinematics the poses of links lag one step behind.
@@ -50,7 +50,7 @@ class ColliderPoses:
                 self.static[k] = pybullet.getDynamicsInfo(id, BASE, client)[0] == 0
         return frames
 
-    def _saved_frames(self) -> dict[tuple[int, int], Frame]:
+    def _saved_frames(self) -> dict[tuple[int, int], Pose]:
         """Of the hidden bodies, by place in a .bullet file and link."""
         bodies = save(self._client).bodies
         keys = [(row, link) for row, links in self._hidden for link in (BASE, *links)]
