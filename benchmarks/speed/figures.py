@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 
 from harness import figures
 from harness.figures import PALE, plt
-from harness.page import duration
+from harness.page import duration, write
 from harness.peers import TIMED, Look
 from speed.turns import Row
 
@@ -172,43 +172,6 @@ def name_ends(ax: Axes, shown: Growth) -> None:
 
 # To hover over
 
-PAGE = """<!doctype html>
-<html lang="en"><meta charset="utf-8"><title>Error over time per pair</title>
-<style>
-body {{ margin: 1em; font: 15px "DejaVu Sans", Verdana, sans-serif; color: #222 }}
-svg {{ width: 100%; max-width: 1500px; height: auto }}
-.point {{ cursor: pointer }}
-.point:hover {{ stroke: #000; stroke-width: 3 }}
-.aside .point:not(.same) {{ opacity: 0.12 }}
-#words {{ position: fixed; display: none; padding: 4px 8px; background: #222; color: #fff; border-radius: 4px;
-  pointer-events: none; max-width: 30em; font-size: 13px }}
-</style>
-<h1>Error over time per pair</h1>
-<p>Point at a mark: its numbers are shown, and its method in all panels.</p>
-<div id="chart">{svg}</div><div id="words"></div>
-<script>
-const chart = document.getElementById("chart"), words = document.getElementById("words")
-for (const point of chart.querySelectorAll(".point")) {{
-  point.addEventListener("mousemove", event => {{
-    words.textContent = point.dataset.words
-    words.style.display = "block"
-    words.style.left = Math.min(event.clientX + 14, innerWidth - 380) + "px"
-    words.style.top = event.clientY + 14 + "px"
-  }})
-  point.addEventListener("mouseenter", () => {{
-    chart.classList.add("aside")
-    for (const other of chart.querySelectorAll(".point"))
-      other.classList.toggle("same", other.dataset.method === point.dataset.method)
-  }})
-  point.addEventListener("mouseleave", () => {{
-    chart.classList.remove("aside")
-    words.style.display = "none"
-  }})
-}}
-</script>
-</html>
-"""
-
 
 def write_hover(path: Path, figure: Figure, words: dict[str, tuple[str, str]]) -> None:
     """The figure with words for every point, in a page that needs nothing else."""
@@ -224,4 +187,4 @@ def write_hover(path: Path, figure: Figure, words: dict[str, tuple[str, str]]) -
             group.set("data-method", method)
             group.set("data-words", said)
     svg = ET.tostring(root, encoding="unicode")
-    path.write_text(PAGE.format(svg=svg), encoding="utf-8")
+    write(Path(__file__).with_name("hover.html"), path, svg=svg)

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from string import Template
 
 import numpy as np
 
@@ -178,23 +177,6 @@ batches, meshes with margins, and scenes.
 
 ![The median and the slowest hundredth of every class of pairs, over the time of a call](round.png)"""
 
-CLAIMS = """![Time over the vertices of a pair and over the number of bodies](speed_claims.png)
-
-- **A pair takes O(n log n).** The article's method grows with the vertices to the power of $paper, from 50 to $most
-  vertices, where n log n would be $n_log_n: $pair_holds. For $most vertices `auto` takes $auto_pair, the article's
-  method $paper_pair.
-- **m bodies take O(m n log n).** The article's method grows with their number to the power of $paper_m, from 8 to
-  $bodies: $groups_hold. `auto`, which cuts what is common by one body after the other, takes the power of $auto_m, and
-  at $bodies bodies $auto_group where the article's method takes $paper_group.
-- **One hull of all m·n duals, or the pairwise tree.** Both by qhull, a point inside given: for $bodies bodies one hull
-  takes $one_hull, the tree $tree. The tree makes hulls of what the next level throws away.
-- **The pairs of a level on two cores.** By the clock, the best of many tries, one call bound to one core and to two:
-
-$cores
-
-- **Cutting, or duality.** Cutting plane by plane, every plane looking at every vertex, grows with the power of $cutting
-  (the article gives O(n³)), duality by qhull with $duality."""
-
 
 def claims_text(claims: list[Claim], pair: Growth, groups: Growth) -> str:
     def power(panel: Growth, name: str) -> str:
@@ -205,7 +187,8 @@ def claims_text(claims: list[Claim], pair: Growth, groups: Growth) -> str:
 
     most, bodies = pair.lines["paper"][-1][0], groups.lines["paper"][-1][0]
     n_log_n = 1 + np.log(np.log(most) / np.log(50)) / np.log(most / 50)
-    return Template(CLAIMS).substitute(
+    return filled(
+        Path(__file__).with_name("claims.md"),
         most=f"{most:,.0f}",
         bodies=f"{bodies:.0f}",
         n_log_n=f"{n_log_n:.2f}",

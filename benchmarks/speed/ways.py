@@ -34,98 +34,78 @@ TURN = (0.3, -0.5, 0.2, 0.8)
 ABOUT_Z = (0, 0, 0.1, 1)
 CUBE = Box([0.5, 0.5, 0.5])
 BALLS = {20 * 4**k: Hull(icosphere(k)) for k in (1, 2, 3, 4)}  # by their facets
-FLOOR = Placed(HalfSpace([0, 0, 1], 0))
-# What of these bodies shares something with others, shares all of it with this one.
+# A rounded hull around all others: whatever they share, they share with it, too.
 AROUND = Placed(RoundedHull(100 * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]), 1))
 
 
 class Typical(NamedTuple):
-    bodies: tuple[Placed, ...]
     way: str  # as the page says
+    bodies: tuple[Placed, ...]
 
+
+def typical(way: str, *bodies: tuple) -> Typical:
+    """Each body is a shape, its position and its orientation, as far as they are not those at rest."""
+    return Typical(way, tuple(Placed(*body) for body in bodies))
+
+
+BALL, DRUM, CAN, CAPSULE = Sphere(0.5), Hull(prism(256)), Cylinder(0.5, 1), Capsule(0.3, 1)
+FLOOR = (HalfSpace([0, 0, 1], 0),)
+BOX = (CUBE,)
+WITH_MARGIN = RoundedHull(0.1 * icosphere(0), 1e-3)
+ASIDE = (0.6, 0.5, 0.4)
 
 TYPICAL = {
-    "two boxes, apart": Typical((Placed(CUBE), Placed(CUBE, (2, 0.5, 0.4), TURN)), "separation"),
-    "two boxes": Typical((Placed(CUBE), Placed(CUBE, (0.6, 0.5, 0.4), TURN)), "clipping"),
-    "a box in the floor": Typical((Placed(CUBE, (0, 0, 0.3), TURN), FLOOR), "clipping"),
-    "three boxes": Typical(
-        (Placed(CUBE), Placed(CUBE, (0.2, 0.1, 0.3), TURN), Placed(CUBE, (0.1, 0.3, 0.2), ABOUT_Z)), "clipping"
+    "two boxes, apart": typical("separation", BOX, (CUBE, (2, 0.5, 0.4), TURN)),
+    "two boxes": typical("clipping", BOX, (CUBE, ASIDE, TURN)),
+    "a box in the floor": typical("clipping", (CUBE, (0, 0, 0.3), TURN), FLOOR),
+    "three boxes": typical("clipping", BOX, (CUBE, (0.2, 0.1, 0.3), TURN), (CUBE, (0.1, 0.3, 0.2), ABOUT_Z)),
+    "a mesh of 1,280 facets in the floor": typical("dual hull", (BALLS[1280], (0, 0, 0.1)), FLOOR),
+    "a mesh of 320 facets in the floor": typical("clipping", (BALLS[320], (0, 0, 0.1), TURN), FLOOR),
+    "a box resting on another, 1 µm deep": typical("wide clipping", BOX, (CUBE, (0.1, 0.2, 1 - 1e-6), ABOUT_Z)),
+    "two meshes of 80 facets": typical("tracing", (BALLS[80],), (BALLS[80], ASIDE, TURN)),
+    "two meshes of 1,280 facets": typical("tracing", (BALLS[1280],), (BALLS[1280], ASIDE, TURN)),
+    "two meshes of 5,120 facets": typical("tracing", (BALLS[5120],), (BALLS[5120], ASIDE, TURN)),
+    "three meshes of 1,280 facets": typical(
+        "dual hull", (BALLS[1280],), (BALLS[1280], ASIDE, TURN), (BALLS[1280], (0.1, -0.6, 0.4), ABOUT_Z)
     ),
-    "a mesh of 1,280 facets in the floor": Typical((Placed(BALLS[1280], (0, 0, 0.1)), FLOOR), "dual hull"),
-    "a mesh of 320 facets in the floor": Typical((Placed(BALLS[320], (0, 0, 0.1), TURN), FLOOR), "clipping"),
-    "a box resting on another, 1 µm deep": Typical(
-        (Placed(CUBE), Placed(CUBE, (0.1, 0.2, 1 - 1e-6), ABOUT_Z)), "wide clipping"
+    "a mesh of 320 facets and the same once more": typical("dual hull", (BALLS[320],), (BALLS[320],)),
+    "two boxes flush at the sides": typical("dual hull", BOX, (CUBE, (0, 0, 0.7))),
+    "a ball in the floor": typical("closed form", (BALL, (0, 0, 0.3)), FLOOR),
+    "a cylinder, tilted, in the floor": typical("closed form", (CAN, (0, 0, 0.3), TURN), FLOOR),
+    "a ball on the face of a box": typical("closed form", (BALL, (0.01, 0.02, 0.9)), BOX),
+    "a ball over the corner of a box": typical("closed form", (BALL, (0.6, 0.4, 0.5)), (CUBE, (0, 0, 0), TURN)),
+    "a cylinder in the corner of a box": typical("closed form", (Cylinder(0.3, 1), (0.3, 0.2, 0.5), TURN), BOX),
+    "a capsule in the corner of a box": typical("closed form", (CAPSULE, (0.3, 0.2, 0.5), TURN), BOX),
+    "an ellipsoid on the face of a box": typical(
+        "closed form", (Ellipsoid([0.5, 0.3, 0.4]), (0.01, 0.02, 0.75), TURN), BOX
     ),
-    "two meshes of 80 facets": Typical((Placed(BALLS[80]), Placed(BALLS[80], (0.6, 0.5, 0.4), TURN)), "tracing"),
-    "two meshes of 1,280 facets": Typical((Placed(BALLS[1280]), Placed(BALLS[1280], (0.6, 0.5, 0.4), TURN)), "tracing"),
-    "two meshes of 5,120 facets": Typical((Placed(BALLS[5120]), Placed(BALLS[5120], (0.6, 0.5, 0.4), TURN)), "tracing"),
-    "three meshes of 1,280 facets": Typical(
-        (
-            Placed(BALLS[1280]),
-            Placed(BALLS[1280], (0.6, 0.5, 0.4), TURN),
-            Placed(BALLS[1280], (0.1, -0.6, 0.4), ABOUT_Z),
-        ),
-        "dual hull",
+    "two balls": typical("closed form", (BALL,), (BALL, (0.6, 0, 0))),
+    "two cylinders": typical("slicing", (CAN,), (CAN, (0.3, 0.2, 0.1), TURN)),
+    "a ball on the side of a capsule": typical("slicing", (BALL,), (CAPSULE, (0.6, 0, 0.1), TURN)),
+    "two meshes of 20 facets with margins, 1 mm each": typical(
+        "slicing", (WITH_MARGIN,), (WITH_MARGIN, (0.12, 0.07, 0.09), TURN)
     ),
-    "a mesh of 320 facets and the same once more": Typical((Placed(BALLS[320]), Placed(BALLS[320])), "dual hull"),
-    "two boxes flush at the sides": Typical((Placed(CUBE), Placed(CUBE, (0, 0, 0.7))), "dual hull"),
-    "a ball in the floor": Typical((Placed(Sphere(0.5), (0, 0, 0.3)), FLOOR), "closed form"),
-    "a cylinder, tilted, in the floor": Typical((Placed(Cylinder(0.5, 1), (0, 0, 0.3), TURN), FLOOR), "closed form"),
-    "a ball on the face of a box": Typical((Placed(Sphere(0.5), (0.01, 0.02, 0.9)), Placed(CUBE)), "closed form"),
-    "a ball over the corner of a box": Typical(
-        (Placed(Sphere(0.5), (0.6, 0.4, 0.5)), Placed(CUBE, (0, 0, 0), TURN)), "closed form"
+    "a rounded hull of 80 facets and a box": typical(
+        "slicing", (RoundedHull(icosphere(1), 0.05),), (CUBE, (0.9, 0.3, 0.4), TURN)
     ),
-    "a cylinder in the corner of a box": Typical(
-        (Placed(Cylinder(0.3, 1), (0.3, 0.2, 0.5), TURN), Placed(CUBE)), "closed form"
-    ),
-    "a capsule in the corner of a box": Typical(
-        (Placed(Capsule(0.3, 1), (0.3, 0.2, 0.5), TURN), Placed(CUBE)), "closed form"
-    ),
-    "an ellipsoid on the face of a box": Typical(
-        (Placed(Ellipsoid([0.5, 0.3, 0.4]), (0.01, 0.02, 0.75), TURN), Placed(CUBE)), "closed form"
-    ),
-    "two balls": Typical((Placed(Sphere(0.5)), Placed(Sphere(0.5), (0.6, 0, 0))), "closed form"),
-    "two cylinders": Typical((Placed(Cylinder(0.5, 1)), Placed(Cylinder(0.5, 1), (0.3, 0.2, 0.1), TURN)), "slicing"),
-    "a ball on the side of a capsule": Typical(
-        (Placed(Sphere(0.5)), Placed(Capsule(0.3, 1), (0.6, 0, 0.1), TURN)), "slicing"
-    ),
-    "two meshes of 20 facets with margins, 1 mm each": Typical(
-        (
-            Placed(RoundedHull(0.1 * icosphere(0), 1e-3)),
-            Placed(RoundedHull(0.1 * icosphere(0), 1e-3), (0.12, 0.07, 0.09), TURN),
-        ),
-        "slicing",
-    ),
-    "a rounded hull of 80 facets and a box": Typical(
-        (Placed(RoundedHull(icosphere(1), 0.05)), Placed(CUBE, (0.9, 0.3, 0.4), TURN)), "slicing"
-    ),
-    "a box stacked on another, flush, 1 µm deep": Typical(
-        (Placed(CUBE), Placed(CUBE, (0, 0, 1 - 1e-6))), "wide dual hull"
-    ),
-    "a box resting on another, 1e-14 m deep": Typical(
-        (Placed(CUBE), Placed(CUBE, (0.1, 0.2, 1 - 1e-14), ABOUT_Z)), "wide dual hull"
-    ),
-    "two boxes, 4e-15 m apart": Typical((Placed(CUBE), Placed(CUBE, (1 + 4e-15, 0, 0))), "wide separation"),
-    "two boxes that touch": Typical((Placed(CUBE), Placed(CUBE, (1, 0.2, 0.1))), "doubt"),
-    "a cylinder that stands on another": Typical(
-        (Placed(Cylinder(0.5, 1)), Placed(Cylinder(0.5, 1), (0, 0, 1))), "doubt"
-    ),
-    "a drum of 256 sides that stands on another": Typical(
-        (Placed(Hull(prism(256))), Placed(Hull(prism(256)), (0, 0, 1))), "doubt"
-    ),
+    "a box stacked on another, flush, 1 µm deep": typical("wide dual hull", BOX, (CUBE, (0, 0, 1 - 1e-6))),
+    "a box resting on another, 1e-14 m deep": typical("wide dual hull", BOX, (CUBE, (0.1, 0.2, 1 - 1e-14), ABOUT_Z)),
+    "two boxes, 4e-15 m apart": typical("wide separation", BOX, (CUBE, (1 + 4e-15, 0, 0))),
+    "two boxes that touch": typical("doubt", BOX, (CUBE, (1, 0.2, 0.1))),
+    "a cylinder that stands on another": typical("doubt", (CAN,), (CAN, (0, 0, 1))),
+    "a drum of 256 sides that stands on another": typical("doubt", (DRUM,), (DRUM, (0, 0, 1))),
 }
-
 
 HEADING = ("bodies", "way", "µs", "by the dual hull", "by the article")
 
 Asked = Callable[[], float]
 
 
-def questions(typical: Typical) -> list[Asked | str]:
+def questions(case: Typical) -> list[Asked | str]:
     """For its own way, and for the dual hull and the article's method where these are other ways and answer."""
-    bodies = typical.bodies
+    bodies = case.bodies
     found: list[Asked | str] = [asked(bodies, "auto"), "", ""]
-    if typical.way in COMPARED:
+    if case.way in COMPARED:
         assert overlap(*bodies, AROUND).way == "dual hull"
         found[1] = asked((*bodies, AROUND), "auto")
     if not has(bodies, RoundedHull):  # which the article's method refuses
@@ -162,10 +142,10 @@ def options(parser: ArgumentParser) -> None:
 
 
 def main(chosen: Namespace) -> None:
-    for name, typical in TYPICAL.items():
-        way = overlap(*typical.bodies).way
-        if way != typical.way:
-            raise SystemExit(f"{name}: the way is {way}, not {typical.way}")
+    for name, case in TYPICAL.items():
+        way = overlap(*case.bodies).way
+        if way != case.way:
+            raise SystemExit(f"{name}: the way is {way}, not {case.way}")
     page = PAGE.read_text(encoding="utf-8")
     pattern = re.escape(f"| {' | '.join(HEADING)} |") + r"\n(?:\|.*\n)+"
     if (count := len(re.findall(pattern, page))) != 1:

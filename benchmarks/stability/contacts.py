@@ -27,10 +27,10 @@ from strategies import directions, product, quaternion, rotation
 
 from harness import results
 from harness.bodies import exact_points
-from harness.peers import NO_ANSWER, NO_DISTANCE, NOT_ASKED, PEERS, HardCase, hard_cases
+from harness.peers import NO_ANSWER, NO_DISTANCE, PEERS, HardCase, hard_cases
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Placed, RoundedHull, Sphere, overlap
 from speed.workloads import ball, by_proof, capsule, hull
-from stability.hard_cases import fill, put
+from stability.hard_cases import Columns
 
 RESULTS = results.FOLDER / "stability_round.csv"
 DEPTH = 1e-8  # m
@@ -248,20 +248,21 @@ def stated(a: Placed, b: Placed) -> float:
     return overlap(a, b).volume_error
 
 
-def told(truth: Fraction, within: Fraction, answer: float | str) -> str:
+def told(truth: tuple[Fraction, Fraction], answer: float | str) -> str:
     """By how much of the true value an answer may be off at most, where the truth is known that well; or in words that
-    there is none, or that it is of bodies apart."""
+    there is no answer, or that it is for bodies apart."""
+    value, within = truth
     if isinstance(answer, str):
         return answer
     if not isfinite(answer) or abs(answer) > NO_DISTANCE:
         return NO_ANSWER
-    if answer * truth <= 0:
+    if answer * value <= 0:
         return "apart"
-    return f"{float((abs(Fraction(answer) - truth) + within) / abs(truth)):.1e}"
+    return f"{float((abs(Fraction(answer) - value) + within) / abs(value)):.1e}"
 
 
-def share(truth: Fraction, _: Fraction, error: float | str) -> str:
-    return error if isinstance(error, str) else f"{error / float(truth):.1e}"
+def share(truth: tuple[Fraction, Fraction], error: float | str) -> str:
+    return error if isinstance(error, str) else f"{error / float(truth[0]):.1e}"
 
 
 def options(parser: ArgumentParser) -> None:
@@ -270,26 +271,17 @@ def options(parser: ArgumentParser) -> None:
 
 def measure(chosen: Namespace, path: Path) -> None:
     asked = contacts(chosen.cases)
-    rows = [{"contact": contact.kind, "case": str(contact.number)} for contact in asked]
     volumes = [contact.volume for contact in asked]
     distances = [(-contact.depth, Fraction(0)) for contact in asked]
-    for row, (volume, within), (distance, _) in zip(rows, volumes, distances):
-        row["volume"], row["known to"] = f"{float(volume):.6g}", f"{float(within / volume):.1e}"
-        row["depth"] = f"{float(-distance):.6g}"
-    missing: list[str] = []
-
-    def column(name: str, answer: Callable, judged: Callable[..., str], truths: list) -> None:
-        answers = put(name, answer, [(contact.a, contact.b) for contact in asked], missing, FIRST)
-        # A peer that knows none of the bodies has no column.
-        if set(answers) != {NOT_ASKED} or any(line.startswith(f"missing: {name} ") for line in missing):
-            fill(rows, name, [judged(*truth, answer) for truth, answer in zip(truths, answers)])
-
-    column(STATED, stated, share, volumes)
+    table = Columns([{"contact": contact.kind, "case": str(contact.number)} for contact in asked], FIRST)
+    table.fill("volume", [f"{float(volume):.6g}" for volume, _ in volumes])
+    table.fill("known to", [f"{float(within / volume):.1e}" for volume, within in volumes])
+    table.fill("depth", [f"{float(-distance):.6g}" for distance, _ in distances])
+    pairs = [(contact.a, contact.b) for contact in asked]
+    table.put(STATED, stated, pairs, share, volumes)
     for kind, word, truths in (("volume", "volume", volumes), ("distance", "depth", distances)):
         for name in hard_cases(kind):
             hard = PEERS[kind][name].hard
             segments = f", {hard} segments" if isinstance(hard, int) else ""
-            column(f"{name}{segments}: {word}", HardCase(kind, name), told, truths)
-    notes = [results.packages("overlap", "python-flint"), *missing]
-    with results.writing(path, list(rows[0]), *notes) as write:
-        write(row.values() for row in rows)
+            table.put(f"{name}{segments}: {word}", HardCase(kind, name), pairs, told, truths)
+    table.write(path, results.packages("overlap", "python-flint"))

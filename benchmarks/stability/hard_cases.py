@@ -14,7 +14,6 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import exact
 import families
@@ -44,8 +43,6 @@ ROUND = ("round_contacts",)
 # A question without difficulty, asked before time counts.
 FIRST = (families.CORNERS, families.CORNERS + 1.0)
 
-Rows = list[dict[str, str]]
-
 
 def options(parser: ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the first case of each family")
@@ -54,31 +51,21 @@ def options(parser: ArgumentParser) -> None:
 
 def measure(chosen: Namespace, path: Path) -> None:
     asked = questions(chosen.seed, chosen.count)
-    rows = [described(question) for question in asked]
-    missing: list[str] = []
-    bodies = [question.bodies for question in asked]
+    table = Columns([described(question) for question in asked], FIRST)
+    flat = [None if question.round else question.bodies for question in asked]
+    pairs = [None if question.signed_distance is None else question.bodies for question in asked]
     for kind in ("volume", "overlaps"):
         for name in hard_cases(kind):
-            given = [None if question.round else question.bodies for question in asked]
-            answers = put(name, HardCase(kind, name), given, missing)
-            # A peer that knows none of the bodies has no column.
-            if set(answers) != {NOT_ASKED} or any(line.startswith(f"missing: {name} ") for line in missing):
-                fill(rows, name, [verdict(*each) for each in zip(asked, answers)])
+            table.put(name, HardCase(kind, name), flat, verdict, asked)
     for name in hard_cases("distance"):
-        given = [None if question.signed_distance is None else question.bodies for question in asked]
-        answers = put(distance_column(name), HardCase("distance", name), given, missing)
-        fill(rows, distance_column(name), [distance_verdict(*each) for each in zip(asked, answers)])
-    fill(rows, "way", put("way", way, bodies, missing))
-    fill(
-        rows,
-        "paper lost at",
-        [lost_at(*q.bodies) if failed(row["paper"]) else NOT_ASKED for q, row in zip(asked, rows)],
-    )
+        table.put(distance_column(name), HardCase("distance", name), pairs, distance_verdict, asked)
+    table.put("way", way, [question.bodies for question in asked], lambda _, answer: answer, asked)
+    lost = [lost_at(*q.bodies) if failed(row["paper"]) else NOT_ASKED for q, row in zip(asked, table.rows)]
+    table.fill("paper lost at", lost)
     solid = [not q.round and q.clear and q.common.dimension == 3 for q in asked]
     for name, step in (("given a point", given_a_point), ("and by qhull", by_qhull)):
-        fill(rows, name, [step(question) if fit else NOT_ASKED for question, fit in zip(asked, solid)])
-    with results.writing(path, list(rows[0]), f"seed {chosen.seed}; {results.packages()}", *missing) as write:
-        write(row.values() for row in rows)
+        table.fill(name, [step(question) if fit else NOT_ASKED for question, fit in zip(asked, solid)])
+    table.write(path, f"seed {chosen.seed}; {results.packages()}")
 
 
 def write_page(path: Path, folder: Path) -> Path:
@@ -107,22 +94,32 @@ def families_of_vertices(name: str) -> bool:
     return not any(isinstance(body, (families.Below, Placed)) for body in families.make(name, 0).bodies)
 
 
-def put(
-    name: str, answer: Callable[..., Any], asked: list[tuple | None], missing: list[str], first: tuple = FIRST
-) -> list[Any]:
-    """The answers of a peer in a process of its own; NOT_ASKED for None, and for all if its package is missing."""
-    with Watched(answer, TIME_LIMIT, first) as peer:
-        try:
-            return [NOT_ASKED if bodies is None else peer.ask(*bodies) for bodies in asked]
-        except ImportError as error:
-            missing.append(f"missing: {name} ({error.name} is not installed)")
-            print(missing[-1])
-            return [NOT_ASKED] * len(asked)
+class Columns:
+    """A table that grows by a column for each peer, which is asked in a process of its own."""
 
+    def __init__(self, rows: list[dict[str, str]], first: tuple) -> None:
+        self.rows, self.first, self.missing = rows, first, []
 
-def fill(rows: Rows, column: str, cells: list[str]) -> None:
-    for row, cell in zip(rows, cells):
-        row[column] = cell
+    def put(self, name: str, answer: Callable, bodies: list[tuple | None], judged: Callable, truths: list) -> None:
+        """What a peer says about bodies, judged by the truth about them; it is not asked about None. A peer that knows
+        none of the bodies has no column, and one whose package is missing has an empty one."""
+        with Watched(answer, TIME_LIMIT, self.first) as peer:
+            try:
+                answers = [NOT_ASKED if each is None else peer.ask(*each) for each in bodies]
+            except ImportError as error:
+                self.missing.append(f"missing: {name} ({error.name} is not installed)")
+                print(self.missing[-1])
+                return self.fill(name, [NOT_ASKED] * len(bodies))
+        if set(answers) != {NOT_ASKED}:
+            self.fill(name, [judged(truth, answer) for truth, answer in zip(truths, answers)])
+
+    def fill(self, name: str, cells: list[str]) -> None:
+        for row, cell in zip(self.rows, cells):
+            row[name] = cell
+
+    def write(self, path: Path, note: str) -> None:
+        with results.writing(path, list(self.rows[0]), note, *self.missing) as write:
+            write(row.values() for row in self.rows)
 
 
 def way(*bodies: np.ndarray | Placed) -> str:

@@ -177,23 +177,37 @@ def error_shade(value: float) -> float | None:
     return None if value < 1e-12 else min(1.0, (log10(value) + 12) / 12)
 
 
+def failures(ax: Axes, groups: Iterable[list[Row]], columns: list[str], across: bool = True) -> None:
+    """Shares of failures; groups go down and columns across, or the other way round."""
+    values = np.array([[failure_share(group, column) for column in columns] for group in groups])
+    heat_map(ax, values if across else values.T, failure_shade, percent, FAILURES)
+
+
+def errors(ax: Axes, groups: Iterable[list[Row]], columns: list[str], across: bool = True) -> None:
+    values = np.array([[worst_error(group, column) for column in columns] for group in groups])
+    heat_map(ax, values if across else values.T, error_shade, exponent, ERRORS)
+
+
+def name_columns(ax: Axes, columns: Iterable[str], *lines: float) -> None:
+    """Names above, the first in bold, and lines between groups of columns."""
+    names = [DISTANCES.get(column, column) for column in columns]
+    ax.xaxis.tick_top()
+    ax.set_xticks(range(len(names)), names, rotation=40, ha="left", rotation_mode="anchor")
+    ax.get_xticklabels()[0].set_fontweight("bold")
+    for line in lines:
+        ax.axvline(line, color=INK, lw=0.8)
+
+
 def overview(rows: list[Row], path: Path) -> None:
     groups, peers, volumes = grouped(rows), peers_of(rows), volumes_of(rows)
-    shares = np.array([[failure_share(group, peer) for peer in peers] for group in groups.values()])
-    errors = np.array([[worst_error(group, peer) for peer in volumes] for group in groups.values()])
     widths = [len(peers), len(volumes)]
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 0.36 * len(groups) + 1.75), width_ratios=widths)
-    heat_map(left, shares, failure_shade, percent, FAILURES)
-    heat_map(right, errors, error_shade, exponent, ERRORS)
+    failures(left, groups.values(), peers)
+    errors(right, groups.values(), volumes)
     left.set_yticks(range(len(groups)), [f"{name}  ({len(group)})" for name, group in groups.items()])
     right.set_yticks([])
-    for ax, names in ((left, peers), (right, volumes)):
-        ax.xaxis.tick_top()
-        ax.set_xticks(range(len(names)), names, rotation=40, ha="left", rotation_mode="anchor")
-        ax.get_xticklabels()[0].set_fontweight("bold")
-    left.axvline(1.5, color=INK, lw=0.8)
-    left.axvline(len(volumes) - 0.5, color=INK, lw=0.8)
-    right.axvline(1.5, color=INK, lw=0.8)
+    name_columns(left, peers, 1.5, len(volumes) - 0.5)
+    name_columns(right, volumes, 1.5)
     left.set_xlabel("failures, % of the cases (number in brackets)", labelpad=6)
     right.set_xlabel("worst error of a volume, power of ten (× lost)", labelpad=6)
     figure.tight_layout(w_pad=1.5)
@@ -203,21 +217,16 @@ def overview(rows: list[Row], path: Path) -> None:
 def overview_of_distances(rows: list[Row], path: Path) -> None:
     groups = {name: group for name, group in grouped(rows).items() if deep(group) or not_deep(group)}
     figure, axes = plt.subplots(1, 4, figsize=(9, 0.36 * len(groups) + 1.75))
+    columns = list(DISTANCES)
     for j, (part, word) in enumerate([(deep, "depth"), (not_deep, "distance")]):
-        parts = [part(group) for group in groups.values()]
-        shares = np.array([[failure_share(group, column) for column in DISTANCES] for group in parts])
-        errors = np.array([[worst_error(group, column) for column in DISTANCES] for group in parts])
-        heat_map(axes[j], shares, failure_shade, percent, FAILURES)
-        heat_map(axes[2 + j], errors, error_shade, exponent, ERRORS)
+        failures(axes[j], map(part, groups.values()), columns)
+        errors(axes[2 + j], map(part, groups.values()), columns)
         axes[j].set_xlabel(f"{word}: failures, %", labelpad=6)
         axes[2 + j].set_xlabel(f"{word}: worst error", labelpad=6)
     counts = [f"{name}  ({len(deep(group))}, {len(not_deep(group))})" for name, group in groups.items()]
     for ax in axes:
         ax.set_yticks(range(len(groups)) if ax is axes[0] else [], counts if ax is axes[0] else [])
-        ax.xaxis.tick_top()
-        ax.set_xticks(range(len(DISTANCES)), list(DISTANCES.values()), rotation=40, ha="left", rotation_mode="anchor")
-        ax.get_xticklabels()[0].set_fontweight("bold")
-        ax.axvline(0.5, color=INK, lw=0.8)
+        name_columns(ax, columns, 0.5)
     figure.tight_layout(w_pad=1.2)
     save(figure, path)
 
@@ -234,10 +243,8 @@ def by_degeneracy(
         parts = [[row for row in members if decade(row) == d] for d in decades]
         shown = [column for column in columns if asked(members, column)]
         exact_ones = [column for column in measured if column in shown]
-        shares = np.array([[failure_share(part, column) for part in parts] for column in shown])
-        errors = np.array([[worst_error(part, column) for part in parts] for column in exact_ones])
-        heat_map(left, shares, failure_shade, percent, FAILURES)
-        heat_map(right, errors, error_shade, exponent, ERRORS)
+        failures(left, parts, shown, across=False)
+        errors(right, parts, exact_ones, across=False)
         for ax, names in ((left, shown), (right, exact_ones)):
             ax.set_yticks(range(len(names)), [DISTANCES.get(name, name) for name in names])
             ax.get_yticklabels()[0].set_fontweight("bold")

@@ -260,7 +260,7 @@ def test_a_depth_that_nobody_knows_is_none():
     [(-1.0, "1.0e-03"), (-1.5, "5.0e-01"), (0.0, "apart"), (1.0, "apart"), (float("nan"), "no answer"), ("-", "-")],
 )
 def test_what_is_told_of_a_contact(answer, words):
-    assert contacts.told(Fraction(-1), Fraction(1, 1000), answer) == words
+    assert contacts.told((Fraction(-1), Fraction(1, 1000)), answer) == words
 
 
 def test_a_cell_of_the_page_has_the_largest_error_and_what_is_no_answer():
