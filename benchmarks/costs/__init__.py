@@ -1,1 +1,1 @@
-"""What single features of the package cost, and what they survive."""
+"""The costs of single features of the package, and the kills that sweeps survive."""

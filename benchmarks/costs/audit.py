@@ -100,7 +100,7 @@ class Peer:
         self.pin.computeCollisions(self.model, self.data, self.tree, q, False)
 
     def answers(self, q: np.ndarray) -> list[bool]:
-        """Of each pair of `pairs`, each asked for by itself."""
+        """For each pair of `pairs`, which is asked for by itself."""
         self.one_by_one(q)
         return [result.isCollision() for result in self.geometry_data.collisionResults]
 
@@ -179,7 +179,7 @@ def agree(count: int = 1000) -> None:
 
 
 def judged(placed: list[Placed], ours: bool) -> str:
-    """Who is right of two that differ, and how near to touching the pair is."""
+    """Which of two different answers is right, and how near to touching the pair is."""
     found = overlap(*placed)
     lower, upper = found.certificate().verify()
     proved = "overlap" if lower > 0 else "share nothing" if upper == 0 else "are not told apart"

@@ -1,11 +1,11 @@
-"""Whether a sweep of the grasp scene survives `kill -9`: of its parent, of its workers and of a node of its cluster.
+"""A sweep of the grasp scene under `kill -9`: of its parent, of its workers and of a node of its cluster.
 
     python benchmarks kills [TASKS] [STEPS] [--kills 3] [--ray] [--scene SCENE] [--seed 0]
 
 The same tasks are swept twice with two processes, once undisturbed. The second time, the parent is killed so many
 times, and started again, and as many times a worker, each at a random moment. The parts of both must be the same files
-to the last bit. With --ray they are swept once more on a cluster of two nodes of one CPU each, one of which is killed
-at a random moment, and that so many times.
+to the last bit. With --ray they are swept once more on a cluster of two nodes of one CPU each. One node is
+killed at a random moment, and that so many times.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ def build(kind: str) -> int:
 
 def options(parser: ArgumentParser) -> None:
     parser.add_argument("kinds", nargs="*", default=["boxes", "mixed", "balls"], metavar="balls | boxes | mixed")
-    parser.add_argument("--steps", type=int, default=1000, help="all of which are recorded")
+    parser.add_argument("--steps", type=int, default=1000, help="that are made and recorded")
 
 
 def main(chosen: Namespace) -> None:
@@ -73,7 +73,7 @@ def main(chosen: Namespace) -> None:
 
 
 def shown(page: Path, profile: Path) -> tuple[float, float]:
-    """What a frame of the page costs, in ms of processor: its own thread, and software in place of a graphics card."""
+    """ms of the processor for a frame: of the page's own thread, and of the software in place of a graphics card."""
     browser = Browser(profile, size=(1280, 800))
     try:
         browser.open(page.as_uri() + "#t=1", until="document.querySelector('#time output').textContent")
@@ -95,7 +95,7 @@ def thread_seconds(browser: Browser) -> float:
 
 
 def drawing_seconds() -> float:
-    """Of the graphics processes of all Chromiums that this process has started."""
+    """Processor time of the graphics processes of all Chromiums that this process has started."""
     family, seconds = {os.getpid()}, 0.0
     processes = subprocess.run(["ps", "-eo", "pid=,ppid=,args="], capture_output=True, text=True, check=True).stdout
     rows = sorted((row.split(None, 2) for row in processes.splitlines()), key=lambda row: int(row[0]))

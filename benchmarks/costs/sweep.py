@@ -1,10 +1,10 @@
-"""What a sweep costs beside the runs themselves, and how much faster two cores are than one.
+"""The cost of a sweep beside the runs themselves, and how much faster two cores are than one.
 
     python benchmarks sweep [ROUNDS]
 
 Overhead, by the processor's time, which is much the same when others are at work on the machine: in a worker, runs of a
 scene of one ball and one step alternate with the same as tasks, and the median of their differences is told; in the
-parent, all that it does for a task of a sweep; and an item of which there is nothing to do, by the clock.
+parent, all that it does for a task of a sweep; and by the clock, an item that needs no work.
 Scaling: tasks of the grasp scene by one worker and by two, in turns, by the clock from the first tasks done on, beside
 what plain arithmetic gains from a second process in the same round. Medians of the rounds, the least and the largest.
 """
@@ -59,7 +59,7 @@ class Cost(NamedTuple):
 
 
 def swept(scene: Path, steps: int, seeds: str, workers: int) -> Cost:
-    """What a sweep costs."""
+    """The cost of a whole sweep."""
     study = Study.of(scene, {"steps": steps, **SETTINGS})
     space = Space(study.scene, study.loaded().parameters)
     sweep = Sweep(study, space.crossed([space.grid(seeds)]))

@@ -1,4 +1,4 @@
-"""What it costs a script to be watched: processor time per step of a pybullet loop, plain and under `overlapper watch`.
+"""The cost of being watched: processor time per step of a pybullet loop, plain and under `overlapper watch`.
 
     python benchmarks watch [ROUNDS]
 
@@ -85,7 +85,7 @@ def main(chosen: Namespace) -> None:
 
 
 def said(folder: str, options: list[str] | None, *script: str) -> str:
-    """What a script prints, plain or watched with these options."""
+    """The output of a script, plain or watched with these options."""
     watch = [] if options is None else ["-m", "overlapper", "watch", *options]
     command = [sys.executable, *watch, *script]
     return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout

@@ -34,7 +34,7 @@ COLUMNS = ("scene", "part", "us")
 PILE = "pile of 200 boxes"
 STEPS = 120
 
-# What is called in a substep, by the part that its time counts for; what is called within it counts for its own.
+# The calls of a substep, and the part that the time of each counts for. A call within a call counts for its own part.
 CALLS: dict[tuple[Any, str], str] = {
     (Bodies, "update"): "poses",
     (Bodies, "follow"): "poses",

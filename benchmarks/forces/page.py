@@ -28,7 +28,7 @@ class Figures(dict[tuple[str, str, str], dict[str, float]]):
         return found
 
     def series(self, experiment: str, law: str, case: str) -> tuple[list[float], list[float]]:
-        """What can be drawn over numbers."""
+        """The values at numbers, to be drawn over them."""
         of = {float(at): value for at, value in self[experiment, law, case].items() if at[:1].isdigit()}
         return [*of], [*of.values()]
 
@@ -211,7 +211,7 @@ def draw_bodies(of: Figures, path: Path) -> None:
 
 
 def cost_table(path: Path) -> str:
-    """What `python benchmarks forces` has measured, if it has."""
+    """The results of `python benchmarks forces`, if there are any."""
     if not path.exists():
         return "They were not measured yet."
     (note,), rows = results.read(path)

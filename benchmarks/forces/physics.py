@@ -1,4 +1,4 @@
-"""What volumetric contact does beside what textbooks say, and beside Bullet's own contact in steps as long.
+"""Volumetric contact beside the formulae of textbooks, and beside Bullet's own contact in steps as long.
 
     python benchmarks physics          all again, a minute or two, then the page and its pictures
     python benchmarks physics --page   only the page, from the results there are
@@ -28,7 +28,7 @@ RESULTS = results.FOLDER / "forces.csv"
 LAWS = ("volumetric", "bullet")
 SUBSTEPS = (1, 2, 4, 8, 16, 32, 64)
 FEW = (1, 4, 20)
-WINDOW = 12  # steps of a series of which the largest is kept
+WINDOW = 12  # steps: of so many values of a series, the largest is kept
 
 
 class Row(NamedTuple):
@@ -113,7 +113,7 @@ def slides_and_spins() -> Iterator[Row]:
 
 
 def rolls() -> Iterator[Row]:
-    """What is left of the speed after a second, and of the energy without dissipation."""
+    """The speed after a second over that before, and the change of energy without dissipation."""
     for shape in ("cylinder", "ball"):
         for tau in (0.0, 5e-4, 1e-3, 2e-3, 4e-3):
             v0, v1, e0, e1 = experiments.roll(shape, stiffness=1e8, dissipation=tau)

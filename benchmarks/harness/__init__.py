@@ -1,1 +1,1 @@
-"""What all benchmarks share: commands, result files, clocks, processes, peers, pages and figures."""
+"""The harness of all benchmarks: commands, result files, clocks, processes, peers, pages and figures."""

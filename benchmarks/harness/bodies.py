@@ -1,4 +1,4 @@
-"""What peers are given: hulls as vertices (n, 3) in the world, and shapes at poses."""
+"""Bodies as peers get them: hulls as vertices (n, 3) in the world, and shapes at poses."""
 
 from __future__ import annotations
 

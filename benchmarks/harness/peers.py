@@ -65,17 +65,16 @@ Ring = list[int]
 
 MOST_IN_NUMPY = 200  # vertices of either body, for a peer that looks at all of them for every plane of the other
 
-# What stands in a table for a peer that was not asked, and for one that has no answer; and for coal, whose answer more
-# iterations change.
+# In tables: the peer was not asked; it has no answer; more iterations of coal change its answer.
 NOT_ASKED, NO_ANSWER, OUT_OF_ITERATIONS = "-", "no answer", "out of iterations"
 
-# What a library gives for want of a distance is larger than this, in m.
+# m. A library that finds no distance returns a number above this one.
 NO_DISTANCE = 1e300
 
 
 @dataclass(frozen=True)
 class Look:
-    """How the speed chart draws a peer; the settings of one that is `joined` are a ladder from coarse to fine."""
+    """How the speed chart draws a peer. A line joins the settings of a `joined` peer, from coarse to fine."""
 
     colour: str = "#555555"
     marker: str = "o"
@@ -299,7 +298,7 @@ def manifold(bodies: Bodies, setting: Setting) -> Asked:
         return reduce(Manifold.__xor__, solids)
 
     solids = [made(body) for body in bodies]
-    # What is put off until it is asked for must not be timed.
+    # manifold3d builds a mesh when its volume is asked for. That must not be timed.
     if isinstance(bodies[0], Placed) and min(solid.volume() for solid in solids) <= 0:
         raise RuntimeError("manifold3d: no mesh")
     if setting == "moved":
@@ -404,7 +403,7 @@ def fcl_collide(bodies: Bodies, _: None) -> Asked:
 
 
 def fcl_distance(bodies: Bodies, way: str) -> Asked:
-    """Of both ways, the signed distance is nearer to the truth than the depths of contacts."""
+    """By the deepest contact, or by the signed distance, which is nearer to the truth."""
     import fcl
 
     if has(bodies, RoundedHull) or (way == "distance" and has(bodies, HalfSpace)):
@@ -436,8 +435,10 @@ def coal_collide(bodies: Bodies, _: None) -> Asked:
 
 
 def coal_distance(bodies: Bodies, tolerance: float | None) -> Asked:
-    """By the depth of a contact; or with a tolerance by its distance, in as many iterations as it makes by itself: an
-    answer that a hundred times as many do not confirm is none."""
+    """By the depth of a contact; with a tolerance, by the distance in coal's own number of iterations.
+
+    The answer is OUT_OF_ITERATIONS if a hundred times as many iterations change it.
+    """
     import coal
 
     (one, at), (other, there) = map(of_coal, pair_of(bodies))
@@ -467,7 +468,7 @@ def coal_distance(bodies: Bodies, tolerance: float | None) -> Asked:
 
 
 def pybullet_overlaps(bodies: Bodies, _: None) -> Asked:
-    """Whether a distance below zero remains once the margins of both hulls are taken off."""
+    """True if the distance without the margins of both hulls is below zero."""
     ask = pybullet_distance(pair_of(bodies), 0.0)
 
     def below_0() -> bool:
@@ -564,10 +565,10 @@ PEERS: dict[str, dict[str, Peer]] = {
     },
 }
 
-# Who is timed: the depths of those who know distances beside the volumes.
+# The peers that are timed: all volumes, and the depths of peers that know distances.
 TIMED = PEERS["volume"] | {f"{name}, depth": peer for name, peer in PEERS["distance"].items() if peer.settings}
 
-# Who is timed on meshes of any size, for time over size, and on bodies that are apart.
+# The peers that stay fast: they are timed on meshes of all sizes and on bodies that are apart, too.
 FEW = ("auto", "auto, batch", "auto, warm batch", "paper", "scipy", "manifold3d", "manifold3d, by the clock", "trimesh")
 
 

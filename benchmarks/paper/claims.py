@@ -1,4 +1,4 @@
-"""What the article claims, measured: how time grows with the size and the number of the bodies, and which way is best.
+"""The claims of the article, measured: how time grows with the size and the number of the bodies, and the best way.
 
 Each claim is a list of ways to do the same, timed in turn at growing sizes. What this package answers is compared with
 the exact truth, as is what the others answer.

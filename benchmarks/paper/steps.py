@@ -214,7 +214,7 @@ def volume_of_polar(duals) -> Fraction | None:
 
 
 def volume_of(vertices: np.ndarray) -> Fraction | None:
-    """Of the second hull as the package builds it, or None where it finds the vertices flat."""
+    """The volume of the second hull as the package builds it; None if it finds the vertices flat."""
     try:
         return Fraction(Hull(vertices).volume)
     except ValueError:

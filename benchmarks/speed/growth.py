@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from strategies import directions
 
 from harness.timing import timed
 from harness.watched import Watched
@@ -35,107 +36,71 @@ MOST_EXPONENT = 1.6
 Points = NDArray[np.float64]
 
 
+def around(turns: np.ndarray, z: float = 0.0) -> Points:
+    """On a circle of radius one."""
+    return np.column_stack([np.cos(turns), np.sin(turns), np.full(len(turns), z)])
+
+
 def circle(n: int, rng: np.random.Generator) -> Points:
-    turns = rng.uniform(0, 2 * np.pi, n)
-    return np.column_stack([np.cos(turns), np.sin(turns), np.zeros(n)])
+    return around(rng.uniform(0, 2 * np.pi, n))
 
 
-def cone(n: int, rng: np.random.Generator) -> Points:
-    return np.vstack([circle(n, rng), [[0, 0, 1]]])
+def evenly(n: int) -> np.ndarray:
+    """Angles."""
+    return 2 * np.pi * np.arange(n) / n
 
 
-def double_cone(n: int, rng: np.random.Generator) -> Points:
-    return np.vstack([cone(n, rng), [[0.1, 0, -1]]])
+def prism(n: int) -> Points:
+    return np.vstack([around(evenly(n // 2), 1.0), around(evenly(n // 2), -1.0)])
 
 
-def blunt_cone(n: int, rng: np.random.Generator) -> Points:
-    return np.vstack([circle(n // 2, rng), circle(n // 2, rng) * 1e-9 + [0, 0, 1]])
+def globe(n: int) -> Points:
+    """Points on eight parallels, and two poles."""
+    tilts = np.pi * (np.arange(8) + 0.5) / 8
+    rings = [around(evenly(n // 8)) * np.sin(t) + [0, 0, np.cos(t)] for t in tilts]
+    return np.vstack([*rings, [[0, 0, 1], [0, 0, -1]]])
 
 
-def prism(n: int, _: np.random.Generator) -> Points:
-    turns = 2 * np.pi * np.arange(n // 2) / (n // 2)
-    rim = np.column_stack([np.cos(turns), np.sin(turns), np.ones(n // 2)])
-    return np.vstack([rim, rim * [1, 1, -1]])
+def trigonometric_curve(n: int) -> Points:
+    return around(evenly(n)) + np.cos(2 * evenly(n))[:, None] * [0, 0, 1]
 
 
-def plate(n: int, rng: np.random.Generator) -> Points:
-    return prism(n, rng) * [1, 1, 1e-6]
+def skew(n: int, rng: np.random.Generator, bulge: float) -> Points:
+    """Two lines or arcs that cross each other at a distance."""
+    t, u = rng.uniform(-1, 1, (2, n // 2))
+    one, other = bulge * (1 - t**2), bulge * (1 - u**2)
+    return np.vstack([np.c_[t, 0 * t, -1 - one], np.c_[0 * u, u, 1 + other]])
 
 
-def needle(n: int, rng: np.random.Generator) -> Points:
-    return ball(n, rng) * [1e-5, 1e-5, 1]
-
-
-def lens(n: int, rng: np.random.Generator) -> Points:
-    return ball(n, rng) * [1, 1, 1e-5]
-
-
-def ball(n: int, rng: np.random.Generator) -> Points:
-    points = rng.normal(size=(n, 3))
-    return np.asarray(points / np.linalg.norm(points, axis=1)[:, None])
-
-
-def cloud(n: int, rng: np.random.Generator) -> Points:
-    return rng.normal(size=(n, 3))
-
-
-def globe(n: int, _: np.random.Generator) -> Points:
-    meridians, parallels = n // 8, 8
-    turns = 2 * np.pi * np.arange(meridians) / meridians
-    rings = np.pi * (np.arange(parallels) + 0.5) / parallels
-    grid = [
-        np.column_stack([np.sin(t) * np.cos(turns), np.sin(t) * np.sin(turns), np.cos(t) + 0 * turns]) for t in rings
-    ]
-    return np.vstack([*grid, [[0, 0, 1], [0, 0, -1]]])
-
-
-def moment_curve(n: int, _: np.random.Generator) -> Points:
-    return np.linspace(0, 1, n)[:, None] ** [1, 2, 3]
-
-
-def trigonometric_curve(n: int, _: np.random.Generator) -> Points:
-    turns = 2 * np.pi * np.arange(n) / n
-    return np.column_stack([np.cos(turns), np.sin(turns), np.cos(2 * turns)])
-
-
-def skew_lines(n: int, rng: np.random.Generator) -> Points:
-    along = rng.uniform(-1, 1, n)
-    return np.vstack(
-        [np.c_[along, 0 * along, 0 * along - 1][: n // 2], np.c_[0 * along, along, 0 * along + 1][n // 2 :]]
-    )
-
-
-def skew_arcs(n: int, rng: np.random.Generator) -> Points:
-    t = rng.uniform(-1, 1, n // 2)
-    return np.vstack([np.c_[t, 0 * t, -1 - 0.5 * (1 - t**2)], np.c_[0 * t, t, 1 + 0.5 * (1 - t**2)]])
-
-
-def grid(n: int, _: np.random.Generator) -> Points:
+def grid(n: int) -> Points:
     side = max(2, round(math.sqrt(n / 2)))
     return np.array(list(np.ndindex(side, side, 2)), float)
 
 
-def duplicates(n: int, rng: np.random.Generator) -> Points:
-    return rng.choice(ball(20, rng), n)
-
-
-def nearly_duplicates(n: int, rng: np.random.Generator) -> Points:
-    return rng.choice(ball(20, rng), n) + rng.normal(size=(n, 3)) * 1e-15
-
-
-def spiral(n: int, _: np.random.Generator) -> Points:
-    t = np.linspace(0, 1, n)
+def spiral(t: np.ndarray) -> Points:
     return np.column_stack([t * np.cos(40 * t), t * np.sin(40 * t), t])
 
 
 FAMILIES: dict[str, Callable[[int, np.random.Generator], Points]] = {
-    each.__name__: each
-    for each in (
-        circle, cone, double_cone, blunt_cone, prism, plate, needle, lens, ball, cloud, globe, moment_curve,
-        trigonometric_curve, skew_lines, skew_arcs, grid, duplicates, nearly_duplicates, spiral,
-    )
-    if each is not circle
-}  # fmt: skip
+    "cone": lambda n, rng: np.vstack([circle(n, rng), [[0, 0, 1]]]),
+    "double_cone": lambda n, rng: np.vstack([circle(n, rng), [[0, 0, 1], [0.1, 0, -1]]]),
+    "blunt_cone": lambda n, rng: np.vstack([circle(n // 2, rng), circle(n // 2, rng) * 1e-9 + [0, 0, 1]]),
+    "prism": lambda n, _: prism(n),
+    "plate": lambda n, _: prism(n) * [1, 1, 1e-6],
+    "needle": lambda n, rng: directions(rng, n) * [1e-5, 1e-5, 1],
+    "lens": lambda n, rng: directions(rng, n) * [1, 1, 1e-5],
+    "ball": lambda n, rng: directions(rng, n),
+    "cloud": lambda n, rng: rng.normal(size=(n, 3)),
+    "globe": lambda n, _: globe(n),
+    "moment_curve": lambda n, _: np.linspace(0, 1, n)[:, None] ** [1, 2, 3],
+    "trigonometric_curve": lambda n, _: trigonometric_curve(n),
+    "skew_lines": lambda n, rng: skew(n, rng, 0.0),
+    "skew_arcs": lambda n, rng: skew(n, rng, 0.5),
+    "grid": lambda n, _: grid(n),
+    "duplicates": lambda n, rng: rng.choice(directions(rng, 20), n),
+    "nearly_duplicates": lambda n, rng: rng.choice(directions(rng, 20), n) + rng.normal(size=(n, 3)) * 1e-15,
+    "spiral": lambda n, _: spiral(np.linspace(0, 1, n)),
+}
 
 ROUND: dict[str, Callable[[float], Shape]] = {
     "ball": lambda extent: Sphere(extent / 2),
@@ -151,7 +116,7 @@ QUESTIONS = (
 
 @dataclass(frozen=True)
 class Input:
-    """What is asked, but for the size: where the second body lies, in extents, and what was done to the points."""
+    """A question but for its size: where the second body lies, in extents, and how the points were changed."""
 
     family: str
     ask: str
@@ -287,7 +252,7 @@ def options(parser: ArgumentParser) -> None:
 
 
 def main(chosen: Namespace) -> bool:
-    """Whether the time of an input is out of proportion to its size."""
+    """True if the time of an input is out of proportion to its size."""
     found = []
     with Watched(seconds, TIME_LIMIT, (Input("ball", "hull"), 100)) as process:
         for family, ask in product(chosen.family or FAMILIES, chosen.ask or QUESTIONS):

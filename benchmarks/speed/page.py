@@ -17,7 +17,7 @@ from speed.figures import Growth, accuracy, growth, start
 from speed.turns import Row
 from speed.workloads import FAMILIES, SIZES
 
-# What the README shows of the first chart.
+# The panels of the first chart that the README shows.
 CHOSEN = [
     "box deep", "box on ground", "h50", "i1280 shallow", "i5120 deep", "box sliver", "ball at box corner",
     "crossing cylinders",
@@ -48,7 +48,7 @@ WRONG = 1e-6
 
 @dataclass(frozen=True)
 class Results:
-    """What was measured, and the folder that it was read from, as the page names it."""
+    """All that was measured, and the folder that it was read from, as the page names it."""
 
     folder: str
     notes: list[str]
@@ -85,7 +85,7 @@ def write_page(measured: Path, folder: Path) -> Path:
 
 
 def panels(found: Results) -> tuple[list[Growth], list[Growth]]:
-    """Of the charts of time over size and of the article's claims."""
+    """The panels of the chart of time over size, and those of the article's claims."""
     by_size = [sizes(found.rows, way) for way in ("deep", "shallow")]
     return by_size, [of_pairs(found.claims), of_groups(found.claims)]
 
@@ -290,7 +290,7 @@ def warm(rows: list[Row]) -> str:
 
 
 def wrong(rows: list[Row]) -> str:
-    """Who answered beside the truth without having been asked for less."""
+    """The peers that answered beside the truth at a setting that promises exact answers."""
     off: dict[str, list[Row]] = {}
     for row in rows:
         exact = row.facets and (row.method not in PEERS["volume"] or PEERS["volume"][row.method].exact)
@@ -313,7 +313,7 @@ def power_table(panels: list[Growth]) -> str:
 
 
 def per_facet(rows: list[Row]) -> str:
-    """What a facet of the answer costs in shallow pairs, over the size of the meshes."""
+    """The cost of a facet of the answer in shallow pairs, over the size of the meshes."""
     lines = []
     for size in SIZES:
         alone, many = (best(rows, f"i{size} shallow", name) for name in ("auto", "auto, batch"))

@@ -1,4 +1,4 @@
-"""What round bodies cost beside two boxes: every class of pairs, cold single calls and batches, margins, and scenes.
+"""The cost of round bodies beside two boxes: every class of pairs, cold single calls and batches, margins, and scenes.
 
     python benchmarks round              all again, two or three minutes, then the page and its picture
     python benchmarks round --pairs 50   fewer pairs of a class, sooner and less surely
@@ -209,14 +209,14 @@ def measured_peer(balls: list[tuple[Placed, Placed]], rounds: int) -> Iterator[F
 
 
 def over_an_edge(ball: Placed) -> float:
-    """What a ball over the edge x = y = 1 of a cube shares with it, of discs cut by two lines, in 50 digits."""
+    """The volume that a ball over the edge x = y = 1 shares with a cube: discs cut by two lines, in 50 digits."""
     import mpmath
 
     with mpmath.workdps(50):
         r, out = mpmath.mpf(ball.shape.radius), mpmath.mpf(float(ball.position[0])) - 1
 
         def area(u: Any) -> Any:
-            """Of the disc whose radius is r cos u: within both lines, each as far from the centre."""
+            """The part of the disc of radius r cos u that is within both lines, each as far from the centre."""
             rho = r * mpmath.cos(u)
             if rho**2 <= 2 * out**2:
                 return mpmath.mpf(0)

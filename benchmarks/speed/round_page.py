@@ -118,7 +118,7 @@ def listed(names: list[str]) -> str:
 
 
 class Aim(NamedTuple):
-    """Of a scene: in words, in µs or None for half of stepSimulation, and what the time goes to if it is missed."""
+    """The aim for a scene: in words; in µs, or None for half of stepSimulation; and the reason if it is missed."""
 
     words: str
     us: float | None

@@ -95,7 +95,7 @@ class Steps:
         contacts = watch("overlaps", bodies.overlaps)
         found = contacts.overlaps
         watch("hand-over", lambda: [getattr(found, name) for name in MEASURES])
-        # What overlaps() has done again, now that the boxes are laid around the shapes.
+        # overlaps() finds the pairs once more, when the boxes are laid around the shapes already.
         watch("culling again", bodies.pairs)
         ids = list(range(self.boxes + 5))
         watch("reading", lambda: [p.getBasePositionAndOrientation(id, client) for id in ids])
@@ -114,7 +114,7 @@ class Steps:
         }
 
     def take_kinds(self, pairs: np.ndarray, overlapping: np.ndarray) -> dict[str, float]:
-        """The geometry of a pair that overlaps, and of one that does not, the shapes being placed before."""
+        """µs for a pair that overlaps, and for a pair that does not. The shapes are placed before."""
         placed, number = self.bodies.placed, np.array([len(self.bodies.placed), 1])
         poses = np.array([body.position for body in placed]), np.array([body.orientation for body in placed])
         apart = pairs[~np.isin(pairs @ number, overlapping @ number)]

@@ -23,7 +23,7 @@ MOST_EDGE_PAIRS = 500_000
 
 
 def common_volume(a: Iterable, b: Iterable) -> Fraction:
-    """Of the hulls of two sets of points, whose coordinates are doubles or fractions."""
+    """The volume common to the hulls of two sets of points, whose coordinates are doubles or fractions."""
     return exact.total(volumes(polytope(a), polytope(b)))
 
 
@@ -66,8 +66,7 @@ def polytope(points: Iterable) -> exact.Polytope:
 
 
 def is_convex(triangles: dict[exact.Ring, exact.Plane], cloud: list[exact.Point]) -> bool:
-    """Whether a closed surface without holes, of all points, is nowhere bent inwards: then it is that of a convex
-    body."""
+    """True if a closed surface without holes, of all points, is nowhere bent inwards: then it is convex."""
     over = {edge: ring for ring in triangles for edge in exact.edges_of(ring)}
     used = Counter(p for ring in triangles for p in ring)
     if len(over) != 3 * len(triangles) or len(used) != len(set(cloud)) or 2 * len(used) - len(triangles) != 4:

@@ -50,7 +50,7 @@ class Row:
     method: str
     setting: str
     quantity: str
-    us: str = ""  # median of the samples; empty if there are none
+    us: str = ""  # median of the samples; empty without samples
     us_low: str = ""  # quartiles
     us_high: str = ""
     samples: int | str = 0

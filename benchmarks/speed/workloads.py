@@ -56,7 +56,7 @@ class Pair:
 
     @cached_property
     def volume(self) -> Fraction:
-        """Of the shapes as placed, without any rounding."""
+        """The volume common to the shapes as placed, without any rounding."""
         if self.volume_of_round is not None:
             return self._found[0]
         return truth.common_volume(*map(exact_points, self.bodies))
@@ -73,7 +73,7 @@ class Pair:
 
     @cached_property
     def volume_of_points(self) -> Fraction:
-        """Of the hulls of the rounded vertices, which is what peers get that take no poses."""
+        """The volume common to the hulls of the rounded vertices. Peers that take no poses get these."""
         if self.volume_of_round is not None or all(map(unrounded, self.bodies)):
             return self.volume
         return truth.common_volume(*map(vertices, self.bodies))
@@ -93,7 +93,7 @@ class Pair:
 
 
 def unrounded(body: Placed) -> bool:
-    """Whether placing the vertices in doubles gives the exact ones."""
+    """True if placing the vertices in doubles gives the exact ones."""
     if is_round(body):
         return True
     return [tuple(map(Fraction, p)) for p in vertices(body).tolist()] == [tuple(p) for p in exact_points(body)]
@@ -110,7 +110,7 @@ def apart(rng: np.random.Generator, first: np.ndarray, second: np.ndarray, gap: 
 
 
 def pushed_in(rng: np.random.Generator, points: np.ndarray, depth: float) -> Pair:
-    """Two hulls of the same points, turned at random, of which one reaches `depth` into the other along a line."""
+    """Two hulls of the same points, turned at random. One reaches `depth` into the other along a line."""
     one, other, along = quaternion(rng), quaternion(rng), directions(rng, 1)[0]
     reach = (points @ rotation(one).T @ along).max() + (points @ rotation(other).T @ -along).max() - depth
     at = directions(rng, 1)[0]
@@ -198,7 +198,7 @@ def ball_at_corner(rng: np.random.Generator) -> Pair:
 
 
 def crossing_cylinders(rng: np.random.Generator) -> Pair:
-    """Of one radius, their axes meeting at a right angle: 16/3 of its cube, as Archimedes knew."""
+    """Two cylinders of one radius whose axes meet at a right angle share 16/3 of its cube, as Archimedes knew."""
     r = Fraction(int(rng.integers(8, 16)), 16)
     at = rng.integers(-16, 17, 3) / 16
     cylinder = Cylinder(float(r), 4.0)
@@ -218,13 +218,13 @@ SHALLOW = 1e-6  # m
 
 
 def by_slices(a: Placed, b: Placed) -> tuple[Fraction, Fraction]:
-    """Of a ball, capsule or cylinder and a polyhedron: the volume as a double."""
+    """The volume of a ball, capsule or cylinder and a polyhedron, as a double, and its error."""
     volume = Fraction(exactly(a, b).volume)
     return volume, volume / 2**53
 
 
 def by_proof(a: Placed, b: Placed) -> tuple[Fraction, Fraction]:
-    """Of two that have a certificate: the middle of what it proves."""
+    """The middle of the bounds that a certificate proves, and half their distance."""
     low, high = overlap(a, b).certificate().verify()
     return (low + high) / 2, (high - low) / 2
 

@@ -1,4 +1,4 @@
-"""Who says what of round bodies that are 1e-8 m deep in each other: volumes and depths, beside the true ones.
+"""Round bodies that are 1e-8 m deep in each other: the volumes and depths that peers give, beside the true ones.
 
     python benchmarks contacts           half a minute; writes benchmarks/results/stability_round.csv
     python benchmarks stability --page   then the page that has it, docs/stability.md

@@ -5,7 +5,7 @@
 
 Writes benchmarks/results/stability.csv (a case a line), and the page stability.md with its pictures to docs. The cases
 are those of tests/support/families.py made of vertices alone, so that every peer can be given them, and contacts of
-round bodies, of which only depths and distances are asked. The truth is exact: rational arithmetic on the doubles that
+round bodies, for which only depths and distances are asked. The truth is exact: rational arithmetic on the doubles that
 the peers get.
 """
 
@@ -101,8 +101,10 @@ class Columns:
         self.rows, self.first, self.missing = rows, first, []
 
     def put(self, name: str, answer: Callable, bodies: list[tuple | None], judged: Callable, truths: list) -> None:
-        """What a peer says about bodies, judged by the truth about them; it is not asked about None. A peer that knows
-        none of the bodies has no column, and one whose package is missing has an empty one."""
+        """Adds the answers of a peer about bodies, judged by the truth about them. The peer is not asked about None.
+
+        A peer that knows none of the bodies gets no column. A peer whose package is missing gets an empty one.
+        """
         with Watched(answer, TIME_LIMIT, self.first) as peer:
             try:
                 answers = [NOT_ASKED if each is None else peer.ask(*each) for each in bodies]

@@ -1,4 +1,4 @@
-"""What an answer to a hard case is worth."""
+"""Verdicts on the answers to hard cases."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ACCURACY = 1e-6
 # Fraction of the smaller body's size within which bodies may as well be said to overlap as not to.
 MARGIN = Fraction(1, 10**12)
 
-# What stands in the table for a right yes or no.
+# In tables: a right yes or no.
 RIGHT = "ok"
 
 
@@ -34,7 +34,7 @@ class Question:
 
     @property
     def round(self) -> bool:
-        """Whether there are bodies that have no vertices: only their signed distance is asked for."""
+        """True if a body has no vertices. Then only the signed distance is asked for."""
         return any(isinstance(body, Placed) for body in self.bodies)
 
     @cached_property
@@ -57,20 +57,20 @@ class Question:
 
     @cached_property
     def signed_distance(self) -> Fraction | None:
-        """Of a pair: minus the depth where they overlap. None of more bodies, and of cylinders met at an edge."""
+        """The distance of a pair; minus its depth if it overlaps. None for more bodies, and for cylinders at an edge."""
         return exact_distance.signed_distance(*self.solids) if len(self.bodies) == 2 else None
 
     @cached_property
     def clear(self) -> bool:
-        """Whether yes or no can be wrong: what is common holds a ball of MARGIN times the size, or the bodies stay
-        apart although every face is moved outwards by as much."""
+        """True if yes or no can be wrong. Then the common set holds a ball of MARGIN times the size, or the bodies
+        stay apart although every face is moved outwards by as much."""
         if self.common.dimension == 3:
             # A convex body of volume V and surface A holds a ball of radius V / A at least.
             return self.volume > MARGIN * self.size * Fraction(self.common.area) or self.shrunk(MARGIN * self.size)
         return self.common.dimension < 0 and not self.shrunk(-MARGIN * self.size)
 
     def shrunk(self, by: Fraction) -> bool:
-        """Whether anything is left in common once every face has been moved inwards."""
+        """True if the bodies have anything in common after every face has been moved inwards."""
         reach = 4 * int(max(float(np.abs(body).max()) for body in self.bodies) + 1)
         part = exact.hull([[x, y, z] for x in (-reach, reach) for y in (-reach, reach) for z in (-reach, reach)])
         for a, b, c, d in (plane for solid in self.solids for plane in solid.planes):
@@ -124,7 +124,7 @@ def failed(cell: str) -> bool:
 
 
 def error_of(cell: str) -> float:
-    """The relative error of a volume; 1 where it is lost, nan where there is none."""
+    """The relative error of a volume; 1 where it is lost, nan where no error is given."""
     try:
         return 1.0 if cell == "missed" else float(cell)
     except ValueError:

@@ -41,7 +41,7 @@ GROUPS = {
     "several bodies": ("compounds", "many_bodies", "crowds", "empty_triples", "slender_groups"),
 }
 
-# What the parameter of a family means, for those whose cases run over many decades of it.
+# The meaning of a family's parameter, for families whose cases run over many decades of it.
 DEGENERACIES = {
     "slivers": "depth of the overlap, in sizes",
     "tilted_slivers": "tilt of one body, in radians",
@@ -87,12 +87,12 @@ def write_page(measured: Path, folder: Path) -> Path:
 
 
 def volumes_of(rows: list[Row]) -> list[str]:
-    """Who was asked for volumes."""
+    """The peers that were asked for volumes."""
     return [name for name in hard_cases("volume") if name in rows[0]]
 
 
 def peers_of(rows: list[Row]) -> list[str]:
-    """Who was asked for volumes, or whether anything is common."""
+    """The peers that were asked for volumes, or whether anything is common."""
     return volumes_of(rows) + [name for name in hard_cases("overlaps") if name in rows[0]]
 
 
@@ -124,7 +124,7 @@ def failure_share(rows: Iterable[Row], peer: str) -> float:
 
 
 def worst_error(rows: Iterable[Row], peer: str) -> float:
-    """Relative, of the volumes or distances that were wanted and given; nan if there are none."""
+    """The largest relative error of the volumes or distances that were given; nan if none was given."""
     errors = [error for cell in asked(rows, peer) if not np.isnan(error := error_of(cell))]
     return max(errors, default=np.nan)
 
@@ -401,7 +401,7 @@ def ways(rows: list[Row]) -> str:
 
 
 def stress_run() -> str:
-    """What `python benchmarks stress` has recorded, and in which words."""
+    """The record of `python benchmarks stress`, in words and as a table."""
     (seeds,), rows = results.read(stress.TABLE)
     failures = int(rows[-1]["failures"])
     words = f"{int(rows[-1]['cases']):,} cases, {seeds}: " + (f"{failures} failures." if failures else "no failure.")
@@ -410,7 +410,7 @@ def stress_run() -> str:
 
 
 def shallow_rounds() -> dict[str, str]:
-    """What `python benchmarks contacts` has recorded, the answers to each contact in one cell."""
+    """The record of `python benchmarks contacts`, with all answers to a contact in one cell."""
     notes, rows = results.read(contacts.RESULTS)
     kinds = dict.fromkeys(row["contact"] for row in rows)
     known = max(float(row["known to"]) for row in rows)
@@ -432,7 +432,7 @@ def shallow_rounds() -> dict[str, str]:
 
 
 def all_said(cells: list[str]) -> str:
-    """The largest error, and how many answers are none."""
+    """The largest error, and how often each word stands in place of an answer."""
     errors = [error for cell in cells if not np.isnan(error := error_of(cell))]
     words = Counter(cell for cell in cells if cell != NOT_ASKED and np.isnan(error_of(cell)))
     worst = [f"{max(errors):.0e}"] if errors else []

@@ -127,7 +127,7 @@ def run(wanted: Iterable[Job], workers: int, path: Path) -> list[Row]:
     return done
 
 
-# What came out
+# The table of the results
 
 
 def table(done: list[Row]) -> list[Row]:
@@ -169,7 +169,7 @@ def print_table(lines: Sequence[Row]) -> None:
 
 
 def soak(first: int, count: int, steps: int = 20) -> bool:
-    """Whether memory stays as it is while so many new cases are asked for everything."""
+    """True if memory stays as it is while so many new cases are asked for everything."""
     stream = jobs(first)
     sizes = []
     for step in range(steps):
@@ -203,7 +203,7 @@ def options(parser: ArgumentParser) -> None:
 
 
 def main(chosen: Namespace) -> bool:
-    """Whether a rule is broken."""
+    """True if a rule is broken."""
     np.seterr(all="ignore")
     if chosen.rounded:
         false = list(rounded_pairs.false_statuses(chosen.first, chosen.rounded))
