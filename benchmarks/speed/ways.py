@@ -39,17 +39,17 @@ AROUND = Placed(RoundedHull(100 * np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1],
 
 
 class Typical(NamedTuple):
-    way: str  # as the page says
     bodies: tuple[Placed, ...]
+    way: str  # as the page says
 
 
-def typical(way: str, *bodies: tuple) -> Typical:
-    """Each body is a shape, its position and its orientation, as far as they are not those at rest."""
-    return Typical(way, tuple(Placed(*body) for body in bodies))
+def typical(way: str, *bodies: tuple | Placed) -> Typical:
+    """Each body is placed, or a shape with its position and orientation, as far as they are not those at rest."""
+    return Typical(tuple(body if isinstance(body, Placed) else Placed(*body) for body in bodies), way)
 
 
 BALL, DRUM, CAN, CAPSULE = Sphere(0.5), Hull(prism(256)), Cylinder(0.5, 1), Capsule(0.3, 1)
-FLOOR = (HalfSpace([0, 0, 1], 0),)
+FLOOR = Placed(HalfSpace([0, 0, 1], 0))
 BOX = (CUBE,)
 WITH_MARGIN = RoundedHull(0.1 * icosphere(0), 1e-3)
 ASIDE = (0.6, 0.5, 0.4)

@@ -57,7 +57,7 @@ class Question:
 
     @cached_property
     def signed_distance(self) -> Fraction | None:
-        """The distance of a pair; minus its depth if it overlaps. None for more bodies, and for cylinders at an edge."""
+        """The distance of a pair; minus its depth if it overlaps. None for more bodies and for cylinders at an edge."""
         return exact_distance.signed_distance(*self.solids) if len(self.bodies) == 2 else None
 
     @cached_property

@@ -38,7 +38,7 @@ def test_a_status_that_the_article_has_wrong_is_not_timed():
 
 
 def test_a_way_that_is_not_the_one_of_the_page_is_named(page):
-    ways.TYPICAL["two boxes"] = Typical("tracing", TYPICAL["two boxes"].bodies)
+    ways.TYPICAL["two boxes"] = Typical(TYPICAL["two boxes"].bodies, "tracing")
     before = page.read_text(encoding="utf-8")
     with pytest.raises(SystemExit, match=r"^two boxes: the way is clipping, not tracing$"):
         command.main(["ways", "--rounds=1"])
