@@ -29,7 +29,7 @@ NEAR = 2.5  # times half the size of the overlap: how much is seen to each side
 LEAST = 1e-150  # m, the least half height of a picture, which is divided by
 EDGES = 200  # of a body: more edges would hide it, and are not drawn
 COARSE = 0.05  # the tolerance of round overlaps, as every facet is written STEPS times
-GROUND = 4 / 3  # times half the height: the size of the scene, which sets how far planes are drawn
+GROUND = 0.9  # times half the height: the size of the scene, which sets how far planes are drawn
 
 
 def turning(overlap: Overlap) -> str:
