@@ -16,7 +16,9 @@ from pages import CUP, HAND, Bodies, hand_at
 
 from overlapper import Placed, Sphere
 from overlapper.viewer import Viewer
-from overlapper.viewer.look import Look
+from overlapper.viewer.framing import Framing
+from overlapper.viewer.look import BODIES, OVERLAPS, Look, owner_color, to_draw
+from overlapper.viewer.stage import Stage, rgb
 
 
 def test_a_live_view_is_seen_where_it_is_asked_to_be():
@@ -56,6 +58,19 @@ def test_a_live_view_shows_the_last_step_and_ends_with_its_server():
             viewer.show(Bodies({CUP: Placed(Sphere(0.1))}), [])
             assert live_paths(viewer) == {cup}
         assert server.returncode is not None
+
+
+def test_a_live_view_draws_every_facet_once_in_the_colour_of_its_owner():
+    bodies = hand_at(0.12)
+    (contact,) = bodies.contacts()
+    drawn = Stage(Framing(bodies), BODIES, OVERLAPS).overlap(contact.overlap).lower()
+    materials = {each["uuid"]: each for each in drawn["materials"]}
+    triangles = {each["uuid"]: len(each["data"]["index"]["array"].data) // 12 for each in drawn["geometries"][:2]}
+    solid = [each for each in drawn["object"]["children"] if each["geometry"] in triangles]
+    assert [materials[each["material"]]["color"] for each in solid] == [rgb(0.7 * owner_color(k)) for k in (0, 1)]
+    facets = to_draw(contact.overlap, Framing(bodies).size)
+    sizes = [[len(ring) - 2 for ring, k in zip(facets.facets, facets.owner) if k == owner] for owner in (0, 1)]
+    assert [triangles[each["geometry"]] for each in solid] == [sum(each) for each in sizes]
 
 
 @dataclass
