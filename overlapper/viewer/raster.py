@@ -71,10 +71,13 @@ def _band(spans: Indices, planes: Array, colors: NDArray[np.float32], top: int, 
     a, b, c = planes[triangle].T
     nearness = (a * column + b * row + c).astype(np.float32)
     ray = (row - top) * columns + column
-    # Positive floats are in the order of their bits. Of faces in one plane, the last drawn is in front.
-    keys = ray.astype(np.uint64) << np.uint64(46) | (nearness.view(np.uint32) >> 7).astype(np.uint64) << np.uint64(22)
-    keys = np.sort(keys | triangle.astype(np.uint64))
-    ray, triangle = (keys >> np.uint64(46)).astype(np.intp), (keys & np.uint64(2**22 - 1)).astype(np.intp)
+    # One sort by ray, by nearness, whose bits are in the order of its values, and by triangle: if two are equally near,
+    # the later one is in front.
+    bits = np.uint64(len(colors).bit_length())
+    near = (nearness.view(np.uint32) >> np.uint32(7)).astype(np.uint64)  # 24 bits: as fine as 1/65,536
+    keys = np.sort((ray.astype(np.uint64) << np.uint64(24) | near) << bits | triangle.astype(np.uint64))
+    ray = (keys >> (bits + np.uint64(24))).astype(np.intp)
+    triangle = (keys & ((np.uint64(1) << bits) - np.uint64(1))).astype(np.intp)
     first = np.flatnonzero(np.diff(ray, prepend=-1))
     faces = np.diff(first, append=len(ray))
     met, paint = np.arange(len(first)), np.zeros((len(first), 4), np.float32)

@@ -76,6 +76,16 @@ def test_triangles_that_share_an_edge_leave_no_gap_and_do_not_overlap():
     assert_allclose(image, 0.5, rtol=1e-6)
 
 
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_of_faces_in_one_plane_the_later_one_is_in_front(order):
+    triangles = np.array(
+        [[[-9, -9, -2], [9, -9, -2], [0, 9, -2]], [[-8, -9, -2], [9, -8, -2], [0, 8, -2]]], dtype=float
+    )
+    colors = np.array([[1, 0, 0, 1], [0, 1, 0, 1]], dtype=float)
+    image = painted(triangles[order], colors[order], SLOPE, WIDTH, HEIGHT)
+    assert_allclose(image, np.broadcast_to(colors[order[1]], image.shape))
+
+
 def test_faces_seen_edge_on_or_not_at_all_leave_the_image_empty():
     edge_on = [[[0, 0, -1], [0, 1, -2], [0, -1, -2]]]
     behind = [[[-9, -9, 2], [9, -9, 2], [0, 9, 2]]]
