@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "methods/round/closed_forms/answer.h"
+#include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/quadric/shallow_ball.h"
 #include "shapes/solid.h"
 

@@ -1,31 +1,11 @@
 #pragma once
 
-#include <array>
 #include <optional>
-#include <vector>
 
-#include "geometry/measures.h"
 #include "geometry/patch.h"
-#include "methods/round/closed_forms/revolved.h"
+#include "methods/round/closed_forms/round_pair.h"
 
 namespace overlapper::closed_forms {
-
-/// Two bodies as closed forms see them, about a reference. At least one of them is round.
-struct RoundPair {
-  std::array<const Placed*, 2> body;
-  std::array<std::optional<Revolved>, 2> revolved;  ///< the bodies that are balls, capsules or cylinders
-  double rounding;                                  ///< m: how far a surface may be off
-  Vec3 reference;
-  std::array<Vec3, 2> positions;  ///< of the bodies, about the reference
-  // Where one body is a half-space, a box or a hull:
-  int self = 0;                 ///< number of the round body
-  std::vector<Plane> planes{};  ///< of the flat body
-  bool outside = false;         ///< the centre of the round body is outside the flat body
-
-  const Placed& round_body() const { return *body[self]; }
-  const Placed& flat_body() const { return *body[1 - self]; }
-};
-RoundPair round_pair(const Placed& a, const Placed& b, double rounding, Vec3 reference);
 
 /// Measures of an overlapping pair right to rounding, whatever the tolerance. Nothing for pairs that the form does not
 /// cover. Volumes are right to their last digits however shallow the contact is, but those of ellipsoids: depths come

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "methods/round/closed_forms/answer.h"
+#include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/closed_forms/revolved_part.h"
 
 namespace overlapper::closed_forms {

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "methods/round/closed_forms/answer.h"
+#include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/quadric/ball.h"
 #include "methods/round/quadric/cylinder.h"
 
@@ -58,7 +58,8 @@ bool flush(const quadric::Rings& polyhedron, const Revolved& body) {
   return false;
 }
 
-/// What a capsule, as a cylinder and two half balls, or a cylinder shares with a polyhedron in its coordinates.
+/// Sums over the common part of a polyhedron and a cylinder, or a capsule as a cylinder and two half balls. The
+/// polyhedron is in coordinates of the long body.
 std::optional<LongBodySums> sums_of(const quadric::Rings& polyhedron, const Revolved& body) {
   thread_local quadric::Rings part;
   if (flush(polyhedron, body)) return std::nullopt;

@@ -2,7 +2,7 @@
 #include <limits>
 #include <span>
 
-#include "methods/round/closed_forms/answer.h"
+#include "methods/round/closed_forms/closed_forms.h"
 #include "methods/round/closed_forms/revolved_part.h"
 #include "methods/round/quadric/stretch.h"
 

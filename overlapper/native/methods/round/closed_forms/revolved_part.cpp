@@ -99,7 +99,7 @@ struct CylinderBelow {
   double lower_end, upper_end;  ///< m²: what is left of the flat ends
 };
 
-/// What is left of the cylinder |x| <= h, y² + z² <= r², where sine * x + cosine * y <= t; both >= 0. Slices of
+/// The part of the cylinder |x| <= h, y² + z² <= r², where sine * x + cosine * y <= t; both >= 0. Slices of
 /// constant y are rectangles, 2 √(r² − y²) wide, whose length falls from 2 h to nothing while y crosses the cut; with
 /// y = −r cos θ every integrand is a trigonometric polynomial. `enter` and `leave` are as in
 /// PlaneCut.

@@ -1,9 +1,10 @@
 #pragma once
 
-#include <array>
 #include <cfloat>
 
 #include "methods/round/closed_forms/revolved.h"
+#include "methods/round/quadric/gauss.h"
+#include "shapes/wide_body.h"
 
 namespace overlapper::closed_forms {
 
@@ -77,7 +78,7 @@ struct SymmetryFrame {
   }
 };
 
-/// What the plane leaves of the body.
+/// The part of the body that the plane leaves.
 RevolvedPart below(const Revolved& body, const PlaneCut& cut);
 
 /// The angle θ at which y = −r cos θ has risen from −r by `risen`.
@@ -89,15 +90,10 @@ double angle_between(double r, double risen, double more);
 /// rounding.
 template <class Integrand>
 void integrate(double from, double width, Integrand integrand) {
-  constexpr std::array<double, 8> node{0.0950125098376374, 0.2816035507792589, 0.4580167776572274, 0.6178762444026438,
-                                       0.7554044083550030, 0.8656312023878318, 0.9445750230732326, 0.9894009349916499};
-  constexpr std::array<double, 8> weight{0.1894506104550685, 0.1826034150449236, 0.1691565193950025,
-                                         0.1495959888165767, 0.1246289712555339, 0.0951585116824928,
-                                         0.0622535239386479, 0.0271524594117541};
   for (int i = 0; i < 8; ++i)
     for (const double side : {-1.0, 1.0}) {
-      const double advance = width * (1 + side * node[i]) / 2;
-      integrand(from + advance, advance, width * weight[i] / 2);
+      const double advance = width * (1 + side * quadric::kGaussNode[i]) / 2;
+      integrand(from + advance, advance, width * quadric::kGaussWeight[i] / 2);
     }
 }
 

@@ -1,7 +1,7 @@
+#include "methods/round/closed_forms/round_pair.h"
+
 #include <algorithm>
 #include <limits>
-
-#include "methods/round/closed_forms/closed_forms.h"
 
 namespace overlapper::closed_forms {
 

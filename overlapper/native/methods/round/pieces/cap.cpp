@@ -1,6 +1,6 @@
-#include "methods/round/pieces/cap.h"
-
 #include <numbers>
+
+#include "methods/round/pieces/piece.h"
 
 namespace overlapper::pieces {
 namespace {
@@ -27,7 +27,7 @@ struct Cap {
   }
 };
 
-/// What a shallow cap is along its axis is far less than across.
+/// Adds second moments. A shallow cap is far less along its axis than across.
 void add_second_moments(const Cap& cap, Moments& sum) {
   const auto& [height, volume, disc, n, tip, first, along, across] = cap;
   const auto square = [&](double p, double u, double v, double w) {

@@ -23,7 +23,7 @@ Culling::Solid::Solid(const Round& round) : radius(round.radius) {
 
 Vec3 Culling::Solid::outward(Vec3 point) const {
   Vec3 from = point - centre;
-  // Of what is far along the axis, the first time leaves rounding.
+  // If the point is far along the axis, the first time leaves rounding.
   for (int again = 0; again < 2; ++again) from -= dot(from, axis) * axis;
   const double length = std::sqrt(norm2(from));
   return length > 0 ? from / length : Vec3{};
@@ -108,7 +108,7 @@ void Culling::near(std::vector<std::array<int, 2>>& pairs) {
         two.lower.z <= one.upper.z)
       pairs.push_back({p, q});
   };
-  // Of two that meet, the one that begins later begins within the other.
+  // If two boxes meet, the one that begins later begins within the other.
   const auto begin_within = [](const std::vector<Swept>& ones, const std::vector<Swept>& others, bool equal, auto use) {
     size_t first = 0;
     for (const Swept& one : ones) {

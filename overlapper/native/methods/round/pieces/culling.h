@@ -17,7 +17,7 @@ class Culling {
   /// Adds the pairs of pieces whose boxes meet, in the order of their numbers.
   void near(std::vector<std::array<int, 2>>& pairs);
 
-  /// Of a piece of a and one of b, which are near each other.
+  /// A piece of a and one of b that are near each other.
   struct Meeting {
     int p = 0, q = 0;
     std::vector<Wall> walls;      ///< those that matter: where no other does, the common set ends sooner

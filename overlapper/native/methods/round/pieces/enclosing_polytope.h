@@ -49,7 +49,7 @@ struct EnclosingPolytope {
   /// Whether it is surely not inside: what is no number may be.
   bool excludes(Vec3 point) const;
   Bounds bounds() const;
-  /// Of dot(direction, X) over the polytope.
+  /// The least and the largest dot(direction, X) over the polytope.
   std::pair<double, double> range(Vec3 direction) const;
   double least(Vec3 direction) const { return range(direction).first; }
   Vec3 middle() const;

@@ -1,9 +1,8 @@
-#include "methods/round/pieces/in_polytope.h"
-
 #include <algorithm>
 #include <array>
 
 #include "geometry/scratch.h"
+#include "methods/round/pieces/piece.h"
 #include "methods/round/quadric/ball.h"
 #include "methods/round/quadric/cylinder.h"
 
@@ -19,7 +18,7 @@ constexpr double kSureOfMoments = 5e-11;
 
 using Face = EnclosingPolytope::Face;
 
-/// What rounding has done to the volume of what corners bound that cuts have made.
+/// The error of a polytope's volume by the rounding of corners that cuts have made.
 double rounding_of(const EnclosingPolytope& polytope, double border) {
   return 16 * DBL_EPSILON * polytope.extent() * border;
 }
@@ -96,7 +95,7 @@ bool add_polytope(const EnclosingPolytope& polytope, const DistinctWalls& distin
   return true;
 }
 
-/// What a round and a polytope share, about a centre in axes that `turn` turns to.
+/// The common part of a round and a polytope, about a centre, in axes that `turn` turns to.
 struct RoundPart {
   int owner;  ///< of the round
   Pull curved;
@@ -253,7 +252,7 @@ bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const Distin
   const auto found =
       quadric::measure_ball({about->corners, about->planes, about->edges, faces, about->misplaced}, {}, ball.radius);
   if (!found || found->sections.empty()) return true;
-  // What is convex has less surface than what is convex around it, unless a turn is wrong.
+  // A convex set has less surface than a convex set around it, unless a turn is wrong.
   if (!(found->volume >= 0 && found->area <= (1 + 1e-9) * polytope.surface())) return false;
   Totals piece;
   static_cast<Moments&>(piece) = *found, piece.error = found->error + nothing * found->area;

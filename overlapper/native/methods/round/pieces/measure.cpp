@@ -8,10 +8,8 @@
 #include "geometry/cancellation.h"
 #include "geometry/scratch.h"
 #include "methods/round/pieces/culling.h"
-#include "methods/round/pieces/in_polytope.h"
 #include "methods/round/pieces/parts.h"
 #include "methods/round/pieces/piece.h"
-#include "methods/round/pieces/result.h"
 
 namespace overlapper::pieces {
 namespace {
@@ -83,7 +81,7 @@ std::optional<RoundMeasures> measures_of(const Totals& totals, const BothPieces&
   result.centroid = inside + totals.first / totals.volume;
   result.inertia = totals.inertia_about_centroid();
   // If a body is inside the other, what sums to zero is rounding.
-  const Vec3 pull = norm(totals.pull) <= kSummation * totals.border ? Vec3{} : totals.pull;
+  const Vec3 pull = norm(totals.pull) <= slicing::kSummation * totals.border ? Vec3{} : totals.pull;
   result.pull = about(Pull{pull, totals.moment}, inside, {});
   for (const Pieces* pieces : {&both.a, &both.b})
     result.facets_touched += static_cast<int>(
@@ -117,7 +115,7 @@ struct FewPieces {
   std::vector<Round> rounds;
   std::vector<Wall> walls;
 
-  /// What every piece shares with every other, those without rounds first.
+  /// Adds what every piece of a shares with every piece of b, those without rounds first.
   bool add_all(const PieceSetting& setting, Sums& sums) {
     for (const int round_ones : {0, 1, 2})
       for (int i = 0; i < static_cast<int>(both.a.pieces.size()); ++i)
@@ -154,7 +152,7 @@ struct ManyPieces {
         if (both.rounds_of(i, j) != round_ones) continue;
         if (round_ones == 2 || (meet(i, j) && !add_in_closed_form(setting, sums))) rest_.push_back({i, j});
       }
-    // What was not sure to a fraction of the pieces before it may be to one of them all.
+    // A piece that was not sure to a fraction of the pieces before it may be sure to a fraction of all.
     for (const auto& [i, j] : rest_)
       if (meet(i, j) && !add_in_closed_form(setting, sums) && !add_sliced(setting, sums)) return false;
     return sums.totals.volume > 0;
@@ -191,7 +189,7 @@ struct ManyPieces {
   }
 
   std::vector<Numbers> rest_;  ///< such as are not measured in closed form
-  // Of the two pieces that meet.
+  // For the two pieces that meet.
   std::vector<Round> rounds_;
   Culling::Meeting meeting_;
   EnclosingPolytope polytope_;  ///< around what they share
@@ -200,13 +198,6 @@ struct ManyPieces {
 };
 
 }  // namespace
-
-bool grow(Pieces& pieces, double outwards) {
-  for (Wall& wall : pieces.walls)
-    if (wall.owner != slicing::kCut) wall.slack = wall.slack + DoubleDouble{outwards};
-  for (Round& r : pieces.rounds) r.radius += outwards;
-  return std::ranges::all_of(pieces.rounds, [](const Round& r) { return r.radius > 0; });
-}
 
 std::optional<RoundMeasures> measure_pieces(const SlicedPair& pair) {
   const Scratch<FewPieces> pieces;

@@ -4,8 +4,6 @@
 #include <limits>
 #include <numbers>
 
-#include "methods/round/pieces/cap.h"
-#include "methods/round/pieces/stacks.h"
 #include "methods/round/slicing/stack.h"
 
 namespace overlapper::pieces {

@@ -380,4 +380,11 @@ void cut(const Placed& body, const Placed& other, const EnclosingPolytope* commo
   std::visit([&](const auto& shape) { cutter(shape); }, body.shape);
 }
 
+bool grow(Pieces& pieces, double outwards) {
+  for (Wall& wall : pieces.walls)
+    if (wall.owner != slicing::kCut) wall.slack = wall.slack + DoubleDouble{outwards};
+  for (Round& r : pieces.rounds) r.radius += outwards;
+  return std::ranges::all_of(pieces.rounds, [](const Round& r) { return r.radius > 0; });
+}
+
 }  // namespace overlapper::pieces

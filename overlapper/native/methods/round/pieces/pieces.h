@@ -12,7 +12,7 @@ namespace overlapper::pieces {
 using slicing::Round;
 using slicing::Wall;
 
-/// What planes leave of at most one round.
+/// The part of at most one round that planes leave.
 struct Piece {
   int round = -1;
   int first_wall = 0, walls = 0;
@@ -43,5 +43,8 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
 /// cylinder along every edge, and a wedge of a ball at every vertex.
 void cut(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
          const WideVector& inside, Pieces& result);
+
+/// Moves the surface of a body out, but not the cuts through it; false if that leaves nothing of something round.
+bool grow(Pieces& pieces, double outwards);
 
 }  // namespace overlapper::pieces

@@ -1,10 +1,9 @@
-#include "methods/round/pieces/stacks.h"
-
 #include <algorithm>
 #include <limits>
 #include <utility>
 
 #include "geometry/scratch.h"
+#include "methods/round/pieces/piece.h"
 #include "methods/round/slicing/stack.h"
 #include "methods/round/slicing/whole_stack.h"
 
@@ -21,7 +20,7 @@ constexpr double kShare = 0.02;
 /// The fraction of a piece that may stay open where its centroid tells whether it lies outside.
 constexpr double kTold = 1e-6;
 
-/// Of coordinates (x, y, t).
+/// The point of coordinates (x, y, t) in the world.
 Vec3 in_world(const Stack& stack, Vec3 v) { return v.x * stack.l + v.y * stack.m + v.z * stack.t; }
 
 /// The best sums over stacks of one piece.
@@ -31,7 +30,7 @@ struct BestSum {
   slicing::DrawnIntervals intervals;
 };
 
-/// What a piece is measured with.
+/// A piece, the settings, and the sums so far.
 struct PieceContext {
   const SlicedPiece& piece;
   const PieceSetting& setting;
@@ -179,7 +178,7 @@ bool add_slices(const SlicedPiece& piece, const PieceSetting& setting, Sums& sum
   const bool told = look_at(*stack, setting.closely, sum.intervals);
   if (told && sum.intervals.intervals.empty()) return true;
   if (told) {
-    // Of few nodes, the terms of a stretched area tell too little.
+    // The terms of few nodes tell too little of a stretched area.
     keep_better(*stack, at, !setting.stretch, 0, sum);
     if (!at.closed(sum, 0.1))
       if (const auto step = nearer_point(*stack, piece, sum.best.integrals))

@@ -1,8 +1,9 @@
 #include <limits>
 
 #include "geometry/scratch.h"
+#include "methods/round/pieces/measure.h"
 #include "methods/round/pieces/piece.h"
-#include "methods/round/pieces/result.h"
+#include "methods/round/pieces/pieces.h"
 
 namespace overlapper::pieces {
 namespace {

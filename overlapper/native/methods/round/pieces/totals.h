@@ -13,9 +13,6 @@
 
 namespace overlapper::pieces {
 
-/// Sums of area vectors are right to this fraction of the area.
-inline constexpr double kSummation = 16 * DBL_EPSILON;
-
 /// Integrals over pieces in the axes of the world, about the point inside.
 struct Totals : Moments {
   double error = 0, area = 0, area_error = 0;
@@ -46,7 +43,7 @@ inline double missing(const Totals& totals) {
   const Vec3 u = totals.unbalanced, s = totals.squares, p = totals.products;
   const double square =
       u.x * u.x * s.x + u.y * u.y * s.y + u.z * u.z * s.z + 2 * (u.y * u.z * p.x + u.z * u.x * p.y + u.x * u.y * p.z);
-  const double rounding = kSummation * totals.border * std::sqrt((s.x + s.y + s.z) / totals.volume);
+  const double rounding = slicing::kSummation * totals.border * std::sqrt((s.x + s.y + s.z) / totals.volume);
   return std::max(0.0, std::sqrt(std::max(0.0, square / totals.volume)) - rounding);
 }
 
@@ -55,7 +52,7 @@ inline double open_volume(const Totals& totals) { return 2 * std::max(totals.ope
 
 /// m²: at least as much is missing of a surface whose area vectors do not sum to zero, beyond rounding.
 inline double missing_area(Vec3 unbalanced, double border) {
-  return std::max(0.0, norm(unbalanced) - kSummation * border);
+  return std::max(0.0, norm(unbalanced) - slicing::kSummation * border);
 }
 
 /// All that is summed over pieces.
@@ -80,7 +77,7 @@ struct PatchView {
         owner(owner_) {}
 };
 
-/// What is the same for all pieces of a pair.
+/// Settings that are the same for all pieces of a pair.
 struct PieceSetting {
   double extent = 0;                          ///< m: no point of the common set is farther from the one inside
   const quadric::Stretch* stretch = nullptr;  ///< of an ellipsoid: from the ball and the planes that are added
@@ -96,5 +93,17 @@ inline constexpr double kSure = 5e-13;
 
 /// Whether slices are to have so many walls: of more, they take long, by the cube of their number.
 inline bool sliceable(size_t walls) { return walls <= 28; }
+
+/// Beyond that fraction of a volume, something is wrong. Polytopes of tangent planes take seconds to be as good.
+inline constexpr double kMostError = 1e-8;
+/// The fraction of a volume that may stay open before slices are looked at more closely, or others are.
+inline constexpr double kMostOpen = 1e-11;
+
+/// m: how far rounding may move surfaces whose coordinates, about the point inside, reach as far as the common set. If
+/// `mean_square` is the mean square of the distance of a convex set from the point, no point is farther than five times
+/// its root: ∫ |x|² dV about the centroid is at least 2 V R² / 45.
+inline double rounding_of_surfaces(double mean_square) { return 8 * DBL_EPSILON * 5 * std::sqrt(mean_square); }
+
+inline double sum_of(Vec3 v) { return v.x + v.y + v.z; }
 
 }  // namespace overlapper::pieces

@@ -270,8 +270,8 @@ void finish(const std::vector<Disc>& discs, double r, BallSums& sums) {
   // A ball that no face reaches no plane reaches either, unless the polyhedron is nothing but rounding.
   const bool reached = std::ranges::any_of(discs, [](const Disc& disc) { return disc.square > 0; });
   if (part.faces == 0 && reached) part.error = kInfinity;
-  // What lies beyond the faces is farther around the ball than they are, and the curved part than its vector is long;
-  // by a wrong turn, one of them would not be so.
+  // The sphere beyond the faces is larger than the faces, and the curved part is larger than its area vector is long.
+  // After a wrong turn, one of the two would not hold.
   const double slack = kOpen * r2;
   if (!(area + sums.flats <= 4 * kPi * r2 + slack && norm(part.flat) <= area + slack)) part.error = kInfinity;
   part.area += area;

@@ -8,7 +8,7 @@
 
 namespace overlapper::quadric {
 
-/// What a ball and a polyhedron share, about the ball's centre, along the polyhedron's axes.
+/// The common part of a ball and a polyhedron, about the ball's centre, along the polyhedron's axes.
 struct BallPart : Moments {
   double error = 0;  ///< of the volume: what rounding may have done to it, that of the arguments not counted
   Vec3 flat;         ///< ∫ n dA over the polyhedron's faces; over the curved part, its opposite

@@ -27,7 +27,7 @@ struct Arc {
   double segment, across, bulge, bulge_square;
 };
 
-/// Of an arc's half angle, the sine and the cosine of that.
+/// The functions of an arc's half angle x, from x, its sine and its cosine.
 Arc arc(double x, double s, double c) {
   if (std::abs(x) < kNarrow) {
     const double square = x * x, cube = square * x;
@@ -81,7 +81,7 @@ bool find_chord(Vec3 p, Vec3 q, bool p_inside, bool q_inside, double radius, Cyl
   return true;
 }
 
-/// What is summed over a face's part inside.
+/// Sums over the part of a face inside the cylinder.
 struct FaceSums : Section {
   double sizes = 0;  ///< m²: of the areas that are summed
   /// ∫ (ρ² − r²) x dA, of the distance ρ from the axis, and ∫ z³ dA.
@@ -168,7 +168,7 @@ bool around(const AboutAxis& at, std::span<const int> ring, Vec3 n) {
     if (turn < 0) return false;
     twice += turn;
   }
-  // What is nothing but rounding may seem to lie around anything.
+  // A face that is nothing but rounding may seem to lie around anything.
   return twice >= 6 * std::abs(n.z) * at.radius * at.radius;
 }
 
@@ -225,7 +225,7 @@ std::optional<double> arc_angle(Vec3 n, Vec3 p, Vec3 q, std::span<const Cylinder
     const bool upright = std::abs(n.z) < kUpright;
     return !upright && (n.z > 0) != (angle > 0) ? angle + turn : angle;
   }
-  // What has a border longer than the arc's chord is not between the two.
+  // If the other border is longer than the arc's chord, the face is not between the arc and its chord.
   if (border > 100 * kNearlyWhole * radius) return angle;
   if (chords.size() != 1) return std::nullopt;
   const double side = cross2(chords[0].from, chords[0].to) * n.z;
@@ -320,7 +320,7 @@ std::optional<FaceSums> add_polygon(Vec3 n, std::span<const CylinderChord> chord
 bool add_face(const AboutAxis& at, size_t f, std::vector<CylinderChord>& chords, CylinderSums& sums, Section& section) {
   const Vec3 n = at.polyhedron->planes()[f].normal;
   const double offset = at.polyhedron->planes()[f].offset - n.z * at.level;
-  // Of the cylinder between the heights, nothing reaches a plane that is farther away.
+  // The cylinder between the heights does not reach a plane that is farther away.
   const double reach = at.radius * std::sqrt(dot2(n, n)) + std::abs(n.z) * at.height / 2;
   if (offset > reach + kBeyond * (reach + at.radius + std::abs(at.level))) return true;
   const auto ring = at.polyhedron->ring(f);

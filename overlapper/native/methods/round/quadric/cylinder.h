@@ -9,7 +9,7 @@
 
 namespace overlapper::quadric {
 
-/// What a cylinder without ends about the z axis and a polyhedron share, about the origin.
+/// The common part of a polyhedron and a cylinder without ends about the z axis, about the origin.
 struct CylinderPart : Moments {
   double error = 0;  ///< of the volume: what rounding may have done to it, that of the arguments not counted
   /// ∫ n dA and ∫ x × n dA over the curved part, and over the polyhedron's faces without cuts.

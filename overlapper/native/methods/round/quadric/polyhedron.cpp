@@ -43,7 +43,7 @@ bool Rings::become(const Shape& shape, const Pose& pose) {
 
 /// The corner where an edge that is cut passes the height, the same for both of its faces.
 int Rings::between(int above, int below, double height) {
-  // Of a fan of faces, all edges have one end in common.
+  // All edges of a fan of faces have one end in common.
   const auto [at_edge, is_new] = crossed_.try_emplace({above, below}, static_cast<int>(corners_.size()));
   if (is_new) {
     const Vec3 p = corners_[above], q = corners_[below];
@@ -52,6 +52,46 @@ int Rings::between(int above, int below, double height) {
     corners_.push_back(at);
   }
   return at_edge->second;
+}
+
+/// Adds what is left of a face, of which `outside` tells the corners that go. False if the face is not convex, by
+/// rounding. Around the new face, after_ leads from each corner, counted from `before`, to the next.
+template <class Outside>
+bool Rings::cut_face(size_t f, double height, int before, Outside outside) {
+  const size_t begin = kept_ring_.size();
+  int leaves = kNone, enters = kNone;
+  const auto corners = ring(f);
+  for (size_t k = 0; k < corners.size(); ++k) {
+    const int i = corners[k], j = corners[k + 1 < corners.size() ? k + 1 : 0];
+    if (!outside(i)) kept_ring_.push_back(i);
+    if (outside(i) == outside(j)) continue;
+    const int corner = outside(i) ? between(i, j, height) : between(j, i, height);
+    kept_ring_.push_back(corner);
+    int& side = outside(i) ? enters : leaves;
+    if (side != kNone) return false;
+    side = corner;
+  }
+  if (kept_ring_.size() == begin) return true;
+  if (enters != kNone) {
+    after_.resize(corners_.size() - before, kNone);
+    after_[enters - before] = leaves;
+  }
+  kept_.push_back(planes_[f]);
+  kept_start_.push_back(static_cast<int>(kept_ring_.size()));
+  return true;
+}
+
+/// Adds the new face; false if its border does not close.
+bool Rings::close_cut(const Plane& plane, int before) {
+  kept_.push_back(plane);
+  int at = before;
+  for (size_t k = 0; k < after_.size(); ++k, at = after_[at - before]) {
+    if (at == kNone || (k > 0 && at == before)) return false;
+    kept_ring_.push_back(at);
+  }
+  if (at != before) return false;
+  kept_start_.push_back(static_cast<int>(kept_ring_.size()));
+  return true;
 }
 
 bool Rings::cut(double height, bool keep_below) {
@@ -64,44 +104,16 @@ bool Rings::cut(double height, bool keep_below) {
     planes_.clear(), cuts_ = 0;
     return true;
   }
-  kept_.clear(), kept_ring_.clear(), kept_start_.assign(1, 0), crossed_.clear();
-  size_t cuts = 0;
-  // Around the new face, from each corner to the next.
-  after_.clear();
+  kept_.clear(), kept_ring_.clear(), kept_start_.assign(1, 0), crossed_.clear(), after_.clear();
+  size_t cuts = 1;
   for (size_t f = 0; f < planes_.size(); ++f) {
-    const size_t begin = kept_ring_.size();
-    int leaves = kNone, enters = kNone;
-    const auto corners = ring(f);
-    for (size_t k = 0; k < corners.size(); ++k) {
-      const int i = corners[k], j = corners[k + 1 < corners.size() ? k + 1 : 0];
-      if (!outside(i)) kept_ring_.push_back(i);
-      if (outside(i) == outside(j)) continue;
-      const int corner = outside(i) ? between(i, j, height) : between(j, i, height);
-      kept_ring_.push_back(corner);
-      int& side = outside(i) ? enters : leaves;
-      if (side != kNone) return false;
-      side = corner;
-    }
-    if (kept_ring_.size() == begin) continue;
-    if (enters != kNone) {
-      after_.resize(corners_.size() - before, kNone);
-      after_[enters - before] = leaves;
-    }
-    kept_.push_back(planes_[f]);
-    kept_start_.push_back(static_cast<int>(kept_ring_.size()));
-    cuts += !face(f);
+    const size_t kept = kept_.size();
+    if (!cut_face(f, height, before, outside)) return false;
+    cuts += kept_.size() > kept && !face(f);
   }
   const double side = keep_below ? 1 : -1;
-  kept_.push_back({{0, 0, side}, side * height});
-  const int first = before;
-  int at = first;
-  for (size_t k = 0; k < after_.size(); ++k, at = after_[at - before]) {
-    if (at == kNone || (k > 0 && at == first)) return false;
-    kept_ring_.push_back(at);
-  }
-  if (at != first) return false;
-  kept_start_.push_back(static_cast<int>(kept_ring_.size()));
-  cuts_ = cuts + 1;
+  if (!close_cut({{0, 0, side}, side * height}, before)) return false;
+  cuts_ = cuts;
   std::swap(planes_, kept_), std::swap(ring_, kept_ring_), std::swap(start_, kept_start_);
   return true;
 }

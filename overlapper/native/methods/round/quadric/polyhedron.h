@@ -54,6 +54,9 @@ class Rings {
 
  private:
   int between(int above, int below, double height);
+  template <class Outside>
+  bool cut_face(size_t f, double height, int before, Outside outside);
+  bool close_cut(const Plane& plane, int before);
 
   std::vector<Vec3> corners_;
   std::vector<Plane> planes_;

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "methods/round/quadric/gauss.h"
 #include "methods/round/quadric/segment.h"
 
 namespace overlapper::quadric {
@@ -17,12 +18,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kUnit = 0x1p-53;  ///< of rounding
 constexpr double kOneWay = 1e-7;   ///< of how far ends are: so near each other, doubles do not say which way they are
 constexpr double kNear = 1e-9;     ///< of squares: so near the sphere, doubles do not say which side a corner is on
-
-/// Gauss's sixteen nodes and weights on [-1, 1].
-constexpr std::array<double, 8> kNode{0.0950125098376374, 0.2816035507792589, 0.4580167776572274, 0.6178762444026438,
-                                      0.7554044083550030, 0.8656312023878318, 0.9445750230732326, 0.9894009349916499};
-constexpr std::array<double, 8> kWeight{0.1894506104550685, 0.1826034150449236, 0.1691565193950025, 0.1495959888165767,
-                                        0.1246289712555339, 0.0951585116824928, 0.0622535239386479, 0.0271524594117541};
 
 /// y z, z x and x y of two points, of one each.
 Vec3 products(Vec3 a, Vec3 b) { return {a.y * b.z, a.z * b.x, a.x * b.y}; }
@@ -94,7 +89,7 @@ void ShallowBall::add_arc(Vec3 from, Vec3 to, Vec3 back) {
   if (angle <= tight) return integrate(middle, half * along, disc_radius_ * out, half / (disc_radius_ + to_chord));
   const int parts = static_cast<int>(std::ceil(angle / tight));
   const double part = angle / parts, s = std::sin(part), c = std::cos(part);
-  // Of more than a half turn, the chord may be too short to say where its own middle is.
+  // The chord of an arc of more than half a turn may be too short to say where its own middle is.
   if (angle > 0.75 * kPi) out = -unit(from - disc_ + (to - disc_)), along = cross(normal_, out);
   for (int k = 0; k < parts; ++k) {
     const double at = (2 * k + 1 - parts) * part, sin_at = std::sin(at), cos_at = std::cos(at);
@@ -113,11 +108,12 @@ void ShallowBall::integrate(Vec3 middle, Vec3 along, Vec3 out, double quarter) {
   const double rise = 2 * scale * q2 / (1 + q2), bx = rise * out.x, by = rise * out.y;
   const double size = rise * std::sqrt(norm2(out));
   for (int i = 0; i < 8; ++i)
-    for (const double node : {-kNode[i], kNode[i]}) {
+    for (const double node : {-kGaussNode[i], kGaussNode[i]}) {
       const double t2 = q2 * node * node, c = 1 / (1 + t2);
       const double go = node * c, bulge = (1 - node * node) * c;
       // Backwards: what is to the left of a face's border is to the right of the curved part's.
-      const double go_rate = -kWeight[i] * (1 - t2) * c * c, bulge_rate = 2 * kWeight[i] * (1 + q2) * node * c * c;
+      const double go_rate = -kGaussWeight[i] * (1 - t2) * c * c,
+                   bulge_rate = 2 * kGaussWeight[i] * (1 + q2) * node * c * c;
       const double x = mx + ax * go + bx * bulge, y = my + ay * go + by * bulge;
       const double dx = ax * go_rate + bx * bulge_rate, dy = ay * go_rate + by * bulge_rate;
       const double square = x * x + y * y, w = square / (1 + std::sqrt(std::max(0.0, 1 - square)));

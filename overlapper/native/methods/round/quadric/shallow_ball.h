@@ -12,10 +12,10 @@ namespace overlapper::quadric {
 /// The depth, over the radius, up to which a common set is shallow.
 inline constexpr double kShallow = 0.4;
 
-/// What a ball and some planes share, seen from an apex just inside the ball: a point of the common set from which it
-/// reaches no deeper than it is shallow. Coordinates count from the apex; z leads away from the ball's centre.
+/// Sums over what a ball and some planes share, seen from an apex: the point of the common set that is nearest to the
+/// ball's centre. Coordinates count from the apex; z leads away from the ball's centre.
 ///
-/// Of each plane, its chords and arcs go around what it shares with the ball, counter-clockwise from outside.
+/// Chords and arcs of each plane go around the face that it shares with the ball, counter-clockwise from outside.
 class ShallowBall {
  public:
   /// m; the apex is so deep in the ball.
@@ -42,7 +42,7 @@ class ShallowBall {
   void integrate(Vec3 middle, Vec3 along, Vec3 out, double quarter);
 
   double radius_, depth_;
-  // Of the face under way.
+  // The face under way.
   Vec3 normal_, disc_;
   double height_ = 0, disc_radius_ = 0, twice_ = 0, twice_sizes_ = 0, segments_ = 0;
   Vec3 face_first_, face_squares_, face_products_;

@@ -10,8 +10,8 @@ namespace overlapper::quadric {
 /// of the ball, or of a plane, becomes one of the ellipsoid by the cofactors, and the size of the element of its
 /// surface, √(b²c² u² + c²a² v² + a²b² w²) per solid angle at (u, v, w), has no integral in closed form.
 struct Stretch {
-  /// What two rules may differ by, relative to what they give: that of fifteen nodes is the better by far, unless they
-  /// agree by chance.
+  /// The relative difference of two rules up to which the finer rule is believed. The rule of fifteen nodes is the
+  /// better by far, unless the two agree by chance.
   static constexpr double kApart = 1e-11;
 
   explicit Stretch(Vec3 half_axes_)
@@ -22,15 +22,15 @@ struct Stretch {
   Vec3 half_axes, cofactors;
   double volume;  ///< the determinant
 
-  /// What is left open of the surface's area, relative to it. Beyond a thousand times as long as thick, the element
-  /// changes within less of the ball than rules are sure to notice.
+  /// The relative error of the surface's area. In a body more than a thousand times as long as thick, the element
+  /// changes within a part of the ball so small that rules may not notice it.
   double open() const {
     const double shortest = std::min({half_axes.x, half_axes.y, half_axes.z});
     const double slender = std::max(1.0, max_component(half_axes) / shortest / 1e3);
     return std::min(1.0, kApart * slender * slender);
   }
 
-  /// Of an area vector.
+  /// The image of an area vector.
   Vec3 normal(Vec3 n) const { return scaled(cofactors, n); }
   double area(Vec3 n) const { return norm(normal(n)); }
   /// place × normal, in the world along the axes.

@@ -33,7 +33,7 @@ void for_roots(double a, double h, double c, Use use) {
 class Candidates {
   static constexpr int kSamples = 24;
   static constexpr int kMostTurns = 12;
-  /// Of the values beside it: one that may be zero when the turn is known better, and one that is but for rounding.
+  /// Two values beside the turn: one may be zero when the turn is known better, and one is zero but for rounding.
   static constexpr double kGrazing = 0.1, kTouching = 1e-9;
   using Samples = std::array<double, kSamples>;
 
@@ -159,7 +159,7 @@ class Candidates {
     }
   }
 
-  /// Of the side of a cylinder and a plane.
+  /// The corner of a plane and the side of a cylinder.
   void corner_and_ball(int i, int j) {
     const Point a = stack_.line[i].normal, b = stack_.line[j].normal;
     if (std::abs(cross(a, b)) < 1e-9 * stack_.line[j].length) return;
@@ -345,7 +345,7 @@ class Settling {
     values.push_back(low_), values.push_back(high_);
     std::sort(values.begin(), values.end());
     if (!find_inside(values)) {
-      // Of corners of a plane and two quadrics nothing is known yet.
+      // Corners of a plane and two quadrics are not known yet.
       candidates.trace(low_, high_);
       std::sort(values.begin(), values.end());
       if (!find_inside(values)) return true;
@@ -364,13 +364,14 @@ class Settling {
   }
 
  private:
-  /// Of an interval, how many parts of it are looked at at most.
+  /// The largest number of parts of an interval that are looked at.
   static constexpr int kMostInner = 48;
   static constexpr double kPointlike = 1e-11, kPointlikeClosely = 1e-14;  ///< of the stack
   static constexpr double kRounded = 1e-12;                               ///< of how far all slices are from the origin
   static constexpr int kMostEvents = 40;
 
-  /// What an interval is small beside: all of them, or near the origin, where doubles are finer, less.
+  /// The size beside which an interval is small: that of all intervals, or less near the origin, where doubles are
+  /// finer.
   double size_near(double low, double high) const {
     const double all = high_ - low_;
     return std::clamp(1e3 * std::max(std::abs(low), std::abs(high)), 1e-3 * all, all);
@@ -385,7 +386,7 @@ class Settling {
 
   void append(double low, double high, const Outline& between) {
     if (between.empty()) return;
-    // Of a convex set there is no empty slice between others, but by rounding.
+    // A convex set has no empty slice between others, but by rounding.
     if (!intervals_.empty()) intervals_.back().high = low;
     // A corner and a circle, or three lines, meet in a value of t; rounding makes it an interval of its own.
     const double far = std::max({0.0, low_, -high_});
@@ -428,27 +429,31 @@ class Settling {
     for (int i = 0; i < samples; ++i)
       if (i != in_the_middle) seen[i] = at(t[i], latest_);
     double from = low;
-    for (int i = 0; i + 1 < samples; ++i) {
-      double here = t[i];
-      Outline now = seen[i];
-      while (!(now == seen[i + 1])) {
-        if (++events_ > kMostEvents) return false;
-        // The first change between here and there, or one of them.
-        double before = here, after = t[i + 1];
-        Outline then = seen[i + 1];
-        for (int step = 0; step < 60; ++step) {
-          const double middle = before + (after - before) / 2;
-          if (middle <= before || middle >= after) break;
-          const Outline found = at(middle);
-          if (found == now) before = middle;
-          else after = middle, then = found;
-        }
-        append(from, after, now);
-        from = here = after;
-        now = then;
-      }
-    }
+    for (int i = 0; i + 1 < samples; ++i)
+      if (!append_changes(t[i], t[i + 1], seen[i], seen[i + 1], from)) return false;
     append(from, high, seen[samples - 1]);
+    return true;
+  }
+
+  /// Appends intervals from `from`, of which the last begins at the last change between two slices; `from` becomes
+  /// that. False if there are too many.
+  bool append_changes(double here, double there, Outline now, const Outline& last, double& from) {
+    while (!(now == last)) {
+      if (++events_ > kMostEvents) return false;
+      // The first change between here and there, or one of them.
+      double before = here, after = there;
+      Outline then = last;
+      for (int step = 0; step < 60; ++step) {
+        const double middle = before + (after - before) / 2;
+        if (middle <= before || middle >= after) break;
+        const Outline found = at(middle);
+        if (found == now) before = middle;
+        else after = middle, then = found;
+      }
+      append(from, after, now);
+      from = here = after;
+      now = then;
+    }
     return true;
   }
 
@@ -458,22 +463,25 @@ class Settling {
     constexpr double kFine = 1e-6, kRounding = 1e-15;
     const double range = stack_.high - stack_.low, away = kRounding * range;
     for (size_t i = 0; i <= intervals_.size(); ++i) {
-      double* end = i > 0 ? &intervals_[i - 1].high : nullptr;
-      double* begin = i < intervals_.size() ? &intervals_[i].low : nullptr;
-      const double t = begin ? *begin : *end;
-      if (!(std::abs(t) < kFine * range)) continue;
-      double low = t - away, high = t + away;
-      if ((end && !(low > intervals_[i - 1].low)) || (begin && !(high < intervals_[i].high))) continue;
-      const Outline before = end ? intervals_[i - 1].outline : Outline{};
-      if (!(at(low) == before) || !(at(high) == (begin ? intervals_[i].outline : Outline{}))) continue;
-      for (int step = 0; step < 60; ++step) {
-        const double middle = low + (high - low) / 2;
-        if (middle <= low || middle >= high) break;
-        (at(middle) == before ? low : high) = middle;
-      }
-      if (end) *end = begin ? high : low;
-      if (begin) *begin = high;
+      const double t = i < intervals_.size() ? intervals_[i].low : intervals_[i - 1].high;
+      if (std::abs(t) < kFine * range) refine(i, t - away, t + away);
     }
+  }
+
+  /// Finds the change before an interval again, or after the last one, if it is the only one from low to high.
+  void refine(size_t i, double low, double high) {
+    Interval* before = i > 0 ? &intervals_[i - 1] : nullptr;
+    Interval* after = i < intervals_.size() ? &intervals_[i] : nullptr;
+    if ((before && !(low > before->low)) || (after && !(high < after->high))) return;
+    const Outline of_before = before ? before->outline : Outline{};
+    if (!(at(low) == of_before) || !(at(high) == (after ? after->outline : Outline{}))) return;
+    for (int step = 0; step < 60; ++step) {
+      const double middle = low + (high - low) / 2;
+      if (middle <= low || middle >= high) break;
+      (at(middle) == of_before ? low : high) = middle;
+    }
+    if (before) before->high = after ? high : low;
+    if (after) after->low = high;
   }
 
   /// The slice there is looked at first.
@@ -513,7 +521,7 @@ class Settling {
     return false;
   }
 
-  /// What slices hold something is found to a factor of four, so that samples and bisections look where changes are.
+  /// Finds which slices hold something, to a factor of four, so that samples and bisections look where changes are.
   void close_in() {
     for (double* end : {&low_, &high_})
       for (int step = 0; step < 60; ++step) {
@@ -525,8 +533,8 @@ class Settling {
 
   const Stack& stack_;
   bool closely_;
-  /// Of an interval: where its ends are looked at. The root of a slice's area is concave, so that what begins or ends
-  /// nearer than that holds no more than its cube of the volume.
+  /// The part of an interval that is left out at its ends. The root of a slice's area is concave, so that anything that
+  /// begins or ends there holds no more than the cube of that part of the volume.
   double beside_;
   int inner_;
   std::vector<Interval>& intervals_;

@@ -17,7 +17,7 @@ struct Points {
 
 double sum(const Row& row) { return ((row[0] + row[1]) + (row[2] + row[3])) + ((row[4] + row[5]) + (row[6] + row[7])); }
 
-/// Of the radius: the direction of a shorter chord is mostly what rounding has made of its ends.
+/// The length of a chord, over the radius, below which rounding of its ends makes most of its direction.
 constexpr double kShort = 1e-6;
 
 /// quadric::Segment of each slice.
@@ -156,7 +156,7 @@ class Bundle {
     if (owner == 0) sum_.first_area += area;
   }
 
-  /// What planes have of the slices' borders.
+  /// Adds an edge of the slices in a plane.
   void add_edge(const Line& line, const Points& from, const Points& to) {
     const Point d = (1 / line.length) * Point{-line.normal.y, line.normal.x};
     const double inverse = 1 / line.length, offset = std::abs(line.offset), rate = std::abs(line.rate);
@@ -193,7 +193,7 @@ class Bundle {
     }
   }
 
-  /// What the side of a cylinder has of them.
+  /// Adds an edge of the slices in the side of a cylinder.
   void add_side(const Line& line, const Points& from, const Points& to) {
     const Quadric& q = stack_.quadric[line.quadric];
     const Point n = line.normal, s = stack_.shear;
@@ -234,7 +234,7 @@ class Bundle {
     }
   }
 
-  /// Of such edges, each as long as it looks.
+  /// Adds edges to the view, each as long as it looks.
   void see(const Points& from, const Points& to, const Row& length) {
     const View& view = *stack_.view;
     for (int k = 0; k < kRow; ++k) {
@@ -266,8 +266,7 @@ class Bundle {
       const double inverse = l > 0 ? 1 / l : 0, x = cy * inverse, y = -cx * inverse;
       const double beside =
           x * (0.5 * (p.x[k] + q.x[k]) - sides_.centre_x[k]) + y * (0.5 * (p.y[k] + q.y[k]) - sides_.centre_y[k]);
-      // Of a chord that rounding may have turned round, what is known of the two lines that it lies between tells the
-      // side.
+      // Rounding may have turned a short chord round. Then the two lines beside the chord tell the side.
       const double sure = back && one[k] > 0 && two[k] > 0 ? -std::abs(beside) : std::abs(beside);
       const double d = l < kShort * radius[k] ? sure : beside, h = 0.5 * l;
       const double whole = std::max(std::sqrt(h * h + d * d), DBL_MIN);
@@ -318,7 +317,7 @@ class Bundle {
     add_zone(ball, {sum(px), sum(py), sum(up)}, all, sum(t_up), sum(size), surface);
   }
 
-  /// What arcs by those angles to either side of (x, y) have of an ellipsoid's surface.
+  /// The surface of an ellipsoid along arcs that reach so far to either side of (x, y).
   double stretched_zone(const Row& x, const Row& y, const Row& angle) {
     const Row& radius = sides_.half[stack_.ball];
     double surface = 0;
@@ -333,7 +332,7 @@ class Bundle {
     return surface;
   }
 
-  /// Of the disc's centre, positive where a line leaves nearly all of the disc.
+  /// Positive where a line leaves nearly all of the disc.
   void beyond(const Line& line, Row& result) const {
     const Point n = line.normal;
     const double length = line.length;
@@ -368,7 +367,7 @@ class Bundle {
     add_zone(ball, {0, 0, up}, all, t_up, size, surface);
   }
 
-  /// What the ball has of the surface. Its forces act along lines through its centre.
+  /// Adds a zone of the ball's surface. Its forces act along lines through the ball's centre.
   void add_zone(const Quadric& ball, Vec3 pull, double turned, double t_up, double size, double surface) {
     add_area(ball.owner, surface);
     sum_.border += turned * ball.radius;

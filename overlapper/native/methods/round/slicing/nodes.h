@@ -12,7 +12,7 @@ inline constexpr int kMostNodes = 24;
 inline constexpr int kRow = 8;
 using Row = std::array<double, kRow>;
 
-/// Of each slice, per quadric: half its chord, and the sides of a cylinder or the disc.
+/// Half the chord of each slice, per quadric, and the sides of a cylinder or the disc.
 struct Sides {
   std::array<Row, 2> half, upper, lower;
   Row centre_x, centre_y, slack;  ///< of the disc; |centre|² − radius²
@@ -28,15 +28,15 @@ struct Nodes {
   void append(double at, double counts) { t[size] = at, tail[size] = 0, weight[size] = counts, ++size; }
 };
 
-/// Of each slice: its area, and that of the surface per unit of t.
+/// The area of each slice, and the area of the surface per unit of t.
 struct Slices {
   std::array<double, kMostNodes> volume, area;
 };
 
-/// What slices give that all have that outline, weighted and summed.
+/// The weighted sum over slices that all have that outline.
 Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices);
 
-/// What a single slice gives per unit of t.
+/// The integrals of a single slice per unit of t.
 Integrals measure(const Stack& stack, const Outline& outline, double t);
 
 /// The face in a plane parallel to the slices, which the slice beside it, at `t`, fills.

@@ -5,6 +5,7 @@
 #include <cfloat>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 
 #include "geometry/wide.h"
@@ -108,8 +109,8 @@ struct Series {
   }
 };
 
-/// What a rule says of the slices between two values of t.
-struct Part {
+/// The answer of a rule for the slices between two values of t.
+struct RulePart {
   const Outline* outline;
   double low, high;
   Rule rule;
@@ -120,8 +121,8 @@ struct Part {
   double width() const { return high - low; }
 };
 
-Part apply(const Stack& stack, const Outline& outline, double low, double high, Rule rule) {
-  Part part{&outline, low, high, rule, {}, {}, {}, {}};
+RulePart apply(const Stack& stack, const Outline& outline, double low, double high, Rule rule) {
+  RulePart part{&outline, low, high, rule, {}, {}, {}, {}};
   const double width = high - low;
   const int half = static_cast<int>(rule.size()), size = 2 * half;
   Nodes nodes;
@@ -151,13 +152,13 @@ class Integrating {
       : stack_(stack), volume_(volume), area_(area), few_(few), strictness_(strictness), sum_(sum) {}
 
   bool run(std::span<const Interval> intervals) {
-    thread_local std::vector<Part> parts;
+    thread_local std::vector<RulePart> parts;
     parts.clear();
     for (const Interval& interval : intervals)
       parts.push_back(apply(stack_, interval.outline, interval.low, interval.high, first()));
-    for (const Part& part : parts) sum_.about += part.integrals.volume, area_ += part.integrals.area;
+    for (const RulePart& part : parts) sum_.about += part.integrals.volume, area_ += part.integrals.area;
     volume_ += sum_.about;
-    for (const Part& part : parts)
+    for (const RulePart& part : parts)
       if (!add(part, 0)) return false;
     return true;
   }
@@ -166,8 +167,8 @@ class Integrating {
   Rule first() const { return few_ ? kRules.front() : kRules.back(); }
 
   /// How many times half of its nodes a rule lacks.
-  double lacks(const Part& part) const {
-    // Of what rounding leaves, other rules make no less.
+  double lacks(const RulePart& part) const {
+    // Other rules do not make rounding smaller.
     const double rounding = 16 * DBL_EPSILON * part.integrals.blur / part.integrals.volume;
     const auto of = [&](const Series& series, double here, double whole, double limit, double limit_of_tail) {
       const double end = series.tail();
@@ -184,33 +185,42 @@ class Integrating {
     return std::max(volume, of(part.area, part.integrals.area, area_, kAreaError, kAreaTail));
   }
 
-  bool add(const Part& part, int halvings) {
+  /// The rule of more nodes that will do, or the one of most. Nothing where halves will do with fewer.
+  std::optional<Rule> finer(const RulePart& part, double lacking) const {
+    // In a series of few nodes, terms in the middle have not begun to fall; later terms fall twice as fast.
+    const double nodes = static_cast<double>(part.rule.size()) * (2 + lacking / 2);
+    if (!(nodes < kHopeless)) return std::nullopt;
+    for (const Rule& rule : kRules)
+      if (rule.size() > part.rule.size() &&
+          (2 * static_cast<double>(rule.size()) >= nodes || rule.size() == kRules.back().size()))
+        return rule;
+    return std::nullopt;
+  }
+
+  bool add(const RulePart& part, int halvings) {
     if (++sum_.rules > kMostRules) return false;
-    const double lacking = lacks(part);
-    if (lacking > 0) {
-      // Of few nodes the terms in the middle are yet to fall, and twice as fast is what comes.
-      const double nodes = static_cast<double>(part.rule.size()) * (2 + lacking / 2);
-      if (part.rule.size() < kRules.back().size() && nodes < kHopeless) {
-        for (const Rule& rule : kRules)
-          if (rule.size() > part.rule.size() &&
-              (2 * static_cast<double>(rule.size()) >= nodes || rule.size() == kRules.back().size()))
-            return add(apply(stack_, *part.outline, part.low, part.high, rule), halvings);
-      }
+    if (const double lacking = lacks(part); lacking > 0) {
+      if (const auto rule = finer(part, lacking))
+        return add(apply(stack_, *part.outline, part.low, part.high, *rule), halvings);
       if (halvings < kMostHalvings && part.width() > 1e-14 * (std::abs(part.low) + std::abs(part.high))) {
         const double middle = part.low + part.width() / 2;
         return add(apply(stack_, *part.outline, part.low, middle, first()), halvings + 1) &&
                add(apply(stack_, *part.outline, middle, part.high, first()), halvings + 1);
       }
     }
+    add_as_it_is(part);
+    return true;
+  }
+
+  void add_as_it_is(const RulePart& part) {
     sum_.integrals.add(1, part.integrals);
     sum_.samples.insert(sum_.samples.end(), part.samples.begin(), part.samples.begin() + 2 * part.rule.size());
-    // Of what was not halved for its area's sake, no fall of terms is taken for granted.
+    // If halving ended for its area's sake, no fall of terms is taken for granted.
     const bool ended = sum_.rules > kMostRulesForStretch;
     const double of_stretched = ended ? 30 * part.area.tail() : part.area.stretched_error(part.integrals.area);
     sum_.area_error += stack_.stretch ? of_stretched : part.area.error();
     const double ratio = volume_ > 0 ? part.volume.tail() / volume_ : 0;
     sum_.error += strictness_ > 0 ? volume_ * std::min(ratio, 30 * ratio * std::sqrt(ratio)) : part.volume.error();
-    return true;
   }
 
   const Stack& stack_;
@@ -220,8 +230,8 @@ class Integrating {
   Sum& sum_;
 };
 
-/// Of slices that are polygons, the integrands are polynomials of degree four at most, which the rule of Gauss and
-/// Legendre with three nodes integrates exactly.
+/// Slices that are polygons have integrands of degree four at most. The rule of Gauss and Legendre with three nodes
+/// integrates these exactly.
 void integrate_polygons(const Stack& stack, const Interval& interval, Sum& sum) {
   constexpr double kShare = 0.1127016653792583, kOuter = 5.0 / 18, kInner = 8.0 / 18;
   const double width = interval.high - interval.low;

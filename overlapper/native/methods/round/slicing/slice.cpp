@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cfloat>
 #include <numbers>
+#include <span>
 
 namespace overlapper::slicing {
 
@@ -78,8 +79,8 @@ bool along_one_another(const Slice& slice, int edge, int other, Point p, Point q
   return !(along >= 0 && along <= dot(q - p, q - p));
 }
 
-/// Of two lines of one direction that lie nearer to one another than corners far away are right to, sides alone tell
-/// which is the nearer: it takes the other's place. True if there is such a line.
+/// Two lines of one direction may lie nearer to one another than the error of corners far away. Then the sides alone
+/// tell which line is the nearer, and it takes the other's place. True if there is such a line.
 bool replaced(Polygon& polygon, const Slice& slice, int line) {
   const Line& b = slice.stack.line[line];
   const double near = 64 * DBL_EPSILON * slice.stack.line[slice.stack.lines - 1].offset * b.length;
@@ -119,7 +120,7 @@ bool clip(Polygon*& now, Polygon*& spare_one, const Slice& slice, int line) {
   int first = 0;
   while (!kept[first] || kept[first > 0 ? first - 1 : size - 1]) ++first;
   const auto wrapped = [size](int i) { return i < size ? i : i - size; };
-  // Of two lines of one direction the nearer is all that counts, whatever rounding says of the other's corners.
+  // The nearer one of two lines of one direction counts alone, whatever rounding says of the other's corners.
   const auto farther = [&](int edge) {
     return slice.side(edge) * stack.line[line].length > side * stack.line[edge].length;
   };
@@ -142,12 +143,33 @@ bool clip(Polygon*& now, Polygon*& spare_one, const Slice& slice, int line) {
   return true;
 }
 
-/// Of a chord: a corner no farther inside of the circle may lie on it.
+/// The fraction of a chord within which a corner inside the circle may lie on the circle.
 constexpr double kBesideCircle = 1e-6;
 
-/// Of the radius: how far the centre is inside of lines that leave the whole disc, but for rounding. That their chords
-/// meet no edge is not enough: of a polygon that is nothing but rounding, none does.
+/// The distance, over the radius, by which lines that leave the whole disc have its centre inside, but for rounding. It
+/// is not enough that no chord meets an edge: in a polygon that is nothing but rounding, none does.
 constexpr double kBeyondCircle = 0.999;
+
+/// Joins edges that do not share a corner by arcs. Both edges at a corner see it inside of the circle, or neither does,
+/// and there the outline turns by less than half a turn; unless the polygon is nothing but rounding, which leaves
+/// nothing. `position` counts the long edges of the polygon, of which there are so many; `before` and `after` say how
+/// much of an edge's chord lies outside of the edge.
+void close_with_arcs(const Slice& slice, std::span<const int> position, int long_edges, std::span<const double> before,
+                     std::span<const double> after, Outline& result) {
+  for (int i = 0; i < result.edges; ++i) {
+    const int next = (i + 1) % result.edges;
+    const bool adjacent = position[next] == (position[i] + 1) % long_edges && result.edges > 1;
+    Outline::Edge &edge = result.edge[i], &other = result.edge[next];
+    const bool corner = adjacent && !edge.to_circle && !other.from_circle;
+    const Point here = slice.stack.line[edge.line].normal, there = slice.stack.line[other.line].normal;
+    if (corner && (slicing::cross(here, there) > 0 || dot(here, there) > 0)) continue;
+    if (corner || after[i] > kBesideCircle || before[next] > kBesideCircle) {
+      result.edges = 0;
+      return;
+    }
+    edge.to_circle = other.from_circle = true;
+  }
+}
 
 /// The outline of polygon and disc.
 void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
@@ -172,21 +194,7 @@ void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
     result.edge[result.edges++] = {line, crossing.enter > from, crossing.leave < to};
   }
   result.whole_disc = result.edges == 0 && holds_disc;
-  // Both edges at a corner see it inside of the circle, or neither does, and there the outline turns by less than half
-  // a turn; unless the polygon is nothing but rounding.
-  for (int i = 0; i < result.edges; ++i) {
-    const int next = (i + 1) % result.edges;
-    const bool adjacent = position[next] == (position[i] + 1) % long_edges && result.edges > 1;
-    Outline::Edge &edge = result.edge[i], &other = result.edge[next];
-    const bool corner = adjacent && !edge.to_circle && !other.from_circle;
-    const Point here = slice.stack.line[edge.line].normal, there = slice.stack.line[other.line].normal;
-    if (corner && (slicing::cross(here, there) > 0 || dot(here, there) > 0)) continue;
-    if (corner || after[i] > kBesideCircle || before[next] > kBesideCircle) {
-      result.edges = 0;
-      return;
-    }
-    edge.to_circle = other.from_circle = true;
-  }
+  close_with_arcs(slice, std::span(position).first(result.edges), long_edges, before, after, result);
 }
 
 /// Whether two lines follow one another that run against each other and meet beyond the square around everything: by
@@ -226,64 +234,90 @@ Outline outline(const Slice& slice) {
   return result;
 }
 
-bool is_outline(const Slice& slice, const Outline& outline) {
-  const Stack& stack = slice.stack;
-  const int lines = stack.lines - 4, edges = outline.edges;
+namespace {
+
+/// The lines of a slice that are not of the square around everything, and their sides.
+struct LineSides {
+  const Slice& slice;
+  int lines;
   std::array<double, kMostLines + 8> side;
-  for (int i = 0; i < lines; ++i) side[i] = slice.side(i);
-  const auto slack = [&](int i, Point p) { return side[i] - dot(stack.line[i].normal, p); };
-  if (outline.whole_disc) {
+
+  explicit LineSides(const Slice& slice_) : slice(slice_), lines(slice_.stack.lines - 4) {
+    for (int i = 0; i < lines; ++i) side[i] = slice.side(i);
+  }
+  double slack(int i, Point p) const { return side[i] - dot(slice.stack.line[i].normal, p); }
+
+  bool hold_disc() const {
     for (int i = 0; i < lines; ++i)
-      if (!(slack(i, slice.centre) > slice.radius * stack.line[i].length)) return false;
+      if (!(slack(i, slice.centre) > slice.radius * slice.stack.line[i].length)) return false;
     return slice.radius > 0;
   }
-  const auto inside = [&](Point p, int but, int and_but) {
+  /// Whether all lines but two have a point inside.
+  bool hold(Point p, int but, int and_but) const {
     for (int i = 0; i < lines; ++i)
       if (!(slack(i, p) > 0) && i != but && i != and_but) return false;
     return true;
-  };
-  Point first, last;
-  // The arc between two points of the circle and lines is inside of other lines if their farthest points are not on it.
-  const auto arc_inside = [&](Point p, Point q, int before, int after) {
+  }
+  /// Whether other lines have the arc between two points inside. It is on the circle, between the lines `before` and
+  /// `after`. The farthest points of the circle along other lines are then not on it.
+  bool hold_arc(Point p, Point q, int before, int after) const {
     const Point chord = q - p;
     if (!(dot(chord, chord) > 1e-12 * slice.radius * slice.radius)) return false;
     for (int i = 0; i < lines; ++i) {
-      const Line& line = stack.line[i];
+      const Line& line = slice.stack.line[i];
       if (i == before || i == after || slack(i, slice.centre) > slice.radius * line.length) continue;
       const Point farthest = slice.centre + (slice.radius / line.length) * line.normal;
       if (!(slicing::cross(chord, farthest - p) > 0)) return false;
     }
     return true;
-  };
+  }
+  bool hold_ends(const Outline::Edge& edge, Point from, Point to, int after) const {
+    if (edge.from_circle && !hold(from, edge.line, edge.line)) return false;
+    if (!hold(to, edge.line, edge.to_circle ? edge.line : after)) return false;
+    if (slice.stack.ball < 0 || edge.to_circle) return true;
+    const Point beside = to - slice.centre;
+    return dot(beside, beside) < slice.radius * slice.radius;
+  }
+};
+
+/// The ends of an edge of an outline, that of the edge before and of the first one given; false if it has none, or goes
+/// the wrong way.
+bool find_ends(const Slice& slice, const Outline& outline, int i, Point first, Point last, Point& from, Point& to) {
+  const int edges = outline.edges;
+  const Outline::Edge& edge = outline.edge[i];
+  from = last;
+  if (edge.from_circle || edge.to_circle) {
+    const Crossing crossing(slice, edge.line);
+    if (!(crossing.discriminant > 0)) return false;
+    if (edge.from_circle) from = crossing.at(crossing.enter);
+    if (edge.to_circle) to = crossing.at(crossing.leave);
+  }
+  if (!edge.from_circle && i == 0) from = slice.corner(outline.edge[edges - 1].line, edge.line);
+  if (!edge.to_circle) {
+    if (edges == 1) return false;
+    to = i + 1 < edges ? slice.corner(edge.line, outline.edge[i + 1].line) : first;
+  }
+  const Point normal = slice.stack.line[edge.line].normal, way = to - from;
+  return normal.x * way.y - normal.y * way.x > 0;
+}
+
+}  // namespace
+
+bool is_outline(const Slice& slice, const Outline& outline) {
+  const LineSides sides(slice);
+  if (outline.whole_disc) return sides.hold_disc();
+  const int edges = outline.edges;
+  Point first, last;
   for (int i = 0; i < edges; ++i) {
     const Outline::Edge& edge = outline.edge[i];
-    const int before = outline.edge[i > 0 ? i - 1 : edges - 1].line,
-              after = outline.edge[i + 1 < edges ? i + 1 : 0].line;
-    if (edge.line >= lines) return false;
-    Point from = last, to;
-    if (edge.from_circle || edge.to_circle) {
-      const Crossing crossing(slice, edge.line);
-      if (!(crossing.discriminant > 0)) return false;
-      if (edge.from_circle) from = crossing.at(crossing.enter);
-      if (edge.to_circle) to = crossing.at(crossing.leave);
-    }
-    if (!edge.from_circle && i == 0) from = slice.corner(before, edge.line);
-    if (!edge.to_circle) {
-      to = i + 1 < edges ? slice.corner(edge.line, after) : first;
-      if (i + 1 == edges && edges == 1) return false;
-    }
+    const int before = outline.edge[i > 0 ? i - 1 : edges - 1].line;
+    const int after = outline.edge[i + 1 < edges ? i + 1 : 0].line;
+    Point from, to;
+    if (edge.line >= sides.lines || !find_ends(slice, outline, i, first, last, from, to)) return false;
     if (i == 0) first = from;
-    const Point normal = stack.line[edge.line].normal, way = to - from;
-    if (!(normal.x * way.y - normal.y * way.x > 0)) return false;
-    if (edge.from_circle &&
-        (!inside(from, edge.line, edge.line) || (i > 0 && !arc_inside(last, from, before, edge.line))))
-      return false;
-    if (edge.to_circle ? !inside(to, edge.line, edge.line) : !inside(to, edge.line, after)) return false;
-    if (stack.ball >= 0 && !edge.to_circle) {
-      const Point beside = to - slice.centre;
-      if (!(dot(beside, beside) < slice.radius * slice.radius)) return false;
-    }
-    if (i + 1 == edges && edge.to_circle && !arc_inside(to, first, edge.line, outline.edge[0].line)) return false;
+    if (!sides.hold_ends(edge, from, to, after)) return false;
+    if (i > 0 && edge.from_circle && !sides.hold_arc(last, from, before, edge.line)) return false;
+    if (i + 1 == edges && edge.to_circle && !sides.hold_arc(to, first, edge.line, outline.edge[0].line)) return false;
     last = to;
   }
   return edges > 0;

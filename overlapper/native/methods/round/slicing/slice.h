@@ -45,8 +45,8 @@ struct Quadric {
   /// The part of value() that does not depend on x and y, and the size of its terms.
   double constant(double t) const { return (1 + dot(shear, shear)) * t * t - 2 * along * t + slack; }
   double terms(double t) const { return (1 + dot(shear, shear)) * t * t + std::abs(2 * along * t) + std::abs(slack); }
-  /// Of the two roots of y² − 2 middle y + constant the nearer one to zero, from the other: not as a difference, but
-  /// near an end of the quadric, where that is smaller than what rounding leaves of the constant.
+  /// The root of y² − 2 middle y + constant that is nearer to zero, from the other root. It is no difference, except
+  /// near an end of the quadric, where it is smaller than the rounding of the constant.
   double nearer(double far, double middle, double constant, double t) const {
     return far * far > kPole * terms(t) ? constant / far : 2 * middle - far;
   }
@@ -101,7 +101,7 @@ struct LineCorner {
   }
 };
 
-/// What of a surface is seen along a direction, in coordinates u and v across it.
+/// A surface seen along a direction, in coordinates u and v across it.
 struct View {
   int owner = 0;      ///< of the surface
   bool rest = false;  ///< instead of it, all other surfaces are seen, from behind: these have no arcs, if it has
@@ -126,7 +126,7 @@ struct Stack {
   std::optional<View> view;                   ///< if anything is looked at
   const quadric::Stretch* stretch = nullptr;  ///< of an ellipsoid: what makes the ball and all else out of the world
 
-  /// Of a part of a plane whose normal times its area that is, along l, m and n.
+  /// The stretched area of a plane's part whose area vector, along l, m and n, is `normal`.
   double area(Vec3 normal) const { return stretch->area(normal.x * l + normal.y * m + normal.z * n); }
   /// place × normal, all along l, m and n; in the world, if that is stretched.
   Vec3 moment(Vec3 place, Vec3 normal) const {
@@ -157,7 +157,7 @@ struct Slice {
   }
 };
 
-/// What bounds a slice, counter-clockwise: pieces of lines, and arcs wherever one of these ends on the circle.
+/// The border of a slice, counter-clockwise: pieces of lines, and arcs wherever a piece ends on the circle.
 struct Outline {
   struct Edge {
     int line;

@@ -133,8 +133,8 @@ bool even(const Axes& axes, std::span<const Wall> walls) {
   });
 }
 
-/// Of the ways to turn them, the one after so many that suit; the first of all where none does. Slices along two axes
-/// that are not parallel leave no choice.
+/// The way to turn slices that comes after `way` others that suit. If none suits, `way` 0 is the first of all. Slices
+/// along two axes that are not parallel leave no choice.
 std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall> walls, int way) {
   const Axes first = choose(rounds, walls, 0);
   const bool fixed = rounds.size() == 2 && !rounds[0].ball && !rounds[1].ball &&

@@ -1,11 +1,16 @@
 #pragma once
 
+#include <cfloat>
+
 #include "geometry/wide.h"
 
 namespace overlapper::slicing {
 
 /// The owner of planes that cut a body in two.
 inline constexpr int kCut = 2;
+
+/// Sums of area vectors are right to this fraction of the area.
+inline constexpr double kSummation = 16 * DBL_EPSILON;
 
 /// A ball, or a cylinder without ends, about a point of the common set.
 struct Round {

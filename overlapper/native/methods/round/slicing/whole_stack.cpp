@@ -1,15 +1,11 @@
 #include "methods/round/slicing/whole_stack.h"
 
 #include <algorithm>
-#include <cfloat>
 
 #include "methods/round/slicing/nodes.h"
 
 namespace overlapper::slicing {
 namespace {
-
-/// Sums of area vectors are right to this fraction of the area.
-constexpr double kSummation = 16 * DBL_EPSILON;
 
 /// Whether there is something between where intervals end and where a quadric does.
 bool holds_to(const Stack& stack, double t, double end) {
@@ -32,9 +28,9 @@ void add_end_face(const Stack& stack, const std::optional<Line>& plane, double e
   }
 }
 
-/// What may be missing: by how much the volume differs from ∫ t N dA, and what area vectors, which sum to zero over a
-/// closed surface, leave times the size, beyond rounding. Those of lines and of arcs are other integrals over the same
-/// slices, less smooth than the volume.
+/// The volume that may be missing, beyond rounding: the difference of the volume from ∫ t N dA, plus the sum of the
+/// area vectors times the size. Area vectors sum to zero over a closed surface. Those of lines and of arcs are other
+/// integrals over the same slices, less smooth than the volume.
 double open_part(const Stack& stack, const Integrals& s) {
   const Vec3 left = s.pull[0] + s.pull[1] + s.pull[2];
   const auto part = [&](double sum, double square) {
