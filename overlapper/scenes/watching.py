@@ -54,13 +54,14 @@ class Watch:
     the table are of, check="fcl" asks FCL, too; `surface`, `concave` and `concave_threshold` are those of
     `simulation.Bodies`, as are `names`; `pairs`, `tolerance` and `method` of `Bodies.overlaps`. What pybullet cannot be
     asked for (pair filters, the filter mode, self-collision, height fields, files) is known if it was said after the
-    watch began, or to `recorder`.
+    watch began, or to `recorder`. `engine` names the simulator, as ENGINE of a scene does; with another one than
+    pybullet, `physicsClientId` is what that engine calls a simulation.
 
     Steps are noticed of `pybullet.stepSimulation`, not of a name that was imported `from pybullet` before, and not in
     other processes; a simulation in real time is not stepped by calls. What cannot be measured or written raises in the
     call that made the step, and the watch is over.
 
-    ValueError for a client that is not connected or an option that is none, OSError if a file cannot be written,
+    ValueError for a client that is not connected or an invalid option, OSError if a file cannot be written,
     ImportError without the library that does it.
     """
 

@@ -20,11 +20,9 @@ class Rules(Protocol):
 
     def allow(self, first: Indices, second: Indices) -> Mask:
         """Whether the colliders in these rows may collide, pair by pair; first < second."""
-        ...
 
     def count(self, weights: NDArray[np.int64]) -> int:
         """How many pairs of shapes may collide, if `weights` (n,) says how many each collider has."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

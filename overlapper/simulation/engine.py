@@ -23,28 +23,22 @@ class Simulation(Protocol):
     @property
     def bodies(self) -> Callable[..., AnyBodies]:
         """Reads the bodies; takes the keywords `concave`, `concave_threshold`, `surface` and `names` of `Bodies`."""
-        ...
 
     @property
     def time_step(self) -> float:
         """s that a step takes."""
-        ...
 
     def build(self, build: Callable[..., Any], parameters: Mapping[str, Any]) -> Any:
         """Call the `build` of a scene with what it fills, and with the scene's parameters; returns its answer."""
-        ...
 
     def step(self) -> None:
         """Go on by a time step."""
-        ...
 
     def leave(self) -> None:
         """Let the simulation go on alone."""
-        ...
 
     def end(self) -> None:
         """End the simulation."""
-        ...
 
 
 class Engine(Protocol):
@@ -52,18 +46,17 @@ class Engine(Protocol):
 
     def begin(self) -> Simulation:
         """A new, empty simulation."""
-        ...
 
     def running(self, which: Any, recorder: Any = None) -> Simulation:
         """The simulation of somebody else, with the `recorder` that it has already. ValueError if it does not run."""
-        ...
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Tell a listener what happens to all simulations, until the function that is returned is called."""
-        ...
 
 
 def engine(name: str) -> Engine:
-    """The engine of that name. ImportError says what to install for it."""
+    """The engine of that name. ValueError if there is none, ImportError with what to install for it."""
+    if name not in ENGINES:
+        raise ValueError(f"the engine must be one of {', '.join(map(repr, ENGINES))}, not {name!r}")
     module: Any = import_module(ENGINES[name])
     return module  # type: ignore[no-any-return]

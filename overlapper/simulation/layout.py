@@ -23,11 +23,9 @@ class Poses(Protocol):
     @property
     def colliders(self) -> Sequence[Link]:
         """(body, link) of each frame, in the order of `read`."""
-        ...
 
     def read(self) -> Sequence[Pose]:
         """Where they are now."""
-        ...
 
 
 class Layout:

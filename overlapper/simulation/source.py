@@ -28,22 +28,18 @@ class Source(Protocol):
     @property
     def time_step(self) -> float:
         """s that a step takes."""
-        ...
 
     def refresh(self) -> Sequence[Skipped] | None:
         """Read what is new. None if no body has come or gone, otherwise what is newly skipped.
 
         ValueError if the simulation has ended.
         """
-        ...
 
     def poses(self, links: Mapping[int, Sequence[int]]) -> Poses:
         """What reads the frames of these bodies' bases, and of their `links`."""
-        ...
 
     def rules(self, layout: Layout) -> Rules:
         """The rules in force; the same object as long as they and the layout are the same."""
-        ...
 
     @property
     def settings(self) -> Mapping[str, str | float]:

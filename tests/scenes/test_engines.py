@@ -129,6 +129,8 @@ def test_an_engine_that_is_not_there_is_named():
     Path("sinking.py").write_text(SCENE.replace("scripted", "newton"))
     with pytest.raises(SceneError, match=r"ENGINE = 'newton', which must be one of 'bullet'"):
         load_scene("sinking.py")
+    with pytest.raises(ValueError, match=r"the engine must be one of 'bullet', .*, not 'newton'"):
+        overlapper.watch(World(), engine="newton")
 
 
 def test_pybullet_is_not_needed():
