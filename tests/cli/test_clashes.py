@@ -283,7 +283,7 @@ def test_meshes_of_too_many_triangles_are_measured_by_their_parts(monkeypatch):
 def test_parts_that_a_transform_makes_flat_are_none():
     ((_, part),), _ = scene.read([Path("one.stl")], "mm")
     hull = Hull(part.placed(part.triangles.reshape(-1, 3)))
-    body = scene.Body("one.stl", part, None, (hull,), "hull", hull.volume, None)
+    body = scene.MeshBody("one.stl", part, None, (hull,), "hull", hull.volume, None)
     in_file = Hull(part.triangles.reshape(-1, 3))
     assert scene._of_parts(body, [in_file], "convex").parts_volume == pytest.approx(1e-6)
     flat = replace(body, part=replace(part, transform=np.diag([1e-3, 1e-3, 0, 1])))
