@@ -15,8 +15,9 @@ ORIGIN: Vector = (fmpq(0), fmpq(0), fmpq(0))
 
 
 def rational(number: Fraction | int | float) -> fmpq:
-    whole = Fraction(number)
-    return fmpq(whole.numerator, whole.denominator)
+    if isinstance(number, float):
+        return fmpq(*number.as_integer_ratio())
+    return fmpq(number.numerator, number.denominator)
 
 
 def fraction(number: fmpq) -> Fraction:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,42 +129,45 @@ class RoundedHullFacts(Round):
         along = self._along(edge)
         return int(along @ along)
 
-    def _corner(self, number: int) -> Exact:
+    @cached_property
+    def _points(self) -> Exact:
+        """(n, 3) corners of the core."""
         corners, unit = self.core.corners
-        point: Exact = corners[number] * Fraction(1, unit)
-        return point
+        points: Exact = corners * Fraction(1, unit)
+        return points
 
     def _plane(self, normal: Exact, corner: int) -> tuple[Exact, Fraction]:
-        """Through a corner; the normal is in units of the corners."""
+        """Through a corner."""
         corners, unit = self.core.corners
-        return normal * Fraction(1, unit), Fraction(normal @ corners[corner], unit * unit)
+        return normal, Fraction(normal @ corners[corner], unit)
 
     def _prism(self, plane: Row, edges: Sequence[Edge]) -> Block:
         normal, offset = np.array(plane[:3], object), plane[3]
         square = int(normal @ normal)
         rise, is_exact = _root_below(square * Fraction(self.rounding) ** 2)
         planes = [(normal, offset + rise), (-normal, Fraction(-offset))]
-        planes += [self._plane(cross(self._along((p, q)), normal), p) for p, q in edges]
-        ring = np.array([self._corner(p) for p in sorted({p for edge in edges for p in edge})])
+        outward = cross(np.array([self._along(edge) for edge in edges]), normal)
+        planes += [self._plane(wall, p) for wall, (p, _) in zip(outward, edges)]
+        ring = self._points[sorted({p for edge in edges for p in edge})]
         spine = np.vstack([ring, ring + normal * (rise / square)])
-        area = Fraction(float(np.linalg.norm(np.ptp(spine.astype(float), axis=0))) * (1.0 + 2.0**-40)) ** 2
+        area = Fraction(float(np.linalg.norm(np.ptp(ring.astype(float), axis=0))) * (1.0 + 2.0**-40)) ** 2
         # The height lost is 2^-PRISM of all or less.
         lost = Fraction(0) if is_exact else area * Fraction(self.rounding) / 2**PRISM
         return Block(planes, spine, lost=lost)
 
     def _wedges(self, sides: dict[Row, list[Edge]]) -> list[Block]:
         plane_at = {edge: plane for plane, edges in sides.items() for edge in edges}
+        once = [(p, q) for p, q in plane_at if p < q]
+        alongs = np.array([self._along(edge) for edge in once])
+        left = np.array([plane_at[edge][:3] for edge in once], object)
+        right = np.array([plane_at[q, p][:3] for p, q in once], object)
+        # Seen along the edge the first facet is on the left, so that the wedge is on the right of its normal.
+        walls = zip(cross(left, alongs), cross(alongs, right))
         found = []
-        for (p, q), plane in plane_at.items():
-            if p < q:
-                along = self._along((p, q))
-                n, m = (np.array(each[:3], object) for each in (plane, plane_at[q, p]))
-                # Seen along the edge the first facet is on the left, so that the wedge is on the right of its normal.
-                planes = [self._plane(wall, p) for wall in (cross(n, along), cross(along, m))]
-                planes += [self._plane(along, q), self._plane(-along, p)]
-                ends = np.array([self._corner(p), self._corner(q)])
-                axis = along * Fraction(1, self.core.corners[1])
-                found.append(Block(planes, ends, self.rounding, ends[0], axis))
+        for (p, q), along, (one, other) in zip(once, alongs, walls):
+            planes = [self._plane(one, p), self._plane(other, p), self._plane(along, q), self._plane(-along, p)]
+            ends = self._points[[p, q]]
+            found.append(Block(planes, ends, self.rounding, ends[0], along))
         return found
 
     def _caps(self, sides: dict[Row, list[Edge]]) -> list[Block]:
@@ -172,7 +176,7 @@ class RoundedHullFacts(Round):
             for edge in edges:
                 from_corner.setdefault(edge[0], []).append(edge)
         return [
-            ball_block(self._corner(p), self.rounding, [self._plane(self._along(edge), p) for edge in edges])
+            ball_block(self._points[p], self.rounding, [self._plane(self._along(edge), p) for edge in edges])
             for p, edges in from_corner.items()
         ]
 
