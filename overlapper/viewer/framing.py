@@ -14,9 +14,9 @@ import numpy as np
 
 from overlapper import Overlap, Placed
 from overlapper.shapes.drawing import triangles
-from overlapper.shapes.table import facts
 from overlapper.viewer.labels import Bodies, Contact, key_of
 from overlapper.viewer.look import FIELD_OF_VIEW, Array
+from overlapper.viewer.tessellation import bounded
 
 GROUND = 30.0  # times as large as all other bodies: a ground. The plane of pybullet is a ground for bodies under 9 m.
 BACK = np.array([0.60, -0.68, 0.42]) / np.linalg.norm([0.60, -0.68, 0.42])  # the usual way to the camera
@@ -71,7 +71,7 @@ class Framing:
 
     def is_ground(self, placed: Placed) -> bool:
         """True for a half-space, and for a shape as large as a body that is a ground."""
-        return not facts(placed.shape).bounded or _extent(placed.bounds) >= self._ground_size
+        return not bounded(placed.shape) or _extent(placed.bounds) >= self._ground_size
 
     def pushed_second(self, contact: Contact) -> bool:
         """True if a force is drawn on the second body: the first is a ground, or rests while the second moves."""
@@ -139,7 +139,7 @@ def _boxes(bodies: Bodies) -> list[tuple[tuple[int, int, int], Array]]:
     return [
         (key, np.asarray(placed.bounds))
         for key, placed in zip(bodies.keys, bodies.placed, strict=True)
-        if facts(placed.shape).bounded
+        if bounded(placed.shape)
     ]
 
 

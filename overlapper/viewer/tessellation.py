@@ -22,6 +22,11 @@ class Mesh:
     triangles: Array
 
 
+def bounded(shape: Shape | Mesh) -> bool:
+    """False for a half-space."""
+    return isinstance(shape, Mesh) or facts(shape).bounded
+
+
 def tessellation(shape: Shape | Mesh) -> Tessellation:
     """The surface of a bounded shape: round shapes within 0.3 % of the radius, rounded hulls with bevelled edges."""
     if not isinstance(shape, Mesh):
@@ -48,12 +53,12 @@ class Ground(Tessellation):
         return faded
 
 
-def ground(shape: Shape, center: Array, size: float) -> Ground | None:
+def ground(shape: Shape | Mesh, center: Array, size: float) -> Ground | None:
     """The plane of a half-space, or the side of a box or hull that faces the scene; None for a round shape.
 
     `center` and `size`, m, are those of the scene. The side of a hull is drawn as the rectangle around it.
     """
-    side = facts(shape).side(center)
+    side = None if isinstance(shape, Mesh) else facts(shape).side(center)
     if side is None:
         return None
     normal, offset, corners = side
