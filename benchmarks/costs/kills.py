@@ -22,6 +22,7 @@ import psutil
 
 from harness.command import ROOT
 
+SWEEP = (sys.executable, "-m", "overlapper", "sweep")
 NODES = ROOT / "tests" / "support" / "ray_nodes.py"
 
 
@@ -38,7 +39,7 @@ def main(asked: Namespace) -> None:
     chance = random.Random(asked.seed)
     frictions = min(asked.tasks, 100)
     masses = max(asked.tasks // frictions, 1)
-    command = [sys.executable, "-m", "overlapper", "sweep", str(asked.scene)]
+    command = [*SWEEP, str(asked.scene)]
     command += [f"--grid=mass=0.05:5:{masses}:log", f"--grid=friction=0.1:1:{frictions}", f"--steps={asked.steps}"]
     total = masses * frictions
     with tempfile.TemporaryDirectory() as folder:

@@ -1,13 +1,14 @@
 """What single features cost: each benchmark runs small, and says what it is there to say."""
 
 import re
+import sys
 
 import exact
 import families
 import numpy as np
 import pytest
 
-from costs import audit, recording
+from costs import audit, kills, recording
 from harness import command, figures
 from overlapper import Placed, Sphere
 from paper import pictures
@@ -46,23 +47,34 @@ def test_a_watched_script_is_timed_beside_itself(capsys):
     assert re.match(r"start: -?\d+\.\d\d s more", lines[3])
 
 
-SCENE = """
-"A ball that nothing touches."
-import pybullet as p
+SWEEP = """
+import subprocess, sys, time
+from pathlib import Path
 
-STEPS = 1
-
-
-def build(client, *, mass=1.0, friction=0.5):
-    ball = p.createCollisionShape(p.GEOM_SPHERE, radius=0.1, physicsClientId=client)
-    p.createMultiBody(mass, ball, physicsClientId=client)
+folder = Path(sys.argv[-1], "tasks.parquet")
+folder.mkdir(parents=True, exist_ok=True)
+worker = subprocess.Popen(["sleep", "60"])
+for number in range(6):
+    if not (part := folder / f"{number}.parquet").exists():
+        time.sleep(0.15)
+        part.write_bytes(bytes([BITS]))
+worker.kill()
 """
 
 
-def test_a_sweep_survives_kills(capsys, tmp_path):
-    (tmp_path / "ball.py").write_text(SCENE, encoding="utf-8")
-    words = said(capsys, "kills", 6, 1, "--kills=1", f"--scene={tmp_path / 'ball.py'}")
-    assert "undisturbed: 6 tasks" in words and "killed 2 times: the same" in words
+@pytest.mark.parametrize("spoilt", [False, True])
+def test_a_sweep_is_killed_at_random_moments_and_compared_with_one_that_was_not(spoilt, capsys, monkeypatch, tmp_path):
+    """What is swept is a script that takes the options of a sweep."""
+    text = SWEEP.replace("BITS", "time.time_ns() % 251" if spoilt else "number")
+    (tmp_path / "sweep.py").write_text(text, encoding="utf-8")
+    monkeypatch.setattr(kills, "SWEEP", (sys.executable, str(tmp_path / "sweep.py")))
+    if spoilt:
+        with pytest.raises(SystemExit, match="tasks have other bits"):
+            command.main(["kills", "6", "1", "--kills=1"])
+    else:
+        words = said(capsys, "kills", 6, 1, "--kills=1")
+        assert "undisturbed: 6 tasks" in words and "killed 2 times: the same" in words
+        assert "  parent killed when" in words and "  worker killed when" in words
 
 
 def test_a_robot_is_a_row_of_the_table_of_audits():
