@@ -142,6 +142,13 @@ def test_a_base_without_mass_moves_only_its_joints():
     assert not found.acceleration[6:12].any() and found.acceleration[12:].all()
 
 
+def test_the_only_joint_of_the_first_body_moves():
+    links = at_rest(Link(mass=0), Link(0, PRISMATIC, (0, 0, 1)), Link(mass=0))
+    found = replace(cube_on(links), on=[2, 1]).solve()
+    assert broken_laws(found) == []
+    assert found.acceleration[6] > 0 and found.scene.frequency2 > 0
+
+
 def test_a_body_without_moments_of_inertia_does_not_turn():
     found = cube_on(at_rest(Link(mass=0), Link(inertia=(0, 0, 0))), acceleration=[0] * 6 + [1, 2, 3, 0, 0, 0]).solve()
     assert found.acceleration[8] > 0 and not found.acceleration[9:].any()
