@@ -66,7 +66,7 @@ struct Body {
   /// How far it reaches along a unit direction of the world, from its own origin.
   double reach_along(Vec3 direction) const {
     const Vec3 local = apply_transposed(placed.pose.rotation, direction);
-    return dot(local, std::visit([&](const auto& s) { return s.support(local); }, placed.shape));
+    return dot(local, ask(placed.shape, [&](const auto& s) { return s.support(local); }));
   }
 };
 
@@ -79,16 +79,15 @@ bool apart(const Body& a, const Body& b, Vec3& axis) {
   const double margin = 4 * rounding(norm(between) + reach(a.placed, a.radius) + reach(b.placed, b.radius));
   if (open_a || open_b) {
     const Body &open = open_a ? a : b, &closed = open_a ? b : a;
-    const Plane& plane = std::get<HalfSpace>(open.placed.shape).plane;
+    const Plane& plane = *only_plane(open.placed.shape);
     const Vec3 normal = open.placed.pose.rotation * plane.normal;
     const double height = dot(normal, open_a ? -between : between);
     return height - plane.offset - closed.reach_along(-normal) > margin;
   }
   const auto gap = [&] { return dot(axis, between) - a.reach_along(-axis) - b.reach_along(axis); };
   if (norm2(axis) > 0 && gap() > margin) return true;
-  const Box *box_a = std::get_if<Box>(&a.placed.shape), *box_b = std::get_if<Box>(&b.placed.shape);
-  if (box_a && box_b) {
-    axis = box_penetration(*box_a, a.placed.pose, *box_b, b.placed.pose, margin).normal;
+  if (const auto of_boxes = box_penetration(a.placed, b.placed, margin)) {
+    axis = of_boxes->normal;
   } else {
     const Vec3 reference = a.placed.pose.translation;
     axis = distance(a.placed.seen_from(reference), b.placed.seen_from(reference)).normal;
@@ -98,9 +97,7 @@ bool apart(const Body& a, const Body& b, Vec3& axis) {
 
 /// False where clipping is sooner done than an axis looked for, which there may not be.
 bool axis_soon_found(const Body& a, const Body& b) {
-  const auto polytope = [](const Shape& shape) {
-    return std::holds_alternative<Box>(shape) || std::holds_alternative<Hull>(shape);
-  };
+  const auto polytope = [](const Shape& shape) { return !smooth(shape) && bounded(shape); };
   return !polytope(a.placed.shape) || !polytope(b.placed.shape);
 }
 

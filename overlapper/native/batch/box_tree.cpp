@@ -35,16 +35,8 @@ int size_class(const Bounds& box) { return std::ilogb(extent(box)) / 3; }
 }  // namespace
 
 Enclosure enclosure(const Placed& placed) {
-  if (const HalfSpace* half = std::get_if<HalfSpace>(&placed.shape))
-    return {bounds(placed), true, placed.pose * half->plane};
-  Bounds box;
-  if (const Box* b = std::get_if<Box>(&placed.shape)) {
-    const Mat3& r = placed.pose.rotation;
-    const Vec3 h = b->half_extents, reach{dot(abs(r.row0), h), dot(abs(r.row1), h), dot(abs(r.row2), h)};
-    box = {placed.pose.translation - reach, placed.pose.translation + reach};
-  } else {
-    box = bounds(placed);
-  }
+  const Bounds box = ask(placed.shape, [&](const auto& s) { return s.enclosing_box(placed.pose); });
+  if (const Plane* plane = only_plane(placed.shape)) return {box, true, placed.pose * *plane};
   const Vec3 farthest = max(abs(box.lower), abs(box.upper));
   const double grown = rounding(farthest.x + farthest.y + farthest.z);
   const Vec3 margin{grown, grown, grown};

@@ -47,12 +47,14 @@ class AxisSearch {
 
 }  // namespace
 
-Penetration box_penetration(const Box& a, const Pose& pose_a, const Box& b, const Pose& pose_b, double far) {
-  const Mat3 into_a = transposed(pose_a.rotation);
-  AxisSearch search(a.half_extents, b.half_extents, into_a * pose_b.rotation,
-                    into_a * (pose_a.translation - pose_b.translation));
+std::optional<Penetration> box_penetration(const Placed& a, const Placed& b, double far) {
+  const Box *box_a = std::get_if<Box>(&a.shape), *box_b = std::get_if<Box>(&b.shape);
+  if (!box_a || !box_b) return std::nullopt;
+  const Mat3 into_a = transposed(a.pose.rotation);
+  AxisSearch search(box_a->half_extents, box_b->half_extents, into_a * b.pose.rotation,
+                    into_a * (a.pose.translation - b.pose.translation));
   Penetration result = search.run(far);
-  result.normal = pose_a.rotation * result.normal;
+  result.normal = a.pose.rotation * result.normal;
   return result;
 }
 

@@ -8,10 +8,8 @@
 namespace overlapper {
 namespace {
 
-const HalfSpace* half_space(const Placed& placed) { return std::get_if<HalfSpace>(&placed.shape); }
-
 Distance distance_to_half_space(const Placed& a, const Placed& b) {
-  const Plane plane = b.pose * half_space(b)->plane;
+  const Plane plane = b.pose * *only_plane(b.shape);
   const Vec3 lowest = a.support(-plane.normal);
   const double height = signed_distance(plane, lowest);
   return {height, height, plane.normal, lowest, lowest - height * plane.normal};
@@ -38,27 +36,26 @@ double depth_in(const Simplex& simplex) {
 /// The sine of an angle between an axis and a direction: GJK knows that of a rim to half of the digits.
 constexpr double kAboutUpright = 0x1p-20;
 
-/// What one body adds to the nearest points: a point that it keeps, or one of a rim that goes with the direction, and
-/// flats along which the point is free.
+/// What one body adds to the nearest points: a point that it keeps, or one of a rim or of a curved core that goes with
+/// the direction, and flats along which the point is free.
 struct Contactor {
-  Vec3 point;  ///< of the body; of a rim or an ellipsoid its centre
+  const Placed& body;
+  CoreKind kind;
+  Vec3 point;  ///< of the body; of a rim its centre
   std::vector<Vec3> flats;
-  const Cylinder* rim = nullptr;
+  double rim_radius = 0;
   Vec3 axis;
-  const Ellipsoid* ellipsoid = nullptr;
-  Mat3 turn;
 
-  Contactor(const Placed& body, const Simplex& simplex, Vec3 DifferencePoint::* on, Vec3 witness) : point(witness) {
-    rim = std::get_if<Cylinder>(&body.shape);
-    ellipsoid = stretched(body.shape);
-    if (ellipsoid) {
-      point = body.pose.translation, turn = body.pose.rotation;
-      return;
+  Contactor(const Placed& placed, const Simplex& simplex, Vec3 DifferencePoint::* on, Vec3 witness)
+      : body(placed), kind(core_kind(placed.shape)), point(witness) {
+    switch (kind) {
+      case CoreKind::kCurved: return;
+      case CoreKind::kPolytope:
+        for (int i = 1; i < simplex.size; ++i) add_flat(simplex.corner[i].*on - simplex.corner[0].*on);
+        return;
+      case CoreKind::kRims: break;
     }
-    if (!rim) {
-      for (int i = 1; i < simplex.size; ++i) add_flat(simplex.corner[i].*on - simplex.corner[0].*on);
-      return;
-    }
+    rim_radius = revolution(body.shape)->radius;
     axis = body.pose.rotation * Vec3{0, 0, 1};
     const auto height = [&](Vec3 p) { return dot(axis, p - body.pose.translation); };
     point = body.pose.translation + height(witness) * axis;
@@ -74,8 +71,12 @@ struct Contactor {
 
   /// The point farthest along a direction, flats aside.
   Vec3 farthest(Vec3 direction) const {
-    if (ellipsoid) return point + turn * ellipsoid->support(apply_transposed(turn, direction));
-    return rim ? point + rim->radius * unit(direction - dot(axis, direction) * axis) : point;
+    switch (kind) {
+      case CoreKind::kCurved: return body.core_support(direction);
+      case CoreKind::kRims: return point + rim_radius * unit(direction - dot(axis, direction) * axis);
+      case CoreKind::kPolytope: break;
+    }
+    return point;
   }
 };
 
@@ -95,8 +96,8 @@ bool accept(Separation& cores, const Placed& a, const Placed& b, Vec3 witness_a,
 /// Above a cap, the nearest points are a lowest one of the other body and its foot, if that is on the cap.
 bool above_cap(const Placed& a, const Placed& b, Separation& cores) {
   for (const Placed* body : {&a, &b}) {
-    const Cylinder* cylinder = std::get_if<Cylinder>(&body->shape);
-    if (!cylinder) continue;
+    if (!has_rims(body->shape)) continue;
+    const Revolution cylinder = *revolution(body->shape);
     const Vec3 axis = body->pose.rotation * Vec3{0, 0, 1}, x = cores.simplex.nearest;
     if (norm(cross(axis, x)) > kAboutUpright * norm(x)) continue;
     const Placed& other = body == &a ? b : a;
@@ -107,8 +108,8 @@ bool above_cap(const Placed& a, const Placed& b, Separation& cores) {
     // An edge or a cap that lies level has points that are as low, of which one has been found.
     for (Vec3 point : {lowest, found - dot(up, found - lowest) * up}) {
       const Vec3 arm = point - body->pose.translation;
-      const double height = dot(up, arm) - cylinder->length / 2;
-      if (norm(arm - dot(up, arm) * up) > cylinder->radius || !(height > 0)) continue;
+      const double height = dot(up, arm) - cylinder.half_length;
+      if (norm(arm - dot(up, arm) * up) > cylinder.radius || !(height > 0)) continue;
       const Vec3 foot = point - height * up;
       if (body == &a ? accept(cores, a, b, foot, point, -height * up) : accept(cores, a, b, point, foot, height * up))
         return true;
@@ -117,9 +118,9 @@ bool above_cap(const Placed& a, const Placed& b, Separation& cores) {
   return false;
 }
 
-/// The nearest points of cores of which one has a rim or is an ellipsoid: GJK knows a point of that, and with it the
+/// The nearest points of cores of which one has a rim or is curved: GJK knows a point of that, and with it the
 /// direction, to half of the digits only. At the nearest points x = a - b is across every flat, and the points of rims
-/// and ellipsoids are those farthest along x: Newton's method on these equations, whose matrix is the identity and
+/// and curved cores are those farthest along x: Newton's method on these equations, whose matrix is the identity and
 /// more. False where they do not hold.
 bool sharpen(const Placed& a, const Placed& b, Separation& cores) {
   const Contactor on_a(a, cores.simplex, &DifferencePoint::on_a, cores.simplex.witness_a()),
@@ -134,17 +135,18 @@ bool sharpen(const Placed& a, const Placed& b, Separation& cores) {
   for (int round = 0; round < 20; ++round) {
     Mat3 slope;
     for (const Contactor* on : {&on_a, &on_b}) {
-      if (on->ellipsoid) {
-        const Mat3 curved = on->turn * on->ellipsoid->slope(apply_transposed(on->turn, x)) * transposed(on->turn);
+      if (on->kind == CoreKind::kCurved) {
+        const Mat3& turn = on->body.pose.rotation;
+        const Mat3 curved = turn * core_slope(on->body.shape, apply_transposed(turn, x)) * transposed(turn);
         const auto across = [&](Vec3 row) { return across_flats(curved * across_flats(row)); };
         slope = {slope.row0 + across({1, 0, 0}), slope.row1 + across({0, 1, 0}), slope.row2 + across({0, 0, 1})};
       }
-      if (!on->rim) continue;
+      if (on->kind != CoreKind::kRims) continue;
       const Vec3 tangent = cross(on->axis, x);
       const double across = norm(tangent);
       if (!(across > kAboutUpright * norm(x))) return false;
       const Vec3 t = across_flats(tangent / across);
-      const double curved = on->rim->radius / across;
+      const double curved = on->rim_radius / across;
       slope = {slope.row0 + curved * t.x * t, slope.row1 + curved * t.y * t, slope.row2 + curved * t.z * t};
     }
     const Vec3 rest = across_flats(on_a.farthest(-x) - on_b.farthest(x)) - x;
@@ -178,8 +180,8 @@ Separation separate_cores(const Placed& a, const Placed& b) {
 }
 
 Distance distance(const Placed& a, const Placed& b) {
-  if (half_space(b)) return distance_to_half_space(a, b);
-  if (half_space(a)) return mirrored(distance_to_half_space(b, a));
+  if (!bounded(b.shape)) return distance_to_half_space(a, b);
+  if (!bounded(a.shape)) return mirrored(distance_to_half_space(b, a));
   const double radius_a = core_radius(a.shape), radius_b = core_radius(b.shape);
   const Separation cores = separate_cores(a, b);
   Distance result;

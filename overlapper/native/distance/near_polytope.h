@@ -24,7 +24,7 @@ struct NearCorner {
 
 struct NearFacet {
   Vec3 normal;
-  std::array<int, 3> corners;  ///< of a triangle; of a box the axis, whether it is the far side, and -1
+  std::array<int, 3> corners;  ///< as in CoreSurface
 };
 
 struct NearRidge {
@@ -60,12 +60,6 @@ class NearPolytope {
   double most_reach(Vec3 direction) const;
 
  private:
-  void gather(const auto& shape, const std::vector<char>& kept);
-  void gather(const Capsule& capsule, const std::vector<char>& kept);
-  void gather(const Box& box, const std::vector<char>& kept);
-  void gather(const Hull& hull, const std::vector<char>& kept);
-  void gather(const RoundedHull& hull, const std::vector<char>& kept);
-  void gather(const HullData& hull, const std::vector<char>& kept);
   void complete(NearRidge& ridge) const;
   NearCorner nearest(const NearRidge& ridge) const;
 

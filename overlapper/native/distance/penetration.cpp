@@ -15,8 +15,6 @@
 namespace overlapper {
 namespace {
 
-const HalfSpace* half_space(const Placed& placed) { return std::get_if<HalfSpace>(&placed.shape); }
-
 /// EPA's polytope: support points of the difference of two cores, and which of its facets are known to be final.
 class DepthSearch {
  public:
@@ -132,24 +130,22 @@ class DepthSearch {
 }  // namespace
 
 Penetration penetration(const Placed& a, const Placed& b) {
-  if (half_space(a) && half_space(b))
+  if (!bounded(a.shape) && !bounded(b.shape))
     throw std::invalid_argument("two half-spaces have no least translation that separates them");
-  if (half_space(a) || half_space(b)) {
+  if (!bounded(a.shape) || !bounded(b.shape)) {
     const Distance height = distance(a, b);
     return {-height.distance, height.normal};
   }
-  Penetration of_boxes;
-  const Box *box_a = std::get_if<Box>(&a.shape), *box_b = std::get_if<Box>(&b.shape);
-  if (box_a && box_b) {
-    of_boxes = box_penetration(*box_a, a.pose, *box_b, b.pose, 0);
-    if (of_boxes.depth > 0) return of_boxes;
+  const std::optional<Penetration> of_boxes = box_penetration(a, b, 0);
+  if (of_boxes) {
+    if (of_boxes->depth > 0) return *of_boxes;
   } else if (const auto of_polytopes = polytope_penetration(a, b)) {
     return *of_polytopes;
   }
   const double radius = core_radius(a.shape) + core_radius(b.shape);
   const Separation cores = separate_cores(a, b);
   if (!cores.origin_inside && cores.gap > 0) return {radius - cores.distance, cores.normal, cores.distance - cores.gap};
-  if (box_a && box_b) return of_boxes;
+  if (of_boxes) return *of_boxes;
   Penetration result = DepthSearch(a, b).run();
   // Of cores that have nothing in common after all, the way along a facet's normal may be the wrong one.
   if (!(result.depth > 0) && radius > 0) result.open = std::numeric_limits<double>::infinity();

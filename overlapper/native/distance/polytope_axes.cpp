@@ -131,15 +131,10 @@ class PartingSearch {
   Penetration best_{std::numeric_limits<double>::infinity(), {}};
 };
 
-bool has_edges(const Shape& shape) {
-  const Hull* hull = std::get_if<Hull>(&shape);
-  return hull ? !hull->data->edges.empty() : std::holds_alternative<Box>(shape);
-}
-
 }  // namespace
 
 std::optional<Penetration> polytope_penetration(const Placed& a, const Placed& b) {
-  if (!has_edges(a.shape) || !has_edges(b.shape)) return std::nullopt;
+  if (edges(a.shape).empty() || edges(b.shape).empty()) return std::nullopt;
   if (facets(a.shape) + facets(b.shape) > kMostFacetsParted) return std::nullopt;
   if (facets(b.shape) < facets(a.shape)) {
     auto swapped = polytope_penetration(b, a);

@@ -226,8 +226,8 @@ struct Rims {
   double radius, half;
 
   explicit Rims(const WideBody& body) : centre(body.placed({})), axis(body.turned({{}, {}, {1}})) {
-    const Cylinder& cylinder = std::get<Cylinder>(body.shape);
-    radius = cylinder.radius, half = cylinder.length / 2;
+    const Revolution cylinder = *revolution(body.shape);
+    radius = cylinder.radius, half = cylinder.half_length;
   }
 };
 
@@ -427,22 +427,22 @@ class EllipsoidSearch {
 /// Newton's method.
 Vec3 between_curved(const Placed& a, const Placed& b, Vec3 outward) {
   for (int round = 0; round < 20; ++round) {
-    const Vec3 farthest = a.support(outward) - b.support(-outward);
+    const Vec3 farthest = a.core_support(outward) - b.core_support(-outward);
     const double way = dot(outward, farthest);
     const Vec3 slope = farthest - way * outward;
     const Vec3 u = any_orthogonal(outward), v = cross(outward, u);
     double uu = -way, uv = 0, vv = -way;
     for (const Placed* body : {&a, &b}) {
-      if (const Ellipsoid* ellipsoid = stretched(body->shape)) {
+      if (!has_rims(body->shape)) {
         const auto own = [&](Vec3 w) { return apply_transposed(body->pose.rotation, w); };
-        const Mat3 curved = ellipsoid->slope(own(outward));
+        const Mat3 curved = core_slope(body->shape, own(outward));
         uu += dot(own(u), curved * own(u)), uv += dot(own(u), curved * own(v)), vv += dot(own(v), curved * own(v));
         continue;
       }
       const Vec3 tangent = cross(body->pose.rotation * Vec3{0, 0, 1}, outward);
       const double across = norm(tangent);
       if (!(across > 0)) return outward;
-      const double curved = std::get<Cylinder>(body->shape).radius / (across * across * across);
+      const double curved = revolution(body->shape)->radius / (across * across * across);
       const double tu = dot(tangent, u), tv = dot(tangent, v);
       uu += curved * tu * tu, uv += curved * tu * tv, vv += curved * tv * tv;
     }
@@ -534,6 +534,14 @@ WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 
       search.lower = std::min(search.lower, ways.shortest().head - ways.lost());
     }
     return found(ways, search.lower > 0 ? search.lower : touching);
+  }
+  if (core_kind(a.shape) == CoreKind::kCurved || core_kind(b.shape) == CoreKind::kCurved) {
+    const EnclosedDepth enclosed = enclosed_depth(a, b);
+    Ways ways(wide_a, wide_b);
+    for (const Vec3 way : {outward, -enclosed.depth.normal, between_curved(a, b, -enclosed.depth.normal)})
+      ways.measure(unit(wide(way)));
+    const double lower = std::min(enclosed.lower, ways.shortest().head - ways.lost());
+    return found(ways, lower > 0 ? lower : touching);
   }
   if (has_rims(a.shape) || has_rims(b.shape)) {
     RimSearch search(wide_a, wide_b);

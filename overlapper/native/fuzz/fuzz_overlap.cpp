@@ -5,6 +5,7 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <stdexcept>
 
 #include "overlap/overlap.h"
@@ -72,19 +73,56 @@ class Decoder {
     return points;
   }
 
-  /// What bytes that have run out decode to, a box, is what is cheapest.
+  double drawn(double) { return positive(); }
+  Vec3 drawn(Vec3) {
+    const double x = positive(), y = positive(), z = positive();
+    return {x, y, z};
+  }
+  /// A shape of a kind from positive fields, unless its fields may be anything.
+  template <class S>
+  S draw(const S*) {
+    const auto draw_each = [&](const auto&... field) { return std::tuple{drawn(S().*field.member)...}; };
+    return std::apply(S::make, std::apply(draw_each, S::fields()));
+  }
+  HalfSpace draw(const HalfSpace*) {
+    const Vec3 normal = direction();
+    return HalfSpace::make(normal, real());
+  }
+  Hull draw(const Hull*) { return make_hull(points()); }
+  RoundedHull draw(const RoundedHull*) {
+    const std::vector<Vec3> corners = points();
+    return make_rounded_hull(corners, positive());
+  }
+
+  /// A shape of a kind after the ellipsoid, if there is one.
+  template <size_t... I>
+  std::optional<Shape> draw_more(std::index_sequence<I...>) {
+    constexpr size_t kOurs = Shape(Ellipsoid()).index() + 1;
+    if constexpr (std::variant_size_v<Shape> == kOurs) return std::nullopt;
+    const size_t chosen = integer(kOurs, std::max(kOurs, std::variant_size_v<Shape> - 1));
+    std::optional<Shape> found;
+    ((I == chosen ? void(found = draw(static_cast<const std::variant_alternative_t<I, Shape>*>(nullptr))) : void()),
+     ...);
+    return found;
+  }
+
+  /// Bytes that have run out decode to a box, which is cheapest. Kinds after the ellipsoid take numbers that else stand
+  /// for a hull.
   Shape shape() {
-    const int kind = integer(0, 26);
-    if (kind == 26) return make_ellipsoid({positive(), positive(), positive()});
-    switch (kind % 9) {
+    constexpr int kOfHull = 7;
+    const int number = integer(0, 26);
+    if (number == 26) return draw(static_cast<const Ellipsoid*>(nullptr));
+    if (number == 9 + kOfHull)
+      if (auto more = draw_more(std::make_index_sequence<std::variant_size_v<Shape>>())) return std::move(*more);
+    switch (number % 9) {
       case 0:
-      case 1: return make_box({positive(), positive(), positive()});
-      case 2: return make_sphere(positive());
-      case 3: return make_capsule(positive(), positive());
-      case 4: return make_cylinder(positive(), positive());
-      case 5: return make_half_space(direction(), real());
-      case 6: return make_rounded_hull(points(), positive());
-      default: return make_hull(points());
+      case 1: return draw(static_cast<const Box*>(nullptr));
+      case 2: return draw(static_cast<const Sphere*>(nullptr));
+      case 3: return draw(static_cast<const Capsule*>(nullptr));
+      case 4: return draw(static_cast<const Cylinder*>(nullptr));
+      case 5: return draw(static_cast<const HalfSpace*>(nullptr));
+      case 6: return draw(static_cast<const RoundedHull*>(nullptr));
+      default: return draw(static_cast<const Hull*>(nullptr));
     }
   }
 
@@ -134,40 +172,34 @@ class Decoder {
 
 // ---------------------------------------------------------------------------------------------------- bodies to Python
 
+void print(double value) { std::fprintf(stderr, "%.17g", value); }
 void print(Vec3 v) { std::fprintf(stderr, "(%.17g, %.17g, %.17g)", v.x, v.y, v.z); }
-
-void print(const Shape& shape) {
-  struct Visitor {
-    void operator()(const Sphere& s) const { std::fprintf(stderr, "Sphere(%.17g)", s.radius); }
-    void operator()(const Box& b) const {
-      std::fprintf(stderr, "Box("), print(b.half_extents), std::fprintf(stderr, ")");
-    }
-    void operator()(const Ellipsoid& e) const {
-      std::fprintf(stderr, "Ellipsoid("), print(e.half_axes), std::fprintf(stderr, ")");
-    }
-    void operator()(const Capsule& c) const { std::fprintf(stderr, "Capsule(%.17g, %.17g)", c.radius, c.length); }
-    void operator()(const Cylinder& c) const { std::fprintf(stderr, "Cylinder(%.17g, %.17g)", c.radius, c.length); }
-    static void print_points(const Hull& h) {
-      for (Vec3 v : h.data->vertices) print(v + h.data->origin), std::fprintf(stderr, ", ");
-    }
-    void operator()(const Hull& h) const {
-      std::fprintf(stderr, "Hull(["), print_points(h), std::fprintf(stderr, "])");
-    }
-    void operator()(const RoundedHull& h) const {
-      std::fprintf(stderr, "RoundedHull(["), print_points(h.core), std::fprintf(stderr, "], %.17g)", h.radius);
-    }
-    void operator()(const HalfSpace& h) const {
-      std::fprintf(stderr, "HalfSpace("), print(h.plane.normal), std::fprintf(stderr, ", %.17g)", h.plane.offset);
-    }
-  };
-  std::visit(Visitor{}, shape);
+void print(const Hull& h) {
+  std::fprintf(stderr, "[");
+  for (Vec3 v : h.data->vertices) print(v + h.data->origin), std::fprintf(stderr, ", ");
+  std::fprintf(stderr, "]");
 }
+
+template <class... Arguments>
+void print_call(const char* name, const Arguments&... arguments) {
+  std::fprintf(stderr, "%s(", name);
+  ((print(arguments), std::fprintf(stderr, ", ")), ...);
+  std::fprintf(stderr, ")");
+}
+
+template <class S>
+void print_shape(const S& shape) {
+  std::apply([&](const auto&... field) { print_call(S::kName, shape.*field.member...); }, S::fields());
+}
+void print_shape(const Hull& hull) { print_call(Hull::kName, hull); }
+void print_shape(const RoundedHull& hull) { print_call(RoundedHull::kName, hull.core, hull.radius); }
 
 void print(const std::vector<Placed>& bodies, double tolerance, const char* method) {
   std::fprintf(stderr, "overlap(");
   for (const Placed& body : bodies) {
     const Quaternion q = body.orientation;
-    std::fprintf(stderr, "Placed("), print(body.shape), std::fprintf(stderr, ", "), print(body.position);
+    std::fprintf(stderr, "Placed("), ask(body.shape, [](const auto& s) { print_shape(s); }), std::fprintf(stderr, ", "),
+        print(body.position);
     std::fprintf(stderr, ", (%.17g, %.17g, %.17g, %.17g)), ", q.x, q.y, q.z, q.w);
   }
   std::fprintf(stderr, "tolerance=%.17g, method='%s')\n", tolerance, method);

@@ -119,4 +119,14 @@ inline WideVector unit(const WideVector& v) {
   return length.head > 0 ? v / length : v;
 }
 
+struct WidePlane {
+  WideVector normal;  ///< unit
+  DoubleDouble offset;
+};
+
+/// How far `point` lies outside the plane; negative inside.
+inline DoubleDouble signed_distance(const WidePlane& plane, const WideVector& point) {
+  return dot(plane.normal, point) - plane.offset;
+}
+
 }  // namespace overlapper

@@ -22,23 +22,30 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-bool clippable(const Shape& shape) {
-  if (const Hull* hull = std::get_if<Hull>(&shape))
-    return !hull->data->edges.empty() && hull->data->planes.size() <= kMostFacetsClipped;
-  return std::holds_alternative<Box>(shape) || std::holds_alternative<HalfSpace>(shape);
+template <class S>
+Traits traits(const S& shape) {
+  Traits own{};
+  own.bodies = 1;
+  own.bounded = S::kBounded;
+  own.flat = !S::kSmooth;
+  if constexpr (S::kSmooth) {
+    own.round = shape.revolution().has_value();
+    own.rounded = shape.polytope() != nullptr;
+    own.stretched = shape.stretched() != nullptr;
+    own.other = !own.round && !own.rounded && !own.stretched;
+  } else {
+    own.clippable = shape.edges_known() && shape.facet_count() <= static_cast<int>(kMostFacetsClipped);
+  }
+  return own;
 }
-
-bool rounded(const Shape& shape) { return std::holds_alternative<RoundedHull>(shape); }
-
 Traits traits(const Shape& shape) {
-  const bool is_stretched = stretched(shape), is_smooth = smooth(shape), is_rounded = rounded(shape);
-  const bool round = is_smooth && !is_rounded && !is_stretched;
-  return {1, bounded(shape), clippable(shape), false, round, is_rounded, is_stretched, !is_smooth};
+  return ask(shape, [](const auto& s) { return traits(s); });
 }
 
 Traits operator+(const Traits& a, const Traits& b) {
   return {a.bodies + b.bodies, a.bounded || b.bounded, a.clippable && b.clippable, false,
-          a.round || b.round,  a.rounded || b.rounded, a.stretched || b.stretched, a.flat || b.flat};
+          a.round || b.round,  a.rounded || b.rounded, a.stretched || b.stretched, a.flat || b.flat,
+          a.other || b.other};
 }
 
 /// Line by line, so that the compiler sees what each asks: a search through pointers is felt by two boxes apart.
@@ -96,8 +103,7 @@ std::vector<WideBody> Arrangement::wide_bodies() const {
 }
 
 double magnitude(const Placed& relative) {
-  if (const HalfSpace* half = std::get_if<HalfSpace>(&relative.shape))
-    return norm(relative.pose.translation) + std::abs(half->plane.offset);
+  if (const Plane* plane = only_plane(relative.shape)) return norm(relative.pose.translation) + std::abs(plane->offset);
   const Bounds box = bounds(relative);
   return reach(relative, norm(max(abs(box.lower), abs(box.upper)))) + flatness(relative.shape) / rounding(1);
 }
@@ -111,9 +117,9 @@ namespace {
 bool bounds_space(std::span<const Placed> bodies) {
   ExpandingHull normals;
   for (const Placed& body : bodies) {
-    const HalfSpace* half = std::get_if<HalfSpace>(&body.shape);
-    if (!half) return true;
-    normals.points.push_back(body.pose.rotation * half->plane.normal);
+    const Plane* plane = only_plane(body.shape);
+    if (!plane) return true;
+    normals.points.push_back(body.pose.rotation * plane->normal);
   }
   if (!normals.build()) return false;
   for (const ExpandingHull::Facet& facet : normals.facets) {

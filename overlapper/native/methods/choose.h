@@ -26,6 +26,7 @@ struct Traits {
   bool rounded;           ///< one of them is a rounded hull
   bool stretched;         ///< one of them is an ellipsoid whose axes differ
   bool flat;              ///< one of them is a box, a hull or a half-space
+  bool other;             ///< one of them is smooth, and none of these kinds
 };
 Traits traits(const Placed& a, const Placed& b);
 Traits traits(std::span<const Placed> bodies);
@@ -54,13 +55,13 @@ inline constexpr std::array<Choice, 7> kChoices{{
      [](const Traits& t) { return t.clippable && t.bounded; },
      {Way::kClipping, Way::kWideClipping, Way::kDual}},
     {"two, one of them a ball, a capsule or a cylinder, and no rounded hull or ellipsoid",
-     [](const Traits& t) { return t.bodies == 2 && t.round && !t.rounded && !t.stretched; },
+     [](const Traits& t) { return t.bodies == 2 && t.round && !t.rounded && !t.stretched && !t.other; },
      {Way::kClosedForm, Way::kSlicing, Way::kDual}},
     {"an ellipsoid, and a box, a hull or a half-space",
      [](const Traits& t) { return t.bodies == 2 && t.stretched && t.flat; },
      {Way::kClosedForm, Way::kSlicing, Way::kDual}},
     {"two, one of them a rounded hull, and no ellipsoid",
-     [](const Traits& t) { return t.bodies == 2 && t.rounded && !t.stretched; },
+     [](const Traits& t) { return t.bodies == 2 && t.rounded && !t.stretched && !t.other; },
      {Way::kSlicing, Way::kDual}},
     {"all others", [](const Traits&) { return true; }, {Way::kDual}},
 }};

@@ -21,54 +21,6 @@
 namespace overlapper {
 namespace {
 
-/// Vertices and facets of a polytope that approximates a smooth shape from inside, its volume short by the fraction
-/// `tolerance` or less; a polytope's own. Half-spaces and rounded hulls have none: std::invalid_argument.
-Hull tessellated(const Shape& shape, double tolerance) {
-  if (const Hull* hull = std::get_if<Hull>(&shape)) return *hull;
-  require(!std::holds_alternative<RoundedHull>(shape), "shapes must not be rounded hulls for method 'paper'");
-  std::vector<Vec3> points;
-  const auto circle = [&](double radius, double z, int n) {
-    for (int i = 0; i < n; ++i) {
-      const double angle = 2 * std::numbers::pi * i / n;
-      points.push_back({radius * std::cos(angle), radius * std::sin(angle), z});
-    }
-  };
-  if (const Box* box = std::get_if<Box>(&shape)) {
-    for (double x : {-1.0, 1.0})
-      for (double y : {-1.0, 1.0})
-        for (double z : {-1.0, 1.0})
-          points.push_back({x * box->half_extents.x, y * box->half_extents.y, z * box->half_extents.z});
-  } else if (const Cylinder* cylinder = std::get_if<Cylinder>(&shape)) {
-    // An inscribed n-gon lacks 2/3 (π/n)² of its disc.
-    require(tolerance >= 1e-11, "tolerance must be 1e-11 or more where method 'paper' tessellates a cylinder");
-    const int n = std::max(8, static_cast<int>(std::ceil(std::numbers::pi * std::sqrt(2 / (3 * tolerance)))));
-    circle(cylinder->radius, -cylinder->length / 2, n);
-    circle(cylinder->radius, cylinder->length / 2, n);
-  } else if (bounded(shape)) {
-    // A grid of latitudes and longitudes with the same step s lacks at most about s²/2 of the ball.
-    const Capsule* capsule = std::get_if<Capsule>(&shape);
-    const Ellipsoid* ellipsoid = std::get_if<Ellipsoid>(&shape);
-    const double radius = ellipsoid ? 1 : core_radius(shape), half = capsule ? capsule->length / 2 : 0;
-    // Two latitudes' worth of points per band: beyond a million or so their hull is out of reach.
-    require(tolerance >= 1e-5, "tolerance must be 1e-5 or more where method 'paper' tessellates a round shape");
-    const int bands = std::max(4, static_cast<int>(std::ceil(std::numbers::pi / std::sqrt(2 * tolerance))));
-    points.push_back({0, 0, radius + half});
-    points.push_back({0, 0, -radius - half});
-    for (int band = 1; band < bands; ++band) {
-      const double latitude = std::numbers::pi * (static_cast<double>(band) / bands - 0.5);
-      const double r = radius * std::cos(latitude), z = radius * std::sin(latitude);
-      const int around = std::max(6, static_cast<int>(std::ceil(2 * bands * std::cos(latitude))));
-      if (z <= 0) circle(r, z - half, around);
-      if (z >= 0) circle(r, z + half, around);
-    }
-    if (ellipsoid)
-      for (Vec3& p : points) p = scaled(ellipsoid->half_axes, p);
-  } else {
-    throw std::invalid_argument("a half-space is unbounded and has no vertices");
-  }
-  return make_hull(points);
-}
-
 /// The minimal step of the 26 shifts, as a fraction of the smaller polytope's extent. The text gives no number. Half of
 /// a double's digits are spent on getting off the boundary, half are left to the dual points.
 constexpr double kMinimalStep = 0x1p-26;
@@ -217,7 +169,7 @@ Intersection intersect_about(const Part& a, const Part& b, Vec3 origin) {
   std::vector<std::vector<int>> planes_at;
   for (int s : source)
     planes_at.push_back(planes_through(dual, face_of[s], vertex_of_face, 64 * rounding(extent_of_vertices)));
-  Part part = placed_part({hull}, {{}, hull->origin}, -1);
+  Part part = placed_part(Hull(hull), {{}, hull->origin}, -1);
   std::vector<int> tried(planes.size(), -1);
   for (int f = 0; f < static_cast<int>(part.owner.size()); ++f) {
     cancellation_point();
@@ -305,11 +257,11 @@ PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double toleran
   int planes = 0;
   for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
     const Placed& body = bodies[i];
-    if (const HalfSpace* half = std::get_if<HalfSpace>(&body.shape)) {
-      const Hull box = stand_in(body.pose * half->plane, bodies);
+    if (const Plane* plane = only_plane(body.shape)) {
+      const Hull box = stand_in(body.pose * *plane, bodies);
       parts.push_back(placed_part(box, {{}, box.data->origin}, i));
     } else {
-      const Hull hull = tessellated(body.shape, tolerance);
+      const Hull hull = inscribed(body.shape, tolerance);
       parts.push_back(placed_part(hull, body.pose, i));
     }
     planes += static_cast<int>(parts.back().owner.size());

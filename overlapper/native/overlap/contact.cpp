@@ -19,17 +19,7 @@ double sum(Vec3 v) { return v.x + v.y + v.z; }
 
 /// No less than radius(), sooner.
 double extent(const Shape& shape) {
-  struct Visitor {
-    double operator()(const Sphere& s) const { return s.radius; }
-    double operator()(const Box& b) const { return sum(b.half_extents); }
-    double operator()(const Capsule& c) const { return c.radius + c.length; }
-    double operator()(const Cylinder& c) const { return c.radius + c.length; }
-    double operator()(const Hull& h) const { return h.data->radius; }
-    double operator()(const HalfSpace& h) const { return std::abs(h.plane.offset); }
-    double operator()(const RoundedHull& h) const { return h.core.data->radius + h.radius; }
-    double operator()(const Ellipsoid& e) const { return sum(e.half_axes); }
-  };
-  return std::visit(Visitor{}, shape);
+  return ask(shape, [](const auto& s) { return s.loose_radius(); });
 }
 
 /// What doubles may lose of a depth or distance, of bodies in coordinates about one of them.
@@ -121,7 +111,7 @@ double off(double stated, double lower, double upper) {
 /// m: no farther a point is outside of a body.
 double outside(const Placed& body, Vec3 point) {
   const WideBody wide_body(body, wide(point));
-  const WideBody at_point({Sphere{0}, point, {}, {{}, point}}, wide(point));
+  const WideBody at_point({Sphere(0), point, {}, {{}, point}}, wide(point));
   const double lost = 0x1p-94 * wide_body.reach();
   return std::max(0.0, wide_gap(at_point, wide_body, lost).most) + lost;
 }

@@ -176,6 +176,8 @@ void array_property(Class& cls, const char* name, Getter getter, const char* doc
 /// A shape as it came, or the hull of an (n, 3) array. TypeError or ValueError naming the argument.
 Shape to_shape(nb::handle value, const std::string& name);
 nb::object to_python(const Shape& shape);
+/// The type of any shape, as signatures have it.
+std::string any_shape();
 /// The same, placed at the origin unless it is a Placed.
 Placed to_placed(nb::handle value, const std::string& name);
 /// "auto" or "paper".

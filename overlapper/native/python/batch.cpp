@@ -274,9 +274,10 @@ as an answer to where a ray leaves it or which of its planes is tightest about a
   cls.def("__setstate__", &set_state, nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
-#define OVERLAPPER_SHAPES \
-  "collections.abc.Sequence[Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace]"
 #define OVERLAPPER_POSES "positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike"
+
+/// The type of shapes in a row, as signatures have it.
+std::string any_shapes() { return "collections.abc.Sequence[" + any_shape() + "]"; }
 
 constexpr const char* kOverlapsDoc =
     R"(What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
@@ -302,7 +303,7 @@ answers are those of a first call to the last bit. Threads that ask at the same 
 A pickle has the shapes alone.)");
   cls.def(
       "__init__", [](Batch* self, nb::handle shapes) { new (self) Batch(to_shapes(shapes)); }, "shapes"_a.none(),
-      nb::sig("def __init__(self, shapes: " OVERLAPPER_SHAPES ") -> None"));
+      nb::sig(("def __init__(self, shapes: " + any_shapes() + ") -> None").c_str()));
   cls.def("__repr__", [](const Batch& self) { return "Batch(" + std::to_string(self.shapes().size()) + " shapes)"; });
   cls.def(
       "__getstate__", [](const Batch& self) { return nb::make_tuple(shape_list(self.shapes())); },
@@ -342,9 +343,11 @@ void define_batch(nb::module_& m) {
       },
       "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none(), "pairs"_a.none() = nb::none(),
       "tolerance"_a.none() = 1e-3, "threads"_a.none() = 1, "method"_a.none() = "auto", "separated"_a = true,
-      nb::sig("def overlaps(shapes: " OVERLAPPER_SHAPES ", " OVERLAPPER_POSES
-              ", pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, "
-              "method: typing.Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps"),
+      nb::sig(("def overlaps(shapes: " + any_shapes() +
+               ", " OVERLAPPER_POSES
+               ", pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, "
+               "method: typing.Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps")
+                  .c_str()),
       kOverlapsDoc);
   m.def(
       "candidate_pairs",
@@ -353,8 +356,9 @@ void define_batch(nb::module_& m) {
         return candidates(batch, positions, orientations);
       },
       "shapes"_a.none(), "positions"_a.none(), "orientations"_a.none(),
-      nb::sig("def candidate_pairs(shapes: " OVERLAPPER_SHAPES ", " OVERLAPPER_POSES
-              ") -> numpy.typing.NDArray[numpy.int32]"),
+      nb::sig(("def candidate_pairs(shapes: " + any_shapes() +
+               ", " OVERLAPPER_POSES ") -> numpy.typing.NDArray[numpy.int32]")
+                  .c_str()),
       R"((p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
 two half-spaces are no pair.)");
 }

@@ -38,7 +38,7 @@ nb::object place(ContactSolver& solver, nb::handle frames_given, const Overlaps&
   std::vector<Pose> frames;
   for (nb::handle each : frames_given) {
     const Frame frame = to_frame(each);
-    frames.push_back(make_placed(Sphere{1}, frame.position, frame.orientation).pose);
+    frames.push_back(make_placed(Sphere(1), frame.position, frame.orientation).pose);
   }
   const size_t count = found.size(), links = solver.bodies().links().size();
   if (frames.size() != links) fail("frames", "must be one for each link");

@@ -30,11 +30,11 @@ Overlap make_overlap(std::vector<Placed> bodies, double tolerance, Method method
   return Overlap(std::move(bodies), tolerance, method);
 }
 
+/// The type of what to_placed() takes, as signatures have it.
+std::string any_body() { return any_shape() + " | Placed | numpy.typing.ArrayLike"; }
+
 /// True where the answer takes so few microseconds that letting other Python threads run meanwhile would double them.
-bool quick(const Shape& shape) {
-  const Hull* hull = std::get_if<Hull>(&shape);
-  return hull ? hull->data->planes.size() <= 64 : std::holds_alternative<Box>(shape) || !bounded(shape);
-}
+bool quick(const Shape& shape) { return !smooth(shape) && facets(shape) <= 64; }
 
 /// The answer is built where Python keeps it.
 nb::object overlap_of_pair(nb::handle type, const Placed& a, const Placed& b) {
@@ -463,10 +463,9 @@ void define_functions(nb::module_& m) {
         return make_overlap(to_bodies(shapes), to_double(tolerance, "tolerance"), to_method(method));
       },
       "shapes"_a, "tolerance"_a.none() = 1e-3, "method"_a.none() = "auto",
-      nb::sig("def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | "
-              "Placed | "
-              "numpy.typing.ArrayLike, "
-              "tolerance: float = 0.001, method: typing.Literal['auto', 'paper'] = 'auto') -> Overlap"),
+      nb::sig(("def overlap(*shapes: " + any_body() +
+               ", tolerance: float = 0.001, method: typing.Literal['auto', 'paper'] = 'auto') -> Overlap")
+                  .c_str()),
       R"(The common set of two or more convex shapes.
 
 Each is a Placed, a bare shape, or an (n, 3) array of points, which stands for their hull. `tolerance`, between 0 and 1,
@@ -492,11 +491,7 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
         return contact_in_doubt(a, b).distance;
       },
       "a"_a.none(), "b"_a.none(),
-      nb::sig(
-          "def distance(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | "
-          "numpy.typing.ArrayLike, "
-          "b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | "
-          "numpy.typing.ArrayLike) -> float"),
+      nb::sig(("def distance(a: " + any_body() + ", b: " + any_body() + ") -> float").c_str()),
       "Distance (m) of the nearest points of two shapes; 0 if they touch or overlap.");
   m.def(
       "penetration_depth",
@@ -509,11 +504,7 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
         return std::max(0.0, depth);
       },
       "a"_a.none(), "b"_a.none(),
-      nb::sig("def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace "
-              "| Placed | "
-              "numpy.typing.ArrayLike, "
-              "b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | "
-              "numpy.typing.ArrayLike) -> float"),
+      nb::sig(("def penetration_depth(a: " + any_body() + ", b: " + any_body() + ") -> float").c_str()),
       R"(Length (m) of the least translation that separates two shapes; 0 if they do not overlap. Positive where pybullet's contact
 distance is negative. Raises ValueError for two half-spaces.)");
   m.def(
@@ -522,11 +513,7 @@ distance is negative. Raises ValueError for two half-spaces.)");
         return union_ratio(a, b, to_double(tolerance, "tolerance"));
       },
       "a"_a.none(), "b"_a.none(), "tolerance"_a.none() = 1e-3,
-      nb::sig("def iou(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | "
-              "numpy.typing.ArrayLike, "
-              "b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | "
-              "numpy.typing.ArrayLike, tolerance: "
-              "float = 0.001) -> float"),
+      nb::sig(("def iou(a: " + any_body() + ", b: " + any_body() + ", tolerance: float = 0.001) -> float").c_str()),
       "Intersection over union of two shapes: common volume over the volume of their union, from 0 to 1.");
 }
 

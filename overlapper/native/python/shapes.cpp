@@ -23,7 +23,7 @@ bool is_shape(nb::handle value, Shape& shape) { return try_shapes(value, shape, 
 }  // namespace
 
 nb::object to_python(const Shape& shape) {
-  return std::visit([](const auto& s) { return wrap(s); }, shape);
+  return ask(shape, [](const auto& s) { return wrap(s); });
 }
 
 Shape to_shape(nb::handle value, const std::string& name) {
@@ -45,6 +45,15 @@ Placed to_placed(nb::handle value, const std::string& name) {
   return make_placed(to_shape(value, name), {}, {});
 }
 
+template <class... Kinds>
+static std::string names(const std::variant<Kinds...>*) {
+  std::string text;
+  ((text += (text.empty() ? "" : " | ") + std::string(Kinds::kName)), ...);
+  return text;
+}
+
+std::string any_shape() { return names(static_cast<const Shape*>(nullptr)); }
+
 std::string number(double value) {
   std::ostringstream text;
   text.precision(6);
@@ -62,28 +71,30 @@ std::string tuple_text(std::initializer_list<double> values) {
 
 std::string text(Vec3 v) { return tuple_text({v.x, v.y, v.z}); }
 
-std::string repr(const Sphere& s) { return "Sphere(radius=" + number(s.radius) + ")"; }
-std::string repr(const Box& b) { return "Box(half_extents=" + text(b.half_extents) + ")"; }
-std::string repr(const Capsule& c) {
-  return "Capsule(radius=" + number(c.radius) + ", length=" + number(c.length) + ")";
+std::string text(double value) { return number(value); }
+
+/// By its fields.
+template <class S>
+std::string repr(const S& shape) {
+  std::string arguments;
+  const auto add = [&](const auto& field) {
+    arguments += (arguments.empty() ? "" : ", ") + std::string(field.name) + "=" + text(shape.*field.member);
+  };
+  std::apply([&](const auto&... field) { (add(field), ...); }, S::fields());
+  return std::string(S::kName) + "(" + arguments + ")";
 }
-std::string repr(const Cylinder& c) {
-  return "Cylinder(radius=" + number(c.radius) + ", length=" + number(c.length) + ")";
+std::string counts(const Hull& h) {
+  return std::to_string(h.data->vertices.size()) + " vertices, " + std::to_string(h.data->planes.size()) + " facets";
 }
-std::string repr(const Hull& h) {
-  return "Hull(" + std::to_string(h.data->vertices.size()) + " vertices, " + std::to_string(h.data->planes.size()) +
-         " facets)";
+std::string repr(const Hull& h) { return "Hull(" + counts(h) + ")"; }
+std::string repr(const RoundedHull& h) {
+  return "RoundedHull(" + counts(h.core) + ", radius=" + number(h.radius) + ")";
 }
 std::string repr(const HalfSpace& h) {
   return "HalfSpace(normal=" + text(h.plane.normal) + ", offset=" + number(h.plane.offset) + ")";
 }
-std::string repr(const RoundedHull& h) {
-  return "RoundedHull(" + std::to_string(h.core.data->vertices.size()) + " vertices, " +
-         std::to_string(h.core.data->planes.size()) + " facets, radius=" + number(h.radius) + ")";
-}
-std::string repr(const Ellipsoid& e) { return "Ellipsoid(half_axes=" + text(e.half_axes) + ")"; }
 std::string repr(const Shape& shape) {
-  return std::visit([](const auto& s) { return repr(s); }, shape);
+  return ask(shape, [](const auto& s) { return repr(s); });
 }
 
 /// Divided by its length; as given if that is 1 but for a rounding, so that what is read back is the same body.
@@ -101,18 +112,12 @@ std::string repr(const Placed& p) {
          ", orientation=" + tuple_text({q.x, q.y, q.z, q.w}) + ")";
 }
 
-template <class T>
-Vec3 world_origin(const T& shape) {
-  const HullData* hull = polytope_of(Shape(shape));
-  return hull ? hull->origin : Vec3{};
-}
-
 /// What all shapes share: measures, printing, copies that are the same object.
 template <class T>
 void define_common(nb::class_<T>& cls) {
-  cls.def_prop_ro("volume", [](const T& s) { return volume(Shape(s)); }, "Volume in m³; infinite for a half-space.");
+  cls.def_prop_ro("volume", [](const T& s) { return s.volume(); }, "Volume in m³; infinite for a half-space.");
   array_property(
-      cls, "centroid", [](const T& s) { return to_numpy(centroid(Shape(s)) + world_origin(s)); },
+      cls, "centroid", [](const T& s) { return to_numpy(s.centroid() + data_origin(s)); },
       "(3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.");
   array_property(
       cls, "bounds", [](const T& s) { return to_numpy(bounds(make_placed(s, {}, {}))); },
@@ -122,13 +127,66 @@ void define_common(nb::class_<T>& cls) {
   cls.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
 }
 
-/// Pickles a shape as the arguments of its constructor.
-template <class T, class Arguments>
-void define_pickle(nb::class_<T>& cls, Arguments arguments) {
+nb::object to_argument(double value) { return nb::cast(value); }
+nb::object to_argument(Vec3 v) { return nb::make_tuple(v.x, v.y, v.z); }
+void read(nb::handle given, const char* name, double& value) { value = to_double(given, name); }
+void read(nb::handle given, const char* name, Vec3& value) { value = to_vec3(given, name); }
+const char* type_of(double) { return "float"; }
+const char* type_of(Vec3) { return "numpy.typing.ArrayLike"; }
+
+template <class S>
+using Fields = decltype(S::fields());
+
+template <size_t>
+using Handle = nb::handle;
+
+/// The class of a kind of shape whose fields are the arguments of its make(), and what a pickle has.
+template <class S, size_t... I>
+nb::class_<S> class_of(nb::module_& m, std::index_sequence<I...>) {
+  nb::class_<S> cls(m, S::kName, S::kAbout);
+  constexpr Fields<S> fields = S::fields();
+  std::string signature = "def __init__(self";
+  ((signature += std::string(", ") + std::get<I>(fields).name + ": " + type_of(S().*std::get<I>(fields).member)), ...);
+  signature += ") -> None";
+  cls.def(
+      "__init__",
+      [](S* self, Handle<I>... given) {
+        std::tuple values{S().*std::get<I>(S::fields()).member...};
+        (read(given, std::get<I>(S::fields()).name, std::get<I>(values)), ...);
+        new (self) S(std::apply(S::make, values));
+      },
+      nb::arg(std::get<I>(fields).name).none()..., nb::sig(signature.c_str()));
   cls.def(
       "__reduce__",
-      [arguments](nb::handle self) { return nb::make_tuple(self.type(), arguments(nb::cast<const T&>(self))); },
+      [](nb::handle self) {
+        const S& shape = nb::cast<const S&>(self);
+        return nb::make_tuple(self.type(), nb::make_tuple(to_argument(shape.*std::get<I>(S::fields()).member)...));
+      },
       nb::sig("def __reduce__(self) -> tuple[type, tuple[object, ...]]"));
+  return cls;
+}
+template <class S>
+nb::class_<S> class_of(nb::module_& m) {
+  return class_of<S>(m, std::make_index_sequence<std::tuple_size_v<Fields<S>>>());
+}
+
+template <class S>
+void define_attribute(nb::class_<S>& cls, const Field<S, double>& field) {
+  const auto member = field.member;
+  cls.def_prop_ro(field.name, [member](const S& s) { return s.*member; }, field.about);
+}
+template <class S>
+void define_attribute(nb::class_<S>& cls, const Field<S, Vec3>& field) {
+  const auto member = field.member;
+  array_property(cls, field.name, [member](const S& s) { return to_numpy(s.*member); }, field.about);
+}
+
+/// A kind of shape that is told by its fields alone.
+template <class S>
+void define(nb::module_& m, const S*) {
+  nb::class_<S> cls = class_of<S>(m);
+  std::apply([&](const auto&... field) { (define_attribute(cls, field), ...); }, S::fields());
+  define_common(cls);
 }
 
 nb::object triples(const std::vector<std::array<int, 3>>& rows) {
@@ -164,91 +222,15 @@ Hull hull_from_state(nb::handle given) {
     triangles.push_back({index(flat[i]), index(flat[i + 1]), index(flat[i + 2])});
   const Vec3 origin = to_vec3(state[0], "origin");
   const std::vector<Vec3> corners = to_rows(state[5], "corners");
-  const Hull hull = unlocked([&] { return hull_of_surface(origin, corners, triangles); });
+  const Hull hull(unlocked([&] { return hull_of_surface(origin, corners, triangles); }));
   const nb::tuple anew = hull_state(hull);
   for (size_t i = 0; i < 8; ++i)
     if (!equal(state[i], anew[i])) throw nb::value_error(kNoHull);
   return hull;
 }
 
-void define_shape_types(nb::module_& m) {
-  nb::class_<Sphere> sphere(m, "Sphere", "A ball of the given radius (m) about the origin.");
-  sphere.def(
-      "__init__", [](Sphere* self, nb::handle radius) { new (self) Sphere(make_sphere(to_double(radius, "radius"))); },
-      "radius"_a.none(), nb::sig("def __init__(self, radius: float) -> None"));
-  sphere.def_ro("radius", &Sphere::radius, "m");
-  define_common(sphere);
-  define_pickle(sphere, [](const Sphere& s) { return nb::make_tuple(s.radius); });
-
-  nb::class_<Box> box(m, "Box", "A box about the origin with half extents (m) along x, y, z.");
-  box.def(
-      "__init__",
-      [](Box* self, nb::handle half_extents) { new (self) Box(make_box(to_vec3(half_extents, "half_extents"))); },
-      "half_extents"_a.none(), nb::sig("def __init__(self, half_extents: numpy.typing.ArrayLike) -> None"));
-  array_property(box, "half_extents", [](const Box& b) { return to_numpy(b.half_extents); }, "(3,) m");
-  define_common(box);
-  define_pickle(box, [](const Box& b) {
-    return nb::make_tuple(nb::make_tuple(b.half_extents.x, b.half_extents.y, b.half_extents.z));
-  });
-
-  nb::class_<Ellipsoid> ellipsoid(m, "Ellipsoid", R"(An ellipsoid about the origin with half axes (m) along x, y, z.
-
-All points with (x / a)² + (y / b)² + (z / c)² <= 1. With equal half axes it answers as the sphere does. With a box, a
-hull or a half-space, it is measured as a ball is, of which it is the image; with other round bodies, between polytopes,
-as closely as `tolerance` asks.)");
-  ellipsoid.def(
-      "__init__",
-      [](Ellipsoid* self, nb::handle half_axes) {
-        new (self) Ellipsoid(make_ellipsoid(to_vec3(half_axes, "half_axes")));
-      },
-      "half_axes"_a.none(), nb::sig("def __init__(self, half_axes: numpy.typing.ArrayLike) -> None"));
-  array_property(ellipsoid, "half_axes", [](const Ellipsoid& e) { return to_numpy(e.half_axes); }, "(3,) m");
-  define_common(ellipsoid);
-  define_pickle(ellipsoid, [](const Ellipsoid& e) {
-    return nb::make_tuple(nb::make_tuple(e.half_axes.x, e.half_axes.y, e.half_axes.z));
-  });
-
-  nb::class_<Capsule> capsule(
-      m, "Capsule",
-      R"(All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.
-
-As in pybullet, `length` lies between the centres of the caps; it may be 0.)");
-  capsule.def(
-      "__init__",
-      [](Capsule* self, nb::handle radius, nb::handle length) {
-        new (self) Capsule(make_capsule(to_double(radius, "radius"), to_double(length, "length")));
-      },
-      "radius"_a.none(), "length"_a.none(), nb::sig("def __init__(self, radius: float, length: float) -> None"));
-  capsule.def_ro("radius", &Capsule::radius, "m");
-  capsule.def_ro("length", &Capsule::length, "m, between the centres of the caps");
-  define_common(capsule);
-  define_pickle(capsule, [](const Capsule& c) { return nb::make_tuple(c.radius, c.length); });
-
-  nb::class_<Cylinder> cylinder(m, "Cylinder",
-                                "A cylinder of `radius` (m) and `length` (m) along local z, about the origin.");
-  cylinder.def(
-      "__init__",
-      [](Cylinder* self, nb::handle radius, nb::handle length) {
-        new (self) Cylinder(make_cylinder(to_double(radius, "radius"), to_double(length, "length")));
-      },
-      "radius"_a.none(), "length"_a.none(), nb::sig("def __init__(self, radius: float, length: float) -> None"));
-  cylinder.def_ro("radius", &Cylinder::radius, "m");
-  cylinder.def_ro("length", &Cylinder::length, "m");
-  define_common(cylinder);
-  define_pickle(cylinder, [](const Cylinder& c) { return nb::make_tuple(c.radius, c.length); });
-
-  nb::class_<HalfSpace> half(m, "HalfSpace",
-                             R"(The closed half-space { x : normal · x <= offset }.
-
-`normal` may have any length but 0. The half-space is what the two say as given, without rounding; the attributes
-`normal` and `offset` are both divided by the length, which rounds.)");
-  half.def(
-      "__init__",
-      [](HalfSpace* self, nb::handle normal, nb::handle offset) {
-        new (self) HalfSpace(make_half_space(to_vec3(normal, "normal"), to_double(offset, "offset")));
-      },
-      "normal"_a.none(), "offset"_a.none(),
-      nb::sig("def __init__(self, normal: numpy.typing.ArrayLike, offset: float) -> None"));
+void define(nb::module_& m, const HalfSpace*) {
+  nb::class_<HalfSpace> half = class_of<HalfSpace>(m);
   array_property(
       half, "normal", [](const HalfSpace& h) { return to_numpy(h.plane.normal); }, "(3,) unit, out of the solid");
   half.def_prop_ro("offset", [](const HalfSpace& h) { return h.plane.offset; }, "m along the unit normal");
@@ -258,16 +240,10 @@ As in pybullet, `length` lies between the centres of the caps; it may be 0.)");
   half.def_prop_ro(
       "given_offset", [](const HalfSpace& h) { return h.given_offset; }, "As given, along the normal as given.");
   define_common(half);
-  define_pickle(half, [](const HalfSpace& h) {
-    const Vec3 n = h.given_normal;
-    return nb::make_tuple(nb::make_tuple(n.x, n.y, n.z), h.given_offset);
-  });
+}
 
-  nb::class_<Hull> hull(m, "Hull",
-                        R"(The convex hull of (n, 3) points (m).
-
-Interior, duplicate and coplanar points are welcome; coplanar triangles become one facet. Raises
-ValueError for fewer than four points, for points that are not finite and for points in one plane.)");
+void define(nb::module_& m, const Hull*) {
+  nb::class_<Hull> hull(m, Hull::kName, Hull::kAbout);
   hull.def(
       "__init__",
       [](Hull* self, nb::handle vertices) {
@@ -304,13 +280,8 @@ ValueError for fewer than four points, for points that are not finite and for po
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
-void define_rounded_hull(nb::module_& m) {
-  nb::class_<RoundedHull> rounded(m, "RoundedHull",
-                                  R"(All points within `radius` (m) of the convex hull of (n, 3) points (m).
-
-The Minkowski sum of the hull and a ball: what Bullet collides with where a convex mesh has a margin. ValueError as
-for Hull and Sphere. Method "paper" does not take it; more than two bodies that overlap, it among them, have
-no certificate, and neither does it with an ellipsoid that it overlaps.)");
+void define(nb::module_& m, const RoundedHull*) {
+  nb::class_<RoundedHull> rounded(m, RoundedHull::kName, RoundedHull::kAbout);
   rounded.def(
       "__init__",
       [](RoundedHull* self, nb::handle vertices, nb::handle radius) {
@@ -331,7 +302,7 @@ no certificate, and neither does it with an ellipsoid that it overlaps.)");
       [](RoundedHull& self, nb::handle state) {
         if (!nb::isinstance<nb::tuple>(state) || nb::len(state) != 2)
           throw nb::value_error("state must be that of a rounded hull");
-        const double radius = make_sphere(to_double(state[1], "radius")).radius;
+        const double radius = Sphere::make(to_double(state[1], "radius")).radius;
         new (&self) RoundedHull{hull_from_state(state[0]), radius};
       },
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
@@ -352,13 +323,13 @@ which rounds.)");
       },
       "shape"_a.none(), "position"_a.none() = nb::make_tuple(0.0, 0.0, 0.0),
       "orientation"_a.none() = nb::make_tuple(0.0, 0.0, 0.0, 1.0),
-      nb::sig(
-          "def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | "
-          "numpy.typing.ArrayLike, position: "
-          "numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None"));
+      nb::sig(("def __init__(self, shape: " + any_shape() +
+               " | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), "
+               "orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None")
+                  .c_str()));
   placed.def_prop_ro(
       "shape", [](const Placed& p) { return to_python(p.shape); },
-      nb::sig("def shape(self) -> Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace"));
+      nb::sig(("def shape(self) -> " + any_shape()).c_str()));
   array_property(placed, "position", [](const Placed& p) { return to_numpy(p.position); }, "(3,) m");
   array_property(
       placed, "orientation", [](const Placed& p) { return to_numpy(unit(p.orientation)); },
@@ -384,11 +355,15 @@ which rounds.)");
   placed.def("__deepcopy__", [](nb::handle self, nb::handle) { return nb::borrow(self); }, "memo"_a);
 }
 
+template <class... Kinds>
+void define_each(nb::module_& m, const std::variant<Kinds...>*) {
+  (define(m, static_cast<const Kinds*>(nullptr)), ...);
+}
+
 }  // namespace
 
 void define_shapes(nb::module_& m) {
-  define_shape_types(m);
-  define_rounded_hull(m);
+  define_each(m, static_cast<const Shape*>(nullptr));
   define_placed(m);
 }
 

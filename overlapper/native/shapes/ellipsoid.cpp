@@ -1,14 +1,32 @@
+#include "shapes/ellipsoid.h"
+
 #include <algorithm>
 #include <array>
+#include <numbers>
 
-#include "shapes/shape.h"
+#include "shapes/inscribed.h"
+#include "shapes/limits.h"
 
 namespace overlapper {
+
+using namespace tangents;
+
 namespace {
 
 int shortest_axis(Vec3 h) { return h.x <= h.y && h.x <= h.z ? 0 : h.y <= h.z ? 1 : 2; }
 
 Vec3 divided(Vec3 v, Vec3 h) { return {v.x / h.x, v.y / h.y, v.z / h.z}; }
+WideVector divided(const WideVector& v, Vec3 by) {
+  return {v.x / DoubleDouble{by.x}, v.y / DoubleDouble{by.y}, v.z / DoubleDouble{by.z}};
+}
+WideVector scaled(Vec3 by, const WideVector& v) {
+  return {DoubleDouble{by.x} * v.x, DoubleDouble{by.y} * v.y, DoubleDouble{by.z} * v.z};
+}
+
+WidePlane wide_supporting(Vec3 half_axes, const WideVector& outward) {
+  const WideVector normal = unit(outward);
+  return {normal, norm(scaled(half_axes, normal))};
+}
 
 /// A point of an ellipsoid's space in units of its shortest half axis, with the shortest axis last.
 ///
@@ -38,7 +56,7 @@ struct Seen {
     std::array<double, 3> n;
     for (int i = 0; i < 2; ++i) n[axis[i]] = u(i, tau) / g[i];
     n[axis[2]] = last;
-    return unit({n[0], n[1], n[2]});
+    return unit(Vec3{n[0], n[1], n[2]});
   }
 
   /// What is left of a unit for the last component where the point lies in the plane across the shortest axis, and τ is
@@ -92,12 +110,19 @@ struct Seen {
 
 }  // namespace
 
+Ellipsoid Ellipsoid::make(Vec3 half_axes) {
+  for (int i = 0; i < 3; ++i) require_size(half_axes[i], "half_axes");
+  return Ellipsoid(half_axes);
+}
+
+double Ellipsoid::volume() const { return 4.0 / 3.0 * std::numbers::pi * half_axes.x * half_axes.y * half_axes.z; }
+
 Vec3 Ellipsoid::support(Vec3 direction) const {
   const Vec3 on_ball = unit(scaled(half_axes, unit(direction)));
   return scaled(half_axes, on_ball);
 }
 
-Mat3 Ellipsoid::slope(Vec3 direction) const {
+Mat3 Ellipsoid::core_slope(Vec3 direction) const {
   // With M the squares of the half axes and p = M d / √(d · M d) the point, (M − p pᵀ) / √(d · M d).
   const Vec3 h = half_axes, square = scaled(h, h);
   const double reach = norm(scaled(h, direction));
@@ -135,5 +160,25 @@ std::vector<Vec3> Ellipsoid::ways_out(Vec3 point) const {
 }
 
 Plane Ellipsoid::tightest(Vec3 point) const { return supporting(ways_out(point)[0]); }
+
+WideVector Ellipsoid::wide_core_support(const WideVector& direction) const {
+  return ball() ? WideVector{} : scaled(half_axes, unit(scaled(half_axes, direction)));
+}
+
+WidePlane Ellipsoid::wide_ray_exit(const WideVector& origin, const WideVector& direction) const {
+  const WideVector on_ball = leave_ball(divided(origin, half_axes), unit(divided(direction, half_axes)), 1);
+  return wide_supporting(half_axes, divided(on_ball, half_axes));
+}
+
+WidePlane Ellipsoid::wide_tightest(const WideVector& point, const WideTriangles&) const {
+  // Where the slack is least, a normal that is off changes it to second order: doubles know it well enough.
+  return wide_supporting(half_axes, wide(ways_out(rounded(point))[0]));
+}
+
+Hull Ellipsoid::inscribed(double tolerance) const {
+  std::vector<Vec3> points = points_of_capsule(1, 0, tolerance);
+  for (Vec3& p : points) p = overlapper::scaled(half_axes, p);
+  return make_hull(points);
+}
 
 }  // namespace overlapper

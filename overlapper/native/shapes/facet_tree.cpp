@@ -7,7 +7,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/fitted_axes.h"
-#include "shapes/hull.h"
+#include "shapes/hull_data.h"
 
 namespace overlapper {
 namespace {

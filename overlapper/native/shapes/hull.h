@@ -1,81 +1,74 @@
 #pragma once
 
-#include <array>
-#include <memory>
-#include <span>
-#include <vector>
-
-#include "geometry/vec.h"
-#include "shapes/hull_graph.h"
+#include "shapes/choices.h"
+#include "shapes/hull_data.h"
+#include "shapes/wide_triangles.h"
 
 namespace overlapper {
 
-/// A ridge of a polytope: from vertex `from` to vertex `to`, the facet `left` on the left hand seen from outside.
-struct Edge {
-  int from, to, left, right;
-};
-
-/// What a convex polytope is made of. Facet f is the polygon ring[ring_start[f] .. ring_start[f + 1]) of vertices,
-/// counter-clockwise from outside, in the plane planes[f]. Coordinates are relative to `origin`: subtracting it rounded
-/// no bit, and it keeps the digits of a hull that lies far from where its points are counted from.
-struct HullData {
-  Vec3 origin;
-  std::vector<Vec3> vertices;
-  std::vector<Plane> planes;
-  std::vector<int> ring, ring_start{0};
-  /// The surface as it is before coplanar triangles are merged and what rounding moved is forgotten, for wider
-  /// arithmetic.
-  std::vector<Vec3> corners;
-  std::vector<std::array<int, 3>> triangles;
-  /// Three corners of each facet whose plane holds all corners of its triangles without any rounding; -1 if there are
-  /// none.
-  std::vector<std::array<int, 3>> facet_corners;
-  double volume = 0;
-  Vec3 centroid;
-  std::shared_ptr<const HullGraph> graph;  ///< for climbing; null where rounding left no closed convex surface
-
-  std::vector<Edge> edges;                      ///< none if merging facets has left a ridge without its other side
-  std::vector<std::array<int, 3>> facets_meet;  ///< per vertex: three of its facets, as far from a common line as any
-  double radius = 0;                            ///< of a ball about the coordinates' origin that holds all vertices
-  double flatness = 0;  ///< m: how far vertices of a facet lie inside its plane, or those beside it outside, at most
-
-  std::span<const int> facet(int f) const {
-    return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
-  }
-};
+class Mesh;
+struct Solid;
 
 /// The convex hull of points; shared, never changed once built.
-struct Hull {
-  std::shared_ptr<const HullData> data;
+struct Hull : Bounded,
+              Flat,
+              NotRevolved,
+              NotStretched,
+              PolytopeCore,
+              OwnCore<Hull>,
+              BoundedBySupports<Hull>,
+              EnclosedByBounds<Hull> {
+  static constexpr const char* kName = "Hull";
+  static constexpr const char* kAbout = R"(The convex hull of (n, 3) points (m).
+
+Interior, duplicate and coplanar points are welcome; coplanar triangles become one facet. Raises
+ValueError for fewer than four points, for points that are not finite and for points in one plane.)";
+
+  Hull() = default;
+  explicit Hull(std::shared_ptr<const HullData> hull) : data(std::move(hull)) {}
 
   Vec3 support(Vec3 direction) const;
   Plane ray_exit(Vec3 origin, Vec3 direction) const;
   Plane tightest(Vec3 point) const;
+
+  const HullData* polytope() const { return data.get(); }
+  std::vector<Vec3> core_corners() const { return data->corners; }
+  void append_core_surface(const std::vector<char>& kept, CoreSurface& surface) const {
+    overlapper::append_core_surface(*data, kept, surface);
+  }
+
+  double volume() const { return data->volume; }
+  Vec3 centroid() const { return data->centroid; }
+  double bounding_radius() const { return data->radius; }
+  double loose_radius() const { return data->radius; }
+  double reach() const { return data->radius; }
+  void append_planes(std::vector<Plane>& planes) const {
+    planes.insert(planes.end(), data->planes.begin(), data->planes.end());
+  }
+  std::partial_ordering order(const Hull& other) const { return order_of(*data, *other.data); }
+
+  int facet_count() const { return static_cast<int>(data->planes.size()); }
+  Vec3 vertex(int i) const { return data->vertices[i]; }
+  std::span<const Edge> edges() const { return data->edges; }
+  bool edges_known() const { return !data->edges.empty(); }
+  std::optional<WidePlane> wide_facet(int f) const;
+  bool has_graph() const { return data->graph != nullptr; }
+  void place(Solid& solid, const Pose* pose, double beyond) const;
+  void give(Mesh& mesh) const;
+
+  WideVector wide_core_support(const WideVector& direction) const { return farthest_corner(*data, direction); }
+  WidePlane wide_tightest(const WideVector& point, const WideTriangles& triangles) const {
+    return triangles.tightest(point);
+  }
+  void append_wide_planes(const WideBody& body, std::vector<WidePlane>& planes) const;
+
+  Hull inscribed(double) const { return *this; }
+
+  std::shared_ptr<const HullData> data;
 };
 
 /// Interior, duplicate, collinear and coplanar points are welcome; coplanar triangles become one facet. Throws
 /// std::invalid_argument with one sentence that names the argument.
-Hull make_hull(std::span<const Vec3> points);
-/// The hull of finite points, or null if they are flat; `source[i]` becomes the index of vertex i among the points.
-std::shared_ptr<HullData> hull_of(std::span<const Vec3> points, std::vector<int>* source = nullptr);
-
-/// The hull whose surface, before coplanar triangles are merged, is that of these corners about `origin`: as it was
-/// built, so that its facets have the same numbers. Throws std::invalid_argument if that is no hull's.
-Hull hull_of_surface(Vec3 origin, std::span<const Vec3> corners, std::span<const std::array<int, 3>> triangles);
-
-/// Fills in what follows from vertices, planes and rings.
-void complete(HullData& data);
-
-/// How far corners of a facet rise above the plane of the one across its edge number `edge`, at most; 0 if none does.
-/// From either end of the edge, heights fall along the ring until they rise again towards the other end, as the ring is
-/// convex but for rounding: once they are below all that rounding may do, none beyond counts. So the ring of a large
-/// facet is not walked for each of the many around it.
-double rise_beside(const HullData& data, const Plane& across, std::span<const int> ring, size_t edge, double rounding);
-
-struct HullMeasures {
-  double volume = 0, area = 0;
-  Vec3 centroid;
-};
-HullMeasures measure(const HullData& hull);
+inline Hull make_hull(std::span<const Vec3> points) { return Hull(hull_of_vertices(points)); }
 
 }  // namespace overlapper

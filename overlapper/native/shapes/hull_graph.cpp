@@ -5,7 +5,7 @@
 
 #include "geometry/cancellation.h"
 #include "geometry/thresholds.h"
-#include "shapes/shape.h"
+#include "shapes/hull_data.h"
 
 namespace overlapper {
 namespace {

@@ -1,16 +1,16 @@
 #pragma once
 
+#include <utility>
+
 #include "shapes/shape.h"
 
 namespace overlapper {
 
-/// True if the shape has a Mesh: a box, or a hull that can be climbed.
-bool has_graph(const Shape& shape);
-
-/// A box or a hull as it was made, with who is next to whom. Boxes are hulls too, here, of which only the sizes change.
+/// A shape with a graph as it was made, with who is next to whom. Boxes are hulls too, here, of which only the sizes
+/// change.
 class Mesh {
  public:
-  /// The shape must stay.
+  /// The shape must stay, and have a graph.
   void set(const Shape& shape);
 
   const HullData& data() const { return *data_; }
@@ -18,13 +18,18 @@ class Mesh {
   /// m: by how much corners may lie off the planes of facets that were merged; 0 where none were.
   double flat() const { return flat_; }
 
- private:
-  void set_box(Vec3 half_extents);
+  // For shapes that give themselves.
 
+  void look_at(const HullData& data, const HullGraph& graph, double flat) {
+    data_ = &data, graph_ = &graph, flat_ = flat;
+  }
+  /// Room for a shape that has no data of its own; it holds what it held.
+  std::pair<HullData, HullGraph>& own() { return own_; }
+
+ private:
   const HullData* data_ = nullptr;
   const HullGraph* graph_ = nullptr;
-  HullData box_;
-  HullGraph box_graph_;
+  std::pair<HullData, HullGraph> own_;
   double flat_ = 0;
 };
 

@@ -1,11 +1,14 @@
+#include "shapes/rounded_hull.h"
+
 #include <cfloat>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <string>
 
-#include "shapes/facet_tree.h"
-#include "shapes/shape.h"
+#include "shapes/limits.h"
+#include "shapes/sphere.h"
+#include "shapes/wide_body.h"
 
 namespace overlapper {
 namespace {
@@ -89,7 +92,7 @@ Steiner steiner(const HullData& hull) {
 }  // namespace
 
 RoundedHull make_rounded_hull(std::span<const Vec3> points, double radius) {
-  RoundedHull rounded{make_hull(points), make_sphere(radius).radius};
+  RoundedHull rounded{make_hull(points), Sphere::make(radius).radius};
   if (rounded.core.data->edges.empty())
     throw std::invalid_argument("vertices are so close to flat that rounding leaves no ridges to round off");
   return rounded;
@@ -160,6 +163,35 @@ Plane RoundedHull::ray_exit(Vec3 origin, Vec3 direction) const {
     t = sooner;
   }
   return exit;
+}
+
+void RoundedHull::append_planes(std::vector<Plane>& planes) const {
+  for (const Plane& plane : core.data->planes) planes.push_back({plane.normal, plane.offset + radius});
+}
+
+namespace {
+
+WidePlane wide_supporting(const RoundedHull& hull, Vec3 outward) {
+  const WideVector normal = unit(wide(outward));
+  return {normal, dot(normal, hull.wide_core_support(normal)) + DoubleDouble{hull.radius}};
+}
+
+}  // namespace
+
+WidePlane RoundedHull::wide_ray_exit(const WideVector& origin, const WideVector& direction) const {
+  return wide_supporting(*this, ray_exit(rounded(origin), rounded(direction)).normal);
+}
+
+WidePlane RoundedHull::wide_tightest(const WideVector& point, const WideTriangles&) const {
+  return wide_supporting(*this, tightest(rounded(point)).normal);
+}
+
+void RoundedHull::append_wide_planes(const WideBody& body, std::vector<WidePlane>& planes) const {
+  body.append_triangles(radius, planes);
+}
+
+Hull RoundedHull::inscribed(double) const {
+  throw std::invalid_argument("shapes must not be rounded hulls for method 'paper'");
 }
 
 }  // namespace overlapper

@@ -1,171 +1,148 @@
 #pragma once
 
-#include <concepts>
-#include <memory>
-#include <optional>
 #include <span>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
-#include "geometry/once.h"
-#include "shapes/facet_tree.h"
+#include "shapes/box.h"
+#include "shapes/capsule.h"
+#include "shapes/convex_shape.h"
+#include "shapes/cylinder.h"
+#include "shapes/ellipsoid.h"
+#include "shapes/half_space.h"
 #include "shapes/hull.h"
+#include "shapes/rounded_hull.h"
+#include "shapes/sphere.h"
+#ifdef OVERLAPPER_MORE_SHAPES
+#include OVERLAPPER_MORE_SHAPES  // defines OVERLAPPER_MORE_KINDS, a comma and the kinds
+#else
+#define OVERLAPPER_MORE_KINDS
+#endif
 
 namespace overlapper {
 
-/// A closed convex solid, known only by asking. Directions need not be unit length.
-template <class T>
-concept ConvexOracle = requires(const T& shape, Vec3 point, Vec3 direction) {
-  { shape.support(direction) } -> std::same_as<Vec3>;  // a farthest point, any of them
-  {
-    shape.ray_exit(point, direction)
-  } -> std::same_as<Plane>;  // supporting plane through which the ray leaves; point strictly inside
-  {
-    shape.tightest(point)
-  } -> std::same_as<Plane>;  // supporting plane with the least slack at the point, inside or out
-};
+template <ConvexShape... Kinds>
+using OneOf = std::variant<Kinds...>;
 
-struct Sphere {
-  double radius;
+/// All kinds of shapes, in the order in which bodies are computed with.
+using Shape = OneOf<Sphere, Box, Capsule, Cylinder, Hull, HalfSpace, RoundedHull, Ellipsoid OVERLAPPER_MORE_KINDS>;
 
-  Vec3 support(Vec3 direction) const { return radius * unit(direction); }
-  Plane ray_exit(Vec3 origin, Vec3 direction) const;
-  Plane tightest(Vec3 point) const;
-};
-
-struct Box {
-  Vec3 half_extents;
-
-  Vec3 support(Vec3 direction) const;
-  Plane ray_exit(Vec3 origin, Vec3 direction) const;
-  Plane tightest(Vec3 point) const;
-};
-
-/// A box's corners and sides by number: bit k of a corner's says on which side of axis k it is, and so does the last
-/// bit of a side's, 2 k or 2 k + 1.
-inline Vec3 corner(const Box& box, int i) {
-  const Vec3 h = box.half_extents;
-  return {i & 1 ? h.x : -h.x, i & 2 ? h.y : -h.y, i & 4 ? h.z : -h.z};
-}
-inline Plane side(const Box& box, int f) {
-  const double sign = f & 1 ? 1 : -1;
-  const int k = f / 2;
-  return {{k == 0 ? sign : 0, k == 1 ? sign : 0, k == 2 ? sign : 0}, box.half_extents[k]};
+/// What a question answers of the shape, whatever its kind.
+template <class Question>
+decltype(auto) ask(const Shape& shape, Question question) {
+  return std::visit(question, shape);
 }
 
-/// Around local z; `length` lies between the centres of the caps.
-struct Capsule {
-  double radius, length;
+/// The same of a shape that is not smooth; of a smooth one, nothing is asked, and the answer is a default value.
+template <class Question>
+auto ask_flat(const Shape& shape, Question question) {
+  using Answer = decltype(question(std::declval<const Box&>()));
+  return ask(shape, [&](const auto& s) -> Answer {
+    if constexpr (!std::decay_t<decltype(s)>::kSmooth) return question(s);
+    else return Answer();
+  });
+}
 
-  Vec3 support(Vec3 direction) const;
-  Plane ray_exit(Vec3 origin, Vec3 direction) const;
-  Plane tightest(Vec3 point) const;
-};
-
-/// Around local z.
-struct Cylinder {
-  double radius, length;
-
-  Vec3 support(Vec3 direction) const;
-  Plane ray_exit(Vec3 origin, Vec3 direction) const;
-  Plane tightest(Vec3 point) const;
-};
-
-/// { x : dot(plane.normal, x) <= plane.offset }. Unbounded: its support is at infinity in all directions but one.
-struct HalfSpace {
-  Plane plane;
-  Vec3 given_normal;  ///< as it came, of any length: dividing by that rounds, and wider arithmetic need not
-  double given_offset;
-
-  Vec3 support(Vec3 direction) const;
-  Plane ray_exit(Vec3, Vec3) const { return plane; }
-  Plane tightest(Vec3) const { return plane; }
-};
-
-/// All points within `radius` of a polytope: its Minkowski sum with a ball.
-struct RoundedHull {
-  Hull core;
-  double radius;
-  std::shared_ptr<const Once<FacetTree>> parts = std::make_shared<Once<FacetTree>>();  ///< of the core
-
-  Vec3 support(Vec3 direction) const { return core.support(direction) + radius * unit(direction); }
-  Plane ray_exit(Vec3 origin, Vec3 direction) const;
-  Plane tightest(Vec3 point) const;
-  /// The supporting plane whose normal is along `outward`.
-  Plane supporting(Vec3 outward) const;
-
-  double volume() const;  ///< m³, by Steiner's formula
-  Vec3 centroid() const;  ///< about the core's origin
-};
-
-/// About the origin, its axes along x, y and z: a ball that has been stretched.
-struct Ellipsoid {
-  Vec3 half_axes;
-
-  /// With equal axes, it answers as the sphere does.
-  bool ball() const { return half_axes.x == half_axes.y && half_axes.y == half_axes.z; }
-
-  Vec3 support(Vec3 direction) const;
-  Plane ray_exit(Vec3 origin, Vec3 direction) const;
-  Plane tightest(Vec3 point) const;
-  /// The supporting plane whose normal is along `outward`.
-  Plane supporting(Vec3 outward) const;
-  /// The derivative of support() by the direction.
-  Mat3 slope(Vec3 direction) const;
-  /// The unit normals at the points of the surface that are the nearest ones of all around them, of which there are
-  /// one or two: the nearest of all, and the one across the shortest axis.
-  std::vector<Vec3> ways_out(Vec3 point) const;
-};
-
-using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Hull, HalfSpace, RoundedHull, Ellipsoid>;
-
-/// Each throws std::invalid_argument with one sentence that names the argument.
-Sphere make_sphere(double radius);
-Box make_box(Vec3 half_extents);
-Capsule make_capsule(double radius, double length);
-Cylinder make_cylinder(double radius, double length);
-HalfSpace make_half_space(Vec3 normal, double offset);
-RoundedHull make_rounded_hull(std::span<const Vec3> points, double radius);
-Ellipsoid make_ellipsoid(Vec3 half_axes);
 /// m³; infinite for a half-space.
-double volume(const Shape& shape);
-Vec3 centroid(const Shape& shape);
-bool bounded(const Shape& shape);
+inline double volume(const Shape& shape) {
+  return ask(shape, [](const auto& s) { return s.volume(); });
+}
+inline Vec3 centroid(const Shape& shape) {
+  return ask(shape, [](const auto& s) { return s.centroid(); });
+}
+inline bool bounded(const Shape& shape) {
+  return ask(shape, [](const auto& s) { return s.kBounded; });
+}
 
 /// True for shapes with infinitely many supporting planes along their boundary: sphere, capsule, cylinder,
 /// rounded hull, ellipsoid.
-bool smooth(const Shape& shape);
+inline bool smooth(const Shape& shape) {
+  return ask(shape, [](const auto& s) { return s.kSmooth; });
+}
 
+/// The plane of a half-space; null for what is bounded.
+inline const Plane* only_plane(const Shape& shape) {
+  return ask(shape, [](const auto& s) -> const Plane* {
+    if constexpr (std::decay_t<decltype(s)>::kBounded) return nullptr;
+    else return &s.plane;
+  });
+}
+
+inline CoreKind core_kind(const Shape& shape) {
+  return ask(shape, [](const auto& s) { return s.core_kind(); });
+}
 /// True for a cylinder, whose caps have round borders.
-bool has_rims(const Shape& shape);
-
-/// The shape, if it is an ellipsoid and no ball.
-const Ellipsoid* stretched(const Shape& shape);
-
+inline bool has_rims(const Shape& shape) { return core_kind(shape) == CoreKind::kRims; }
 /// True for cylinders and stretched ellipsoids: what GJK and EPA find of a core that is curved, they approach, and know
 /// the direction there to half of the digits.
-bool has_curved_core(const Shape& shape);
+inline bool has_curved_core(const Shape& shape) { return core_kind(shape) != CoreKind::kPolytope; }
+/// A smooth shape is its core (a point, a segment, a polytope) grown by a radius; every other shape is its own core, of
+/// radius 0.
+inline double core_radius(const Shape& shape) {
+  return ask(shape, [](const auto& s) { return s.core_radius(); });
+}
+inline Mat3 core_slope(const Shape& shape, Vec3 direction) {
+  return ask(shape, [&](const auto& s) { return s.core_slope(direction); });
+}
+
+/// Nothing unless the shape is a ball, a capsule or a cylinder.
+inline std::optional<Revolution> revolution(const Shape& shape) {
+  return ask(shape, [](const auto& s) { return s.revolution(); });
+}
+/// The shape, if it is an ellipsoid and no ball.
+inline const Ellipsoid* stretched(const Shape& shape) {
+  return ask(shape, [](const auto& s) -> const Ellipsoid* { return s.stretched(); });
+}
+/// The polytope that a hull is, or that a rounded hull is grown from; null for other shapes.
+inline const HullData* polytope_of(const Shape& shape) {
+  return ask(shape, [](const auto& s) -> const HullData* { return s.polytope(); });
+}
 
 /// All facet planes of a polytope; for a smooth shape a few of its tangent planes that already bound it. About the
 /// shape's origin.
-void append_planes(const Shape& shape, std::vector<Plane>& planes);
-
-/// A smooth shape is its core (a point, a segment, a polytope) grown by a radius; every other shape is its own core, of
-/// radius 0.
-double core_radius(const Shape& shape);
-
-/// The polytope that a hull is, or that a rounded hull is grown from; null for other shapes.
-const HullData* polytope_of(const Shape& shape);
+inline void append_planes(const Shape& shape, std::vector<Plane>& planes) {
+  ask(shape, [&](const auto& s) { s.append_planes(planes); });
+}
 
 /// How far from its own origin a shape reaches; of a half-space, how far its plane is. For balls, capsules, cylinders,
 /// rounded hulls and ellipsoids, the corner of the box around them.
-double radius(const Shape& shape);
+inline double radius(const Shape& shape) {
+  return ask(shape, [](const auto& s) { return s.bounding_radius(); });
+}
 
-/// Facets of a box or a hull; 1 for a half-space.
-int facets(const Shape& shape);
+/// Facets of a box or a hull; 1 for a half-space, 0 for a smooth shape.
+inline int facets(const Shape& shape) {
+  return ask_flat(shape, [](const auto& s) { return s.facet_count(); });
+}
+/// Of a box, by the numbers of corner() and side(), or of a hull; none of others.
+inline std::span<const Edge> edges(const Shape& shape) {
+  return ask_flat(shape, [](const auto& s) { return s.edges(); });
+}
+inline Vec3 vertex(const Shape& shape, int number) {
+  return ask_flat(shape, [&](const auto& s) { return s.vertex(number); });
+}
+/// A facet's plane, its normal of any length; nothing where rounding has merged several.
+inline std::optional<WidePlane> wide_facet(const Shape& shape, int number) {
+  return ask_flat(shape, [&](const auto& s) { return s.wide_facet(number); });
+}
+/// True if the shape has a Mesh: a box, or a hull that can be climbed.
+inline bool has_graph(const Shape& shape) {
+  return ask_flat(shape, [](const auto& s) { return s.has_graph(); });
+}
+
+/// The hull of points of a bounded shape that lacks no more than that fraction of its volume. Throws
+/// std::invalid_argument for shapes that method "paper" does not take.
+Hull inscribed(const Shape& shape, double tolerance);
 
 /// m: by how much planes of facets that are not quite flat miss their corners.
 double flatness(const Shape& shape);
+
+/// Where the coordinates of a hull's data, and of a rounded hull's, begin.
+inline Vec3 data_origin(const Shape& shape) {
+  const HullData* hull = polytope_of(shape);
+  return hull ? hull->origin : Vec3{};
+}
 
 /// A shape and where it is. `pose` maps the shape's own coordinates (a hull's are about HullData::origin) to the world.
 struct Placed {
@@ -185,7 +162,7 @@ struct Placed {
   /// The same body with coordinates counted from `reference`: relative poses keep the digits that world ones lose.
   Placed seen_from(Vec3 reference) const;
 };
-static_assert(ConvexOracle<Placed> && ConvexOracle<Hull> && ConvexOracle<HalfSpace>);
+static_assert(ConvexOracle<Placed>);
 
 Placed make_placed(Shape shape, Vec3 position, Quaternion orientation);
 
@@ -194,13 +171,8 @@ Placed make_placed(Shape shape, Vec3 position, Quaternion orientation);
 /// adding that origin rounds, too.
 double reach(const Placed& body, double extent);
 
-struct Bounds {
-  Vec3 lower, upper;
-};
-/// The box around a placed shape, from six supports; infinite for a half-space.
+/// The box around a placed shape; infinite for a half-space.
 Bounds bounds(const Placed& placed);
-/// m², of a box.
-double surface(const Bounds& box);
 
 /// True if none of the bodies is smooth.
 bool polyhedral(std::span<const Placed> bodies);

@@ -55,9 +55,6 @@ struct Ball {
   double radius;
 };
 
-/// Of a box, by the numbers of corner() and side(), or of a hull; none of others.
-std::span<const Edge> edges(const Shape& shape);
-
 /// A bounded polytope in the coordinates of `pose`, or a half-space. Planes that fill up the stride are `beyond` away.
 void set_solid(Solid& solid, const Placed& body, int owner, const Pose* pose, double beyond);
 

@@ -7,16 +7,6 @@
 
 namespace overlapper {
 
-struct WidePlane {
-  WideVector normal;  ///< unit
-  DoubleDouble offset;
-};
-
-/// How far `point` lies outside the plane; negative inside.
-inline DoubleDouble signed_distance(const WidePlane& plane, const WideVector& point) {
-  return dot(plane.normal, point) - plane.offset;
-}
-
 /// A placed shape in double-double, from the numbers that define it: corners, sizes, position, and orientation taken as
 /// the exact rotation that its quaternion stands for at any length. Coordinates are counted from `about`, which need
 /// not be a double: so near a small common set, what doubles hold of planes and points is right relative to its size.
@@ -24,6 +14,7 @@ class WideBody {
  public:
   WideBody(const Placed& body, const WideVector& about);
 
+  /// Only of a smooth shape.
   WidePlane ray_exit(const WideVector& origin, const WideVector& direction) const;
   WidePlane tightest(const WideVector& point) const;
   WideVector support(const WideVector& direction) const;
@@ -40,26 +31,23 @@ class WideBody {
   /// All planes of a polytope, of each triangle of its hull; for a smooth shape a few tangent planes that bound it.
   void append_planes(std::vector<WidePlane>& planes) const;
 
+  // For shapes that append their planes.
+
+  /// The planes of all triangles of its hull, moved out by a radius.
+  void append_triangles(double radius, std::vector<WidePlane>& planes) const;
+  /// Its supporting planes across its own axes.
+  void append_planes_across_axes(std::vector<WidePlane>& planes) const;
+
   Shape shape;
 
  private:
-  /// A facet's triangle, as doubles know it: enough to tell that it is not the one looked for.
-  struct Glance {
-    Vec3 corner, normal;
-    double doubt;  ///< of the normal's direction
-  };
-
   WidePlane in_world(const WidePlane& local) const;
   WideVector local(const WideVector& point) const;
-  WidePlane triangle_plane(int triangle) const;
-  WidePlane tightest_triangle(const WideVector& local_point) const;
-  WidePlane supporting(Vec3 local_outward) const;
-  WideVector farthest_corner(const WideVector& local_direction) const;
 
+  WideTriangles triangles_;
   WideMatrix rotation_;
   WideVector translation_;
   double reach_;
-  std::vector<Glance> glances_;  ///< per triangle of a hull
 };
 
 }  // namespace overlapper

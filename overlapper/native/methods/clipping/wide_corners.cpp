@@ -8,12 +8,6 @@ namespace {
 constexpr WideColumns kIdentity{WideLanes{Quad{1, 0, 0, 0}, Quad{}}, WideLanes{Quad{0, 1, 0, 0}, Quad{}},
                                 WideLanes{Quad{0, 0, 1, 0}, Quad{}}};
 
-/// Where the coordinates of a hull's data begin.
-Vec3 data_origin(const Shape& shape) {
-  const Hull* hull = std::get_if<Hull>(&shape);
-  return hull ? hull->data->origin : Vec3{};
-}
-
 /// Columns of the rotation that a quaternion of any length stands for.
 template <bool fused>
 WideColumns rotation_columns(Quaternion given) {
@@ -118,19 +112,9 @@ class WideCorners {
   bool add_plane(int facet) {
     const bool second = facet >= common_.first_facets;
     const Shape& shape = second ? common_.b.shape : common_.a.shape;
-    WideVector normal;
-    DoubleDouble level;
-    if (const Hull* hull = std::get_if<Hull>(&shape)) {
-      const HullData& data = *hull->data;
-      const auto& [i, j, k] = data.facet_corners[second ? facet - common_.first_facets : facet];
-      if (i < 0) return false;
-      normal = wide_normal(data.corners[i], data.corners[j], data.corners[k]);
-      level = dot(normal, wide(data.corners[i]));
-    } else {
-      const HalfSpace& half = std::get<HalfSpace>(shape);
-      normal = wide(half.given_normal);
-      level = {half.given_offset};
-    }
+    const std::optional<WidePlane> plane = wide_facet(shape, second ? facet - common_.first_facets : facet);
+    if (!plane) return false;
+    auto [normal, level] = *plane;
     const DoubleDouble scale{1 / norm(overlapper::rounded(normal))};
     normal = scale * normal;
     level = scale * level;
@@ -199,9 +183,7 @@ class WideCorners {
   /// The step from a vertex that doubles have placed to the body's own.
   Vec3 beside_vertex(const CornerSource& corner, Vec3 vertex) const {
     const Shape& shape = corner.body == 0 ? common_.a.shape : common_.b.shape;
-    const Box* box = std::get_if<Box>(&shape);
-    const Vec3 local =
-        box ? overlapper::corner(*box, corner.vertex) : std::get<Hull>(shape).data->vertices[corner.vertex];
+    const Vec3 local = overlapper::vertex(shape, corner.vertex);
     const Vec3 origin = common_.origin;
     if (corner.body == 0) {
       const WideLanes exactly = two_sum(Quad{local.x, local.y, local.z}, Quad{-origin.x, -origin.y, -origin.z});

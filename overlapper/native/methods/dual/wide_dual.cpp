@@ -14,7 +14,7 @@ class BodyDuals {
       : owner_(owner), rotation_(wide_rotation(body.orientation)) {
     const WideVector from_body = wide_difference(reference, body.position) + wide(frame.origin);
     origin_ = apply_transposed(rotation_, from_body);
-    if (const Hull* hull = std::get_if<Hull>(&body.shape)) origin_ = origin_ - wide(hull->data->origin);
+    if (const HullData* hull = polytope_of(body.shape)) origin_ = origin_ - wide(hull->origin);
     const Mat3 columns = transposed(frame.axes);
     axis_ = {apply_transposed(rotation_, wide(columns.row0)), apply_transposed(rotation_, wide(columns.row1)),
              apply_transposed(rotation_, wide(columns.row2))};
@@ -30,13 +30,12 @@ class BodyDuals {
     return slack > 2 * reach * norm(along);
   }
 
-  /// The dual of the plane with that normal, of any length, through a point or at a height along the normal.
+  /// The dual of the plane with that normal, of any length, through a point; and of a plane with a normal of any
+  /// length.
   WideDual through(const WideVector& normal, Vec3 point) const {
     return make(normal, dot(normal, wide(point) - origin_));
   }
-  WideDual at(const WideVector& normal, double height) const {
-    return make(normal, DoubleDouble{height} - dot(normal, origin_));
-  }
+  WideDual at(const WidePlane& plane) const { return make(plane.normal, plane.offset - dot(plane.normal, origin_)); }
 
  private:
   WideDual make(const WideVector& normal, DoubleDouble slack) const {
@@ -58,22 +57,16 @@ std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference,
   std::vector<WideDual> duals;
   for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
     const BodyDuals body(bodies[i], i, reference, frame);
-    if (const Hull* hull = std::get_if<Hull>(&bodies[i].shape)) {
-      for (const auto& [a, b, c] : hull->data->triangles) {
+    if (const HullData* hull = polytope_of(bodies[i].shape)) {
+      for (const auto& [a, b, c] : hull->triangles) {
         cancellation_point();
-        const std::vector<Vec3>& corner = hull->data->corners;
+        const std::vector<Vec3>& corner = hull->corners;
         if (body.far(corner[a], corner[b], corner[c], reach)) continue;
         duals.push_back(body.through(wide_normal(corner[a], corner[b], corner[c]), corner[a]));
       }
       continue;
     }
-    if (const HalfSpace* half = std::get_if<HalfSpace>(&bodies[i].shape)) {
-      duals.push_back(body.at(wide(half->given_normal), half->given_offset));
-      continue;
-    }
-    std::vector<Plane> planes;
-    append_planes(bodies[i].shape, planes);
-    for (const Plane& plane : planes) duals.push_back(body.at(wide(plane.normal), plane.offset));
+    for (int f = 0; f < facets(bodies[i].shape); ++f) duals.push_back(body.at(*wide_facet(bodies[i].shape, f)));
   }
   return duals;
 }

@@ -7,10 +7,7 @@
 namespace overlapper {
 
 CloseFrame close_frame(const Placed& first, const Placed& second, Vec3 origin) {
-  const auto own_origin = [](const Placed& body) {
-    const Hull* hull = std::get_if<Hull>(&body.shape);
-    return hull ? hull->data->origin : Vec3{};
-  };
+  const auto own_origin = [](const Placed& body) { return data_origin(body.shape); };
   const WideMatrix a = wide_rotation(first.orientation), b = wide_rotation(second.orientation);
   const WideVector from_second =
       a * wide_difference(origin, -own_origin(first)) + wide_difference(first.position, second.position);

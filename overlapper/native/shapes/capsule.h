@@ -1,0 +1,64 @@
+#pragma once
+
+#include "shapes/choices.h"
+#include "shapes/wide_triangles.h"
+
+namespace overlapper {
+
+struct Hull;
+
+/// Around local z; `length` lies between the centres of the caps.
+struct Capsule : Bounded,
+                 Smooth,
+                 CentredAtOrigin,
+                 WithoutHullData,
+                 NotStretched,
+                 PolytopeCore,
+                 BoundedBySupports<Capsule>,
+                 EnclosedByBounds<Capsule>,
+                 ReachesToCornerOfBounds<Capsule>,
+                 WidePlanesAcrossAxes,
+                 OrderedByFields<Capsule> {
+  static constexpr const char* kName = "Capsule";
+  static constexpr const char* kAbout =
+      R"(All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.
+
+As in pybullet, `length` lies between the centres of the caps; it may be 0.)";
+  static constexpr auto fields() {
+    return std::tuple{Field{"radius", &Capsule::radius, "m"},
+                      Field{"length", &Capsule::length, "m, between the centres of the caps"}};
+  }
+
+  Capsule() = default;
+  Capsule(double r, double l) : radius(r), length(l) {}
+  /// Throws std::invalid_argument with one sentence that names the argument.
+  static Capsule make(double radius, double length);
+
+  Vec3 support(Vec3 d) const { return Vec3{0, 0, tangents::sign(d.z) * length / 2} + radius * unit(d); }
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+
+  double core_radius() const { return radius; }
+  Vec3 core_support(const Pose& pose, Vec3 direction) const {
+    const Vec3 along = pose.rotation * Vec3{0, 0, length / 2};
+    return pose.translation + (dot(along, direction) < 0 ? -along : along);
+  }
+  std::vector<Vec3> core_corners() const;
+  void append_core_surface(const std::vector<char>& kept, CoreSurface& surface) const;
+  std::optional<Revolution> revolution() const { return Revolution{radius, length / 2, true}; }
+
+  double volume() const;
+  double loose_radius() const { return radius + length; }
+  double reach() const { return radius + length / 2; }
+  void append_planes(std::vector<Plane>& planes) const { append_box({radius, radius, radius + length / 2}, planes); }
+
+  WideVector wide_core_support(const WideVector& direction) const;
+  WidePlane wide_ray_exit(const WideVector& origin, const WideVector& direction) const;
+  WidePlane wide_tightest(const WideVector& point, const WideTriangles&) const;
+
+  Hull inscribed(double tolerance) const;
+
+  double radius = 0, length = 0;
+};
+
+}  // namespace overlapper

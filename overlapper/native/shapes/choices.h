@@ -1,0 +1,173 @@
+#pragma once
+
+#include <array>
+#include <compare>
+#include <optional>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "geometry/bounds.h"
+#include "geometry/wide.h"
+#include "shapes/tangents.h"
+
+namespace overlapper {
+
+struct Ellipsoid;
+struct HullData;
+class WideBody;
+
+/// What a shape's core is: its support function says where the least way out of it may lie.
+enum class CoreKind {
+  kPolytope,  ///< a polytope, a segment or a point
+  kRims,      ///< a cylinder
+  kCurved     ///< anything else that is convex
+};
+
+/// A segment about the origin along z, and all points around it: within `radius` of it if the ends are round, else
+/// between planes across its ends.
+struct Revolution {
+  double radius, half_length;
+  bool round_ends;
+};
+
+/// A ridge of a polytope: from vertex `from` to vertex `to`, the facet `left` on the left hand seen from outside.
+struct Edge {
+  int from, to, left, right;
+};
+
+/// The facets and ridges of a core that is a polytope, by the numbers of its corners. No facets lie beside a segment:
+/// -1.
+struct CoreSurface {
+  /// Three corners of a facet; or an axis, 1 for its far side and 0 for the other, and -1 for a facet across that axis.
+  std::vector<std::array<int, 3>> facets;
+  std::vector<Edge> ridges;
+};
+
+/// A number or a vector that defines a shape: an argument of its make(), and an attribute in Python.
+template <class S, class T>
+struct Field {
+  const char* name;
+  T S::* member;
+  const char* about;
+};
+template <class S, class T>
+Field(const char*, T S::*, const char*) -> Field<S, T>;
+
+// ----------------------------------------------------------------------------------------------------------- choices
+// What several shapes are or do alike. A shape inherits what is true of it: nothing is taken for granted of a shape that
+// does not say so. ConvexShape, in convex_shape.h, lists the questions.
+
+struct Bounded {
+  static constexpr bool kBounded = true;
+};
+
+/// It has infinitely many supporting planes along its boundary.
+struct Smooth {
+  static constexpr bool kSmooth = true;
+};
+
+/// Planes bound it, and no two of its own numbers stand for a curve.
+struct Flat {
+  static constexpr bool kSmooth = false;
+};
+
+struct CentredAtOrigin {
+  static Vec3 centroid() { return {}; }
+};
+
+/// No numbers of a hull describe it.
+struct WithoutHullData {
+  static const HullData* polytope() { return nullptr; }
+};
+
+struct NotRevolved {
+  static std::optional<Revolution> revolution() { return std::nullopt; }
+};
+
+struct NotStretched {
+  static const Ellipsoid* stretched() { return nullptr; }
+};
+
+/// Its core is a polytope, along whose support function no point moves but by leaps.
+struct PolytopeCore {
+  static CoreKind core_kind() { return CoreKind::kPolytope; }
+  static Mat3 core_slope(Vec3) { return {{}, {}, {}}; }
+};
+
+/// Its core is the origin.
+struct PointCore : PolytopeCore {
+  static Vec3 core_support(const Pose& pose, Vec3) { return pose.translation; }
+  static WideVector wide_core_support(const WideVector&) { return {}; }
+  static std::vector<Vec3> core_corners() { return {{}}; }
+  static void append_core_surface(const std::vector<char>&, CoreSurface&) {}
+};
+
+/// Its core has no corners that doubles could list.
+struct CurvedCore {
+  static std::vector<Vec3> core_corners() { return {}; }
+  static void append_core_surface(const std::vector<char>&, CoreSurface&) {}
+};
+
+/// It is its own core, grown by nothing.
+template <class S>
+struct OwnCore {
+  static double core_radius() { return 0; }
+  Vec3 core_support(const Pose& pose, Vec3 direction) const {
+    return pose * static_cast<const S&>(*this).support(apply_transposed(pose.rotation, direction));
+  }
+};
+
+/// The box around it is found by six supports.
+template <class S>
+struct BoundedBySupports {
+  Bounds bounds(const Pose& pose) const {
+    const auto reach = [&](int i, double side) {
+      const Vec3 along = apply_transposed(pose.rotation, side * tangents::axis(i));
+      return (pose * static_cast<const S&>(*this).support(along))[i];
+    };
+    return {{reach(0, -1), reach(1, -1), reach(2, -1)}, {reach(0, 1), reach(1, 1), reach(2, 1)}};
+  }
+};
+
+/// No box around it is sooner found than bounds().
+template <class S>
+struct EnclosedByBounds {
+  Bounds enclosing_box(const Pose& pose) const { return static_cast<const S&>(*this).bounds(pose); }
+};
+
+/// It reaches as far as the corner of the box around it.
+template <class S>
+struct ReachesToCornerOfBounds {
+  double bounding_radius() const {
+    const Bounds box = static_cast<const S&>(*this).bounds({});
+    return norm(max(abs(box.lower), abs(box.upper)));
+  }
+};
+
+/// Wider arithmetic begins with its tangent planes across the axes.
+struct WidePlanesAcrossAxes {
+  static void append_wide_planes(const WideBody& body, std::vector<WidePlane>& planes);
+};
+
+inline std::partial_ordering order_of(double a, double b) { return a <=> b; }
+inline std::partial_ordering order_of(Vec3 a, Vec3 b) { return std::tie(a.x, a.y, a.z) <=> std::tie(b.x, b.y, b.z); }
+
+/// Of two, the one whose first field that differs is less comes first.
+template <class S>
+struct OrderedByFields {
+  std::partial_ordering order(const S& other) const {
+    std::partial_ordering found = std::partial_ordering::equivalent;
+    const auto differs = [&](const auto& field) {
+      found = order_of(static_cast<const S&>(*this).*field.member, other.*field.member);
+      return found != 0;
+    };
+    std::apply([&](const auto&... field) { (void)(differs(field) || ...); }, S::fields());
+    return found;
+  }
+};
+
+/// Appends the six planes of a box about the origin.
+void append_box(Vec3 half_extents, std::vector<Plane>& planes);
+
+}  // namespace overlapper

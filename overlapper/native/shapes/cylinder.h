@@ -1,0 +1,56 @@
+#pragma once
+
+#include "shapes/choices.h"
+#include "shapes/wide_triangles.h"
+
+namespace overlapper {
+
+struct Hull;
+
+/// Around local z.
+struct Cylinder : Bounded,
+                  Smooth,
+                  CentredAtOrigin,
+                  WithoutHullData,
+                  NotStretched,
+                  CurvedCore,
+                  OwnCore<Cylinder>,
+                  BoundedBySupports<Cylinder>,
+                  EnclosedByBounds<Cylinder>,
+                  ReachesToCornerOfBounds<Cylinder>,
+                  WidePlanesAcrossAxes,
+                  OrderedByFields<Cylinder> {
+  static constexpr const char* kName = "Cylinder";
+  static constexpr const char* kAbout = "A cylinder of `radius` (m) and `length` (m) along local z, about the origin.";
+  static constexpr auto fields() {
+    return std::tuple{Field{"radius", &Cylinder::radius, "m"}, Field{"length", &Cylinder::length, "m"}};
+  }
+
+  Cylinder() = default;
+  Cylinder(double r, double l) : radius(r), length(l) {}
+  /// Throws std::invalid_argument with one sentence that names the argument.
+  static Cylinder make(double radius, double length);
+
+  Vec3 support(Vec3 direction) const;
+  Plane ray_exit(Vec3 origin, Vec3 direction) const;
+  Plane tightest(Vec3 point) const;
+
+  CoreKind core_kind() const { return CoreKind::kRims; }
+  Mat3 core_slope(Vec3 direction) const { return tangents::slope_of_circle(radius, direction); }
+  std::optional<Revolution> revolution() const { return Revolution{radius, length / 2, false}; }
+
+  double volume() const;
+  double loose_radius() const { return radius + length; }
+  double reach() const { return radius + length / 2; }
+  void append_planes(std::vector<Plane>& planes) const { append_box({radius, radius, length / 2}, planes); }
+
+  WideVector wide_core_support(const WideVector& direction) const;
+  WidePlane wide_ray_exit(const WideVector& origin, const WideVector& direction) const;
+  WidePlane wide_tightest(const WideVector& point, const WideTriangles&) const;
+
+  Hull inscribed(double tolerance) const;
+
+  double radius = 0, length = 0;
+};
+
+}  // namespace overlapper
