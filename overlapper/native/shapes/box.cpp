@@ -32,8 +32,20 @@ constexpr std::array<Edge, 12> box_edges() {
 }
 constexpr std::array<Edge, 12> kBoxEdges = box_edges();
 
-/// One coordinate of a box's corners and normals, from that row of its rotation. Both go by the numbers of corner() and
-/// side(), and have the bits that placing each alone would give it.
+/// The corners around the sides of a box, by their numbers.
+constexpr std::array<std::array<int, 4>, 6> box_rings() {
+  std::array<std::array<int, 4>, 6> rings{};
+  for (int k = 0; k < 3; ++k) {
+    const int i = 1 << (k + 1) % 3, j = 1 << (k + 2) % 3, up = 1 << k;
+    rings[2 * k] = {0, j, i | j, i};
+    rings[2 * k + 1] = {up, up | i, up | i | j, up | j};
+  }
+  return rings;
+}
+constexpr auto kBoxRings = box_rings();
+
+/// One coordinate of a box's corners and normals, from that row of its rotation. Both go by their numbers, and have the
+/// bits that placing each alone would give it.
 void place_box_coordinate(Vec3 row, Vec3 half, double origin, double* corners, double* normals) {
   constexpr TwoLanes sign{-1, 1};
   const TwoLanes x = sign * (row.x * half.x);
@@ -61,8 +73,8 @@ void place_box(Solid& solid, Vec3 half, const Pose& pose) {
 }
 
 void set_box(Solid& solid, const Box& box) {
-  for (int i = 0; i < 8; ++i) solid.set_vertex(i, corner(box, i));
-  for (int f = 0; f < 6; ++f) solid.set_plane(f, side(box, f).normal, side(box, f).offset);
+  for (int i = 0; i < 8; ++i) solid.set_vertex(i, box.vertex(i));
+  for (int f = 0; f < 6; ++f) solid.set_plane(f, box.facet(f).normal, box.facet(f).offset);
 }
 
 /// In the order in which hulls of cubes have long been made.
@@ -99,6 +111,8 @@ Plane Box::tightest(Vec3 point) const {
 }
 
 std::span<const Edge> Box::edges() const { return kBoxEdges; }
+
+std::span<const int> Box::ring(int f) const { return kBoxRings[f]; }
 
 void Box::place(Solid& solid, const Pose* pose, double beyond) const {
   solid.resize(8, 6, beyond);

@@ -48,16 +48,24 @@ struct Box : Bounded,
 
   /// Corners and sides by number: bit k of a corner's says on which side of axis k it is, and so does the last bit of a
   /// side's, 2 k or 2 k + 1.
+  int vertex_count() const { return 8; }
   int facet_count() const { return 6; }
   Vec3 vertex(int i) const {
     const Vec3 h = half_extents;
     return {i & 1 ? h.x : -h.x, i & 2 ? h.y : -h.y, i & 4 ? h.z : -h.z};
   }
+  Plane facet(int f) const {
+    const double sign = f & 1 ? 1 : -1;
+    const int k = f / 2;
+    return {{k == 0 ? sign : 0, k == 1 ? sign : 0, k == 2 ? sign : 0}, half_extents[k]};
+  }
+  std::span<const int> ring(int f) const;
   std::span<const Edge> edges() const;
   bool edges_known() const { return true; }
   std::optional<WidePlane> wide_facet(int f) const {
     return WidePlane{wide((f & 1 ? 1.0 : -1.0) * tangents::axis(f / 2)), {half_extents[f / 2]}};
   }
+  std::optional<WidePlane> unit_facet(int f) const { return WidePlane{wide(facet(f).normal), {facet(f).offset}}; }
   bool has_graph() const { return true; }
   void place(Solid& solid, const Pose* pose, double beyond) const;
   void give(Mesh& mesh) const;
@@ -71,13 +79,5 @@ struct Box : Bounded,
 
   Vec3 half_extents;
 };
-
-/// By the number that Box::facet_count() explains.
-inline Plane side(const Box& box, int f) {
-  const double sign = f & 1 ? 1 : -1;
-  const int k = f / 2;
-  return {{k == 0 ? sign : 0, k == 1 ? sign : 0, k == 2 ? sign : 0}, box.half_extents[k]};
-}
-inline Vec3 corner(const Box& box, int i) { return box.vertex(i); }
 
 }  // namespace overlapper

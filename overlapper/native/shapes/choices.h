@@ -55,8 +55,8 @@ template <class S, class T>
 Field(const char*, T S::*, const char*) -> Field<S, T>;
 
 // ----------------------------------------------------------------------------------------------------------- choices
-// What several shapes are or do alike. A shape inherits what is true of it: nothing is taken for granted of a shape that
-// does not say so. ConvexShape, in convex_shape.h, lists the questions.
+// What several shapes are or do alike. A shape inherits what is true of it: nothing is taken for granted of a shape
+// that does not say so. ConvexShape, in convex_shape.h, lists the questions.
 
 struct Bounded {
   static constexpr bool kBounded = true;

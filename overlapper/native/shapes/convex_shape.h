@@ -38,9 +38,9 @@ concept Measurable = requires(const S& s, const Pose& pose, std::vector<Plane>& 
   { s.centroid() } -> std::same_as<Vec3>;  // unless bounded, the point of its border that is nearest to the origin
   // How far it reaches; unless bounded, how far its plane is.
   { s.bounding_radius() } -> std::same_as<double>;
-  { s.loose_radius() } -> std::same_as<double>;  // no less than bounding_radius(), sooner
-  { s.reach() } -> std::same_as<double>;         // how far it reaches at most, as a sum of its numbers
-  { s.bounds(pose) } -> std::same_as<Bounds>;    // the box around it; infinite where it is
+  { s.loose_radius() } -> std::same_as<double>;       // no less than bounding_radius(), sooner
+  { s.reach() } -> std::same_as<double>;              // how far it reaches at most, as a sum of its numbers
+  { s.bounds(pose) } -> std::same_as<Bounds>;         // the box around it; infinite where it is
   { s.enclosing_box(pose) } -> std::same_as<Bounds>;  // the same but for rounding, the sooner the better
   // All facet planes of a polytope; of a smooth shape a few of its tangent planes that already bound it.
   { s.append_planes(planes) };
@@ -48,15 +48,15 @@ concept Measurable = requires(const S& s, const Pose& pose, std::vector<Plane>& 
 
 /// What depths and distances ask: a shape is its core grown by a radius.
 template <class S>
-concept Cored = requires(const S& s, const Pose& pose, Vec3 direction, const std::vector<char>& kept,
-                         CoreSurface& surface) {
-  { s.core_kind() } -> std::same_as<CoreKind>;
-  { s.core_radius() } -> std::same_as<double>;
-  { s.core_support(pose, direction) } -> std::same_as<Vec3>;  // in the world
-  { s.core_slope(direction) } -> std::same_as<Mat3>;          // the derivative of the core's support by the direction
-  { s.core_corners() } -> std::same_as<std::vector<Vec3>>;    // none unless the core is a polytope
-  { s.append_core_surface(kept, surface) };  // the facets and ridges of it with a corner that is kept
-};
+concept Cored =
+    requires(const S& s, const Pose& pose, Vec3 direction, const std::vector<char>& kept, CoreSurface& surface) {
+      { s.core_kind() } -> std::same_as<CoreKind>;
+      { s.core_radius() } -> std::same_as<double>;
+      { s.core_support(pose, direction) } -> std::same_as<Vec3>;  // in the world
+      { s.core_slope(direction) } -> std::same_as<Mat3>;        // the derivative of the core's support by the direction
+      { s.core_corners() } -> std::same_as<std::vector<Vec3>>;  // none unless the core is a polytope
+      { s.append_core_surface(kept, surface) };  // the facets and ridges of it with a corner that is kept
+    };
 
 /// How double-double arithmetic sees it, in its own coordinates. `triangles` are those of polytope(), made ready.
 template <class S>
@@ -86,14 +86,19 @@ concept SmoothShape = S::kSmooth && requires(const S& s, const WideVector& v) {
 /// A polytope or a half-space: vertices and facets by number.
 template <class S>
 concept FlatShape = !S::kSmooth && requires(const S& s, int number, Solid& solid, const Pose* pose, Mesh& mesh) {
+  { s.vertex_count() } -> std::same_as<int>;
   { s.facet_count() } -> std::same_as<int>;
   { s.vertex(number) } -> std::same_as<Vec3>;
+  { s.facet(number) } -> std::same_as<Plane>;
+  { s.ring(number) } -> std::same_as<std::span<const int>>;  // the vertices around a facet, seen from outside
   { s.edges() } -> std::same_as<std::span<const Edge>>;
-  { s.edges_known() } -> std::same_as<bool>;      // false where rounding has left a ridge without its other side
-  { s.wide_facet(number) } -> std::same_as<std::optional<WidePlane>>;  // its normal of any length; nothing if merged
-  { s.has_graph() } -> std::same_as<bool>;        // true if it has a Mesh
-  { s.place(solid, pose, 0.0) };                  // writes its columns, in the coordinates of the pose
-  { s.give(mesh) };                               // only if it has a graph
+  { s.edges_known() } -> std::same_as<bool>;  // false where rounding has left a ridge without its other side
+  // A facet by exact numbers, its normal of any length, and of length 1; nothing where rounding has merged several.
+  { s.wide_facet(number) } -> std::same_as<std::optional<WidePlane>>;
+  { s.unit_facet(number) } -> std::same_as<std::optional<WidePlane>>;
+  { s.has_graph() } -> std::same_as<bool>;  // true if it has a Mesh
+  { s.place(solid, pose, 0.0) };            // writes its columns, in the coordinates of the pose
+  { s.give(mesh) };                         // only if it has a graph
 };
 
 /// Everything that is asked of a kind of shape. One that lacks an answer cannot be an alternative of Shape.

@@ -55,8 +55,7 @@ WidePlane Cylinder::wide_ray_exit(const WideVector& origin, const WideVector& d)
 }
 
 WidePlane Cylinder::wide_tightest(const WideVector& p, const WideTriangles&) const {
-  const DoubleDouble past_cap = abs(p.z) - DoubleDouble{length / 2},
-                     past_side = norm(across(p)) - DoubleDouble{radius};
+  const DoubleDouble past_cap = abs(p.z) - DoubleDouble{length / 2}, past_side = norm(across(p)) - DoubleDouble{radius};
   if (!(past_cap < past_side)) return {DoubleDouble{sign(p.z)} * wide_axis(2), {length / 2}};
   return tangent(across(p), {}, radius, wide_axis(0));
 }

@@ -51,6 +51,13 @@ void HalfSpace::place(Solid& solid, const Pose* pose, double beyond) const {
   solid.edges = {};
 }
 
+std::optional<WidePlane> HalfSpace::unit_facet(int) const {
+  const DoubleDouble length = norm(wide(given_normal));
+  const bool as_given = norm2(plane.normal - given_normal) == 0;
+  // A normal of nearly unit length stands for its direction, and the offset counts along that direction.
+  return WidePlane{unit(wide(given_normal)), DoubleDouble{as_given ? plane.offset : given_offset} / length};
+}
+
 WidePlane HalfSpace::wide_tightest(const WideVector&, const WideTriangles&) const {
   const WideVector given = wide(given_normal);
   return {unit(given), DoubleDouble{given_offset} / norm(given)};

@@ -48,11 +48,15 @@ struct HalfSpace : Flat, WithoutHullData, NotRevolved, NotStretched, PolytopeCor
   Bounds enclosing_box(const Pose& pose) const { return bounds(pose); }
   void append_planes(std::vector<Plane>& planes) const { planes.push_back(plane); }
 
+  int vertex_count() const { return 0; }
   int facet_count() const { return 1; }
-  Vec3 vertex(int) const { return {}; }  // there are none
+  Vec3 vertex(int) const { return {}; }
+  Plane facet(int) const { return plane; }
+  std::span<const int> ring(int) const { return {}; }
   std::span<const Edge> edges() const { return {}; }
   bool edges_known() const { return true; }
   std::optional<WidePlane> wide_facet(int) const { return WidePlane{wide(given_normal), {given_offset}}; }
+  std::optional<WidePlane> unit_facet(int) const;
   bool has_graph() const { return false; }
   void place(Solid& solid, const Pose* pose, double beyond) const;
   void give(Mesh&) const {}

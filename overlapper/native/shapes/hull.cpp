@@ -55,6 +55,13 @@ std::optional<WidePlane> Hull::wide_facet(int f) const {
   return WidePlane{normal, dot(normal, wide(data->corners[i]))};
 }
 
+std::optional<WidePlane> Hull::unit_facet(int f) const {
+  const auto& [i, j, k] = data->facet_corners[f];
+  if (i < 0) return std::nullopt;
+  const WideVector normal = unit(wide_normal(data->corners[i], data->corners[j], data->corners[k]));
+  return WidePlane{normal, dot(normal, wide(data->corners[i]))};
+}
+
 void Hull::place(Solid& solid, const Pose* pose, double beyond) const {
   solid.resize(static_cast<int>(data->vertices.size()), facet_count(), beyond);
   for (int i = 0; i < solid.vertices; ++i) solid.set_vertex(i, pose ? *pose * data->vertices[i] : data->vertices[i]);

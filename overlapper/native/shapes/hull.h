@@ -47,11 +47,15 @@ ValueError for fewer than four points, for points that are not finite and for po
   }
   std::partial_ordering order(const Hull& other) const { return order_of(*data, *other.data); }
 
+  int vertex_count() const { return static_cast<int>(data->vertices.size()); }
   int facet_count() const { return static_cast<int>(data->planes.size()); }
   Vec3 vertex(int i) const { return data->vertices[i]; }
+  Plane facet(int f) const { return data->planes[f]; }
+  std::span<const int> ring(int f) const { return data->facet(f); }
   std::span<const Edge> edges() const { return data->edges; }
   bool edges_known() const { return !data->edges.empty(); }
   std::optional<WidePlane> wide_facet(int f) const;
+  std::optional<WidePlane> unit_facet(int f) const;
   bool has_graph() const { return data->graph != nullptr; }
   void place(Solid& solid, const Pose* pose, double beyond) const;
   void give(Mesh& mesh) const;

@@ -39,8 +39,8 @@ no certificate, and neither does it with an ellipsoid that it overlaps.)";
     core.append_core_surface(kept, surface);
   }
 
-  double volume() const;    ///< m³, by Steiner's formula
-  Vec3 centroid() const;    ///< about the core's origin
+  double volume() const;  ///< m³, by Steiner's formula
+  Vec3 centroid() const;  ///< about the core's origin
   double loose_radius() const { return core.bounding_radius() + radius; }
   double reach() const { return core.bounding_radius() + radius; }
   void append_planes(std::vector<Plane>& planes) const;

@@ -115,16 +115,22 @@ inline double radius(const Shape& shape) {
 inline int facets(const Shape& shape) {
   return ask_flat(shape, [](const auto& s) { return s.facet_count(); });
 }
-/// Of a box, by the numbers of corner() and side(), or of a hull; none of others.
+/// The ridges of a box or a hull; none of others.
 inline std::span<const Edge> edges(const Shape& shape) {
   return ask_flat(shape, [](const auto& s) { return s.edges(); });
+}
+inline Plane facet(const Shape& shape, int number) {
+  return ask_flat(shape, [&](const auto& s) { return s.facet(number); });
 }
 inline Vec3 vertex(const Shape& shape, int number) {
   return ask_flat(shape, [&](const auto& s) { return s.vertex(number); });
 }
-/// A facet's plane, its normal of any length; nothing where rounding has merged several.
+/// A facet by exact numbers, its normal of any length, and of length 1. Nothing where rounding has merged several.
 inline std::optional<WidePlane> wide_facet(const Shape& shape, int number) {
   return ask_flat(shape, [&](const auto& s) { return s.wide_facet(number); });
+}
+inline std::optional<WidePlane> unit_facet(const Shape& shape, int number) {
+  return ask_flat(shape, [&](const auto& s) { return s.unit_facet(number); });
 }
 /// True if the shape has a Mesh: a box, or a hull that can be climbed.
 inline bool has_graph(const Shape& shape) {
@@ -134,6 +140,11 @@ inline bool has_graph(const Shape& shape) {
 /// The hull of points of a bounded shape that lacks no more than that fraction of its volume. Throws
 /// std::invalid_argument for shapes that method "paper" does not take.
 Hull inscribed(const Shape& shape, double tolerance);
+
+/// How far a shape reaches from its own origin at most; of a half-space, how far its plane is.
+inline double reach(const Shape& shape) {
+  return ask(shape, [](const auto& s) { return s.reach(); });
+}
 
 /// m: by how much planes of facets that are not quite flat miss their corners.
 double flatness(const Shape& shape);

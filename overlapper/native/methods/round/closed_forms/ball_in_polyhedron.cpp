@@ -12,20 +12,23 @@ namespace {
 class OwnPolyhedron {
  public:
   explicit OwnPolyhedron(const Shape& shape) {
-    if (const Box* box = std::get_if<Box>(&shape)) {
-      for (int i = 0; i < 8; ++i) corners_[i] = corner(*box, i);
-      for (int f = 0; f < 6; ++f) planes_[f] = side(*box, f);
-      polyhedron_ = {corners_, planes_, edges(shape), 6};
-    } else if (const Hull* hull = std::get_if<Hull>(&shape)) {
-      polyhedron_ = {hull->data->vertices, hull->data->planes, edges(shape), hull->data->planes.size()};
+    if (edges(shape).empty()) return;
+    if (const HullData* hull = polytope_of(shape)) {
+      polyhedron_ = {hull->vertices, hull->planes, edges(shape), hull->planes.size()};
+      return;
     }
+    ask_flat(shape, [&](const auto& s) {
+      for (int i = 0; i < s.vertex_count(); ++i) corners_.push_back(s.vertex(i));
+      for (int f = 0; f < s.facet_count(); ++f) planes_.push_back(s.facet(f));
+    });
+    polyhedron_ = {corners_, planes_, edges(shape), planes_.size()};
   }
   /// Without edges if there is none.
   const quadric::Polyhedron& operator*() const { return polyhedron_; }
 
  private:
-  std::array<Vec3, 8> corners_;
-  std::array<Plane, 6> planes_;
+  std::vector<Vec3> corners_;
+  std::vector<Plane> planes_;
   quadric::Polyhedron polyhedron_;
 };
 
@@ -47,7 +50,7 @@ MeasuresAndInertia measures_of(const quadric::BallPart& part, const Moments& mom
 /// What a ball about that point, in the polyhedron's own coordinates, shares with it in a shallow contact.
 std::optional<quadric::ShallowPart> shallow_part(const OwnPolyhedron& polyhedron, const Placed& other,
                                                  const WideVector& centre, double radius) {
-  const auto plane = [&](int f) { return own_plane(other.shape, f); };
+  const auto plane = [&](int f) { return unit_facet(other.shape, f); };
   auto part = quadric::measure_shallow_ball(*polyhedron, plane, centre, radius);
   if (part && !(part->volume > 0)) part.reset();
   return part;

@@ -91,7 +91,7 @@ std::optional<MeasuresAndInertia> cut_by_one_plane(const RoundPair& pair) {
   if (!found) return std::nullopt;
   const Vec3 normal = found->plane->normal;
   const Placed& flat = pair.flat_body();
-  if (const auto plane = own_plane(flat.shape, static_cast<int>(found->plane - pair.planes.data())))
+  if (const auto plane = unit_facet(flat.shape, static_cast<int>(found->plane - pair.planes.data())))
     return measure_below(pair, cut_of(body, seen_from(flat, body), *plane), normal, found->layers * pair.rounding);
   const WideAxis at{wide(body.centre), wide(body.axis)};
   const PlaneCut cut = cut_of(body, at, {wide(normal), {found->plane->offset}});

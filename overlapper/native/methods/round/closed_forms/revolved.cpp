@@ -5,16 +5,10 @@
 namespace overlapper::closed_forms {
 
 std::optional<Revolved> revolved(const Placed& body) {
+  const std::optional<Revolution> own = revolution(body.shape);
+  if (!own) return std::nullopt;
   const Vec3 axis = body.pose.rotation * Vec3{0, 0, 1};
-  if (const Sphere* s = std::get_if<Sphere>(&body.shape))
-    return Revolved{body.pose.translation, axis, s->radius, 0, true, &body};
-  if (const Ellipsoid* e = std::get_if<Ellipsoid>(&body.shape); e && e->ball())
-    return Revolved{body.pose.translation, axis, e->half_axes.x, 0, true, &body};
-  if (const Capsule* c = std::get_if<Capsule>(&body.shape))
-    return Revolved{body.pose.translation, axis, c->radius, c->length / 2, true, &body};
-  if (const Cylinder* c = std::get_if<Cylinder>(&body.shape))
-    return Revolved{body.pose.translation, axis, c->radius, c->length / 2, false, &body};
-  return std::nullopt;
+  return Revolved{body.pose.translation, axis, own->radius, own->half_length, own->round_ends, &body};
 }
 
 double reach_of_cap(double r, Vec3 normal, double offset, Vec3 direction, double rounding) {
@@ -22,25 +16,6 @@ double reach_of_cap(double r, Vec3 normal, double offset, Vec3 direction, double
   if (r * along <= t) return r + rounding;
   const double disc = std::sqrt(std::max(0.0, (r - t) * (r + t)));
   return t * along + disc * norm(direction - along * normal) + 2 * rounding;
-}
-
-std::optional<WidePlane> own_plane(const Shape& shape, int f) {
-  if (const HalfSpace* half = std::get_if<HalfSpace>(&shape)) {
-    const DoubleDouble length = norm(wide(half->given_normal));
-    const bool as_given = norm2(half->plane.normal - half->given_normal) == 0;
-    // A normal of nearly unit length stands for its direction, and the offset counts along that direction.
-    return WidePlane{unit(wide(half->given_normal)),
-                     DoubleDouble{as_given ? half->plane.offset : half->given_offset} / length};
-  }
-  if (const Box* box = std::get_if<Box>(&shape)) {
-    const Plane plane = side(*box, f);
-    return WidePlane{wide(plane.normal), {plane.offset}};
-  }
-  const HullData& hull = *std::get<Hull>(shape).data;
-  const auto [a, b, c] = hull.facet_corners[f];
-  if (a < 0) return std::nullopt;
-  const WideVector normal = unit(wide_normal(hull.corners[a], hull.corners[b], hull.corners[c]));
-  return WidePlane{normal, dot(normal, wide(hull.corners[a]))};
 }
 
 namespace {

@@ -30,9 +30,6 @@ std::optional<Revolved> revolved(const Placed& body);
 /// may be off by `rounding`, the answer is no less than that maximum. `offset` is between -r and r.
 double reach_of_cap(double r, Vec3 normal, double offset, Vec3 direction, double rounding);
 
-/// A plane of a half-space, a box or a hull, in coordinates of its own. Nothing if corners of a hull's facet miss it.
-std::optional<WidePlane> own_plane(const Shape& shape, int f);
-
 /// The direction of a body's z axis in the world.
 WideVector axis_of(const Placed& body);
 

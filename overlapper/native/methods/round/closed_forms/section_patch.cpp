@@ -60,12 +60,13 @@ void add_end(double r, double sine, double cosine, double t, double height, doub
 }  // namespace
 
 std::optional<Patch> section_patch(const Placed& a, const Placed& b, Vec3 centroid, Vec3 area) {
-  const bool first = std::holds_alternative<HalfSpace>(b.shape);
+  const bool first = !bounded(b.shape);
   const Placed &placed = first ? a : b, &other = first ? b : a;
   const std::optional<Revolved> body = revolved(placed);
-  if (!body || !std::holds_alternative<HalfSpace>(other.shape)) return std::nullopt;
-  const Vec3 normal = (other.pose * std::get<HalfSpace>(other.shape).plane).normal;
-  const PlaneCut cut = cut_of(*body, seen_from(other, *body), *own_plane(other.shape, 0));
+  const Plane* plane = only_plane(other.shape);
+  if (!body || !plane) return std::nullopt;
+  const Vec3 normal = (other.pose * *plane).normal;
+  const PlaneCut cut = cut_of(*body, seen_from(other, *body), *unit_facet(other.shape, 0));
   const bool ball = body->ball();
   const double r = body->radius, h = body->half_length, sine = cut.sine, cosine = cut.cosine;
   const auto [axis, sideways] = SymmetryFrame(*body, normal);

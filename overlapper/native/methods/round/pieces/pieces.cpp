@@ -20,21 +20,6 @@ constexpr size_t kMostOfTriangles = slicing::kMostLines / 2;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// How far a shape reaches from its own origin; of a half-space, how far its plane is.
-double reach(const Shape& shape) {
-  struct Visitor {
-    double operator()(const Sphere& s) const { return s.radius; }
-    double operator()(const Box& b) const { return norm(b.half_extents); }
-    double operator()(const Capsule& c) const { return c.radius + c.length / 2; }
-    double operator()(const Cylinder& c) const { return c.radius + c.length / 2; }
-    double operator()(const Hull& h) const { return h.data->radius; }
-    double operator()(const HalfSpace& h) const { return std::abs(h.plane.offset); }
-    double operator()(const RoundedHull& h) const { return h.core.data->radius + h.radius; }
-    double operator()(const Ellipsoid& e) const { return max_component(e.half_axes); }
-  };
-  return std::visit(Visitor{}, shape);
-}
-
 /// A body in double-double, and the cutter of it.
 class Cutter {
  public:
@@ -52,63 +37,50 @@ class Cutter {
     margin_ = 1e-12 * (norm(body.pose.translation) + norm(other.pose.translation) + reach(body.shape));
   }
 
-  void operator()(const Sphere& s) {
+  /// Of a shape that Traits::other does not tell of.
+  void cut(const Shape& shape) {
+    const HullData* hull = polytope_of(shape);
+    if (smooth(shape) && hull) rounded_hull(*hull, core_radius(shape));
+    else if (hull) polytope(*hull);
+    else if (!smooth(shape)) facet_walls(shape);
+    else if (stretched(shape)) whole_ball(1);
+    else revolved(*revolution(shape));
+  }
+
+ private:
+  void whole_ball(double radius) {
     begin();
-    ball({}, s.radius);
+    ball({}, radius);
     end();
   }
 
-  void operator()(const Ellipsoid& e) {
+  void facet_walls(const Shape& shape) {
     begin();
-    ball({}, e.ball() ? e.half_axes.x : 1);
-    end();
-  }
-
-  void operator()(const Box& box) {
-    begin();
-    for (int f = 0; f < 6; ++f) {
-      const Plane plane = side(box, f);
-      wall(wide(plane.normal), {plane.offset}, owner_);
+    for (int f = 0; f < overlapper::facets(shape); ++f) {
+      const auto [normal, offset] = *unit_facet(shape, f);
+      wall(normal, offset, owner_);
     }
     end();
   }
 
-  void operator()(const HalfSpace& half) {
+  void revolved(const Revolution& r) {
+    const double half = r.half_length;
+    if (half == 0) return whole_ball(r.radius);
     begin();
-    const DoubleDouble length = norm(wide(half.given_normal));
-    const bool as_given = norm2(half.plane.normal - half.given_normal) == 0;
-    const WideVector normal = unit(wide(half.given_normal));
-    // A normal that is unit but for its last bits stands for its direction, and the offset is along that.
-    wall(normal, DoubleDouble{as_given ? half.plane.offset : half.given_offset} / length, owner_);
+    cylinder({}, {{}, {}, {1}}, r.radius, half);
+    for (const double sign : {-1.0, 1.0})
+      wall({{}, {}, {sign}}, {half}, r.round_ends ? slicing::kCut : owner_);
     end();
-  }
-
-  void operator()(const Cylinder& c) {
-    begin();
-    cylinder({}, {{}, {}, {1}}, c.radius, c.length / 2);
-    for (const double sign : {-1.0, 1.0}) wall({{}, {}, {sign}}, {c.length / 2}, owner_);
-    end();
-  }
-
-  void operator()(const Capsule& c) {
-    const double half = c.length / 2;
-    if (half > 0) {
-      begin();
-      cylinder({}, {{}, {}, {1}}, c.radius, half);
-      for (const double sign : {-1.0, 1.0}) wall({{}, {}, {sign}}, {half}, slicing::kCut);
-      end();
-    }
+    if (!r.round_ends) return;
     for (const double sign : {-1.0, 1.0}) {
       begin();
-      ball({{}, {}, {sign * half}}, c.radius);
-      if (half > 0) wall({{}, {}, {-sign}}, {-half}, slicing::kCut);
+      ball({{}, {}, {sign * half}}, r.radius);
+      wall({{}, {}, {-sign}}, {-half}, slicing::kCut);
       end();
-      if (half == 0) break;
     }
   }
 
-  void operator()(const Hull& hull) {
-    const HullData& data = *hull.data;
+  void polytope(const HullData& data) {
     const double flatness = unexact(data);
     begin();
     if (flatness == 0 || !triangle_walls(data)) {
@@ -118,32 +90,30 @@ class Cutter {
     end();
   }
 
-  void operator()(const RoundedHull& hull) {
-    const HullData& core = *hull.core.data;
+  void rounded_hull(const HullData& core, double radius) {
     result_.flatness = std::max(result_.flatness, unexact(core));
     begin();
     for (int f = 0; f < facets(core); ++f) facet_wall(core, f, 0, slicing::kCut);
     end();
-    const Bounds near = local_bounds(hull.radius);
+    const Bounds near = local_bounds(radius);
     for (int f = 0; f < facets(core); ++f)
-      if (meets(near, core.vertices, core.facet(f))) prism(core, f, hull.radius);
+      if (meets(near, core.vertices, core.facet(f))) prism(core, f, radius);
     std::vector<std::pair<int, int>> beside;
     for (const Edge& edge : core.edges) {
       cancellation_point();
       const std::array<int, 2> ends{edge.from, edge.to};
       if (!meets(near, core.vertices, ends)) continue;
-      edge_wedge(core, edge, hull.radius);
+      edge_wedge(core, edge, radius);
       for (const int i : {0, 1})
         if (meets(near, core.vertices, std::span(ends).subspan(i, 1))) beside.push_back({ends[i], ends[1 - i]});
     }
     std::ranges::sort(beside);
     for (size_t i = 0, end; i < beside.size(); i = end) {
       for (end = i + 1; end < beside.size() && beside[end].first == beside[i].first;) ++end;
-      vertex_wedge(core, std::span(beside).subspan(i, end - i), hull.radius);
+      vertex_wedge(core, std::span(beside).subspan(i, end - i), radius);
     }
   }
 
- private:
   /// In the body's own coordinates, what encloses the common set, and so much more.
   Bounds local_bounds(double more) const {
     if (!common_) return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
@@ -359,10 +329,8 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
     if (const HullData* hull = polytope_of(body->shape)) {
       const double more = core_radius(body->shape) + hull->flatness;
       for (const Plane& plane : hull->planes) add(plane, more);
-    } else if (const Box* box = std::get_if<Box>(&body->shape)) {
-      for (int f = 0; f < 6; ++f) add(side(*box, f), 0);
-    } else if (const HalfSpace* half = std::get_if<HalfSpace>(&body->shape)) {
-      add(half->plane, 0);
+    } else {
+      for (int f = 0; f < overlapper::facets(body->shape); ++f) add(facet(body->shape, f), 0);
     }
   }
   std::ranges::sort(planes, {}, &EnclosingPolytope::Face::slack);
@@ -377,7 +345,7 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
 void cut(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
          const WideVector& inside, Pieces& result) {
   Cutter cutter(body, other, common, owner, reference, inside, result);
-  std::visit([&](const auto& shape) { cutter(shape); }, body.shape);
+  cutter.cut(body.shape);
 }
 
 bool grow(Pieces& pieces, double outwards) {

@@ -8,36 +8,20 @@ namespace {
 
 constexpr int kNone = -1;
 
-/// The corners around the sides of a box, by the numbers of corner() and side().
-constexpr std::array<std::array<int, 4>, 6> box_rings() {
-  std::array<std::array<int, 4>, 6> rings{};
-  for (int k = 0; k < 3; ++k) {
-    const int i = 1 << (k + 1) % 3, j = 1 << (k + 2) % 3, up = 1 << k;
-    rings[2 * k] = {0, j, i | j, i};
-    rings[2 * k + 1] = {up, up | i, up | i | j, up | j};
-  }
-  return rings;
-}
-constexpr auto kBoxRings = box_rings();
-
 }  // namespace
 
 bool Rings::become(const Shape& shape, const Pose& pose) {
   clear();
-  if (const Box* box = std::get_if<Box>(&shape)) {
-    for (int i = 0; i < 8; ++i) corners_.push_back(pose * corner(*box, i));
-    for (int f = 0; f < 6; ++f) {
-      planes_.push_back(pose * side(*box, f));
-      ring_.insert(ring_.end(), kBoxRings[f].begin(), kBoxRings[f].end());
+  if (edges(shape).empty()) return false;
+  ask_flat(shape, [&](const auto& s) {
+    for (int i = 0; i < s.vertex_count(); ++i) corners_.push_back(pose * s.vertex(i));
+    for (int f = 0; f < s.facet_count(); ++f) {
+      planes_.push_back(pose * s.facet(f));
+      const auto around = s.ring(f);
+      ring_.insert(ring_.end(), around.begin(), around.end());
       start_.push_back(static_cast<int>(ring_.size()));
     }
-    return true;
-  }
-  const Hull* hull = std::get_if<Hull>(&shape);
-  if (!hull || hull->data->edges.empty()) return false;
-  for (const Vec3 v : hull->data->vertices) corners_.push_back(pose * v);
-  for (const Plane& plane : hull->data->planes) planes_.push_back(pose * plane);
-  ring_ = hull->data->ring, start_ = hull->data->ring_start;
+  });
   return true;
 }
 
