@@ -13,6 +13,8 @@ class Sphere:
 
     def __init__(self, radius: float) -> None: ...
 
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
+
     @property
     def radius(self) -> float:
         """m"""
@@ -39,12 +41,12 @@ class Sphere:
 
     def __deepcopy__(self, memo: object) -> object: ...
 
-    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
-
 class Box:
     """A box about the origin with half extents (m) along x, y, z."""
 
     def __init__(self, half_extents: numpy.typing.ArrayLike) -> None: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
 
     @property
     def half_extents(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
@@ -72,47 +74,6 @@ class Box:
 
     def __deepcopy__(self, memo: object) -> object: ...
 
-    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
-
-class Ellipsoid:
-    """
-    An ellipsoid about the origin with half axes (m) along x, y, z.
-
-    All points with (x / a)² + (y / b)² + (z / c)² <= 1. With equal half axes it answers as the sphere does. With a box, a
-    hull or a half-space, it is measured as a ball is, of which it is the image; with other round bodies, between polytopes,
-    as closely as `tolerance` asks.
-    """
-
-    def __init__(self, half_axes: numpy.typing.ArrayLike) -> None: ...
-
-    @property
-    def half_axes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(3,) m"""
-
-    @property
-    def volume(self) -> float:
-        """Volume in m³; infinite for a half-space."""
-
-    @property
-    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """
-        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
-        """
-
-    @property
-    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
-        """
-        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
-        """
-
-    def __repr__(self) -> str: ...
-
-    def __copy__(self) -> object: ...
-
-    def __deepcopy__(self, memo: object) -> object: ...
-
-    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
-
 class Capsule:
     """
     All points within `radius` (m) of a segment of `length` (m) along local z, about the origin.
@@ -121,6 +82,8 @@ class Capsule:
     """
 
     def __init__(self, radius: float, length: float) -> None: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
 
     @property
     def radius(self) -> float:
@@ -152,14 +115,14 @@ class Capsule:
 
     def __deepcopy__(self, memo: object) -> object: ...
 
-    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
-
 class Cylinder:
     """
     A cylinder of `radius` (m) and `length` (m) along local z, about the origin.
     """
 
     def __init__(self, radius: float, length: float) -> None: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
 
     @property
     def radius(self) -> float:
@@ -190,58 +153,6 @@ class Cylinder:
     def __copy__(self) -> object: ...
 
     def __deepcopy__(self, memo: object) -> object: ...
-
-    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
-
-class HalfSpace:
-    """
-    The closed half-space { x : normal · x <= offset }.
-
-    `normal` may have any length but 0. The half-space is what the two say as given, without rounding; the attributes
-    `normal` and `offset` are both divided by the length, which rounds.
-    """
-
-    def __init__(self, normal: numpy.typing.ArrayLike, offset: float) -> None: ...
-
-    @property
-    def normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(3,) unit, out of the solid"""
-
-    @property
-    def offset(self) -> float:
-        """m along the unit normal"""
-
-    @property
-    def given_normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """(3,) as given, of any length"""
-
-    @property
-    def given_offset(self) -> float:
-        """As given, along the normal as given."""
-
-    @property
-    def volume(self) -> float:
-        """Volume in m³; infinite for a half-space."""
-
-    @property
-    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
-        """
-        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
-        """
-
-    @property
-    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
-        """
-        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
-        """
-
-    def __repr__(self) -> str: ...
-
-    def __copy__(self) -> object: ...
-
-    def __deepcopy__(self, memo: object) -> object: ...
-
-    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
 
 class Hull:
     """
@@ -309,6 +220,56 @@ class Hull:
 
     def __setstate__(self, state: tuple[object, ...]) -> None: ...
 
+class HalfSpace:
+    """
+    The closed half-space { x : normal · x <= offset }.
+
+    `normal` may have any length but 0. The half-space is what the two say as given, without rounding; the attributes
+    `normal` and `offset` are both divided by the length, which rounds.
+    """
+
+    def __init__(self, normal: numpy.typing.ArrayLike, offset: float) -> None: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
+
+    @property
+    def normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(3,) unit, out of the solid"""
+
+    @property
+    def offset(self) -> float:
+        """m along the unit normal"""
+
+    @property
+    def given_normal(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(3,) as given, of any length"""
+
+    @property
+    def given_offset(self) -> float:
+        """As given, along the normal as given."""
+
+    @property
+    def volume(self) -> float:
+        """Volume in m³; infinite for a half-space."""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """
+        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        """
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
 class RoundedHull:
     """
     All points within `radius` (m) of the convex hull of (n, 3) points (m).
@@ -354,6 +315,45 @@ class RoundedHull:
 
     def __setstate__(self, state: tuple[object, ...]) -> None: ...
 
+class Ellipsoid:
+    """
+    An ellipsoid about the origin with half axes (m) along x, y, z.
+
+    All points with (x / a)² + (y / b)² + (z / c)² <= 1. With equal half axes it answers as the sphere does. With a box, a
+    hull or a half-space, it is measured as a ball is, of which it is the image; with other round bodies, between polytopes,
+    as closely as `tolerance` asks.
+    """
+
+    def __init__(self, half_axes: numpy.typing.ArrayLike) -> None: ...
+
+    def __reduce__(self) -> tuple[type, tuple[object, ...]]: ...
+
+    @property
+    def half_axes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """(3,) m"""
+
+    @property
+    def volume(self) -> float:
+        """Volume in m³; infinite for a half-space."""
+
+    @property
+    def centroid(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
+        """
+        (3,) centre of volume in the shape's frame; the nearest boundary point to the origin for a half-space.
+        """
+
+    @property
+    def bounds(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]:
+        """
+        (2, 3) lower and upper corner of the box around the bare shape; infinite where a half-space is.
+        """
+
+    def __repr__(self) -> str: ...
+
+    def __copy__(self) -> object: ...
+
+    def __deepcopy__(self, memo: object) -> object: ...
+
 class Placed:
     """
     A shape and where it is in the world.
@@ -363,10 +363,10 @@ class Placed:
     which rounds.
     """
 
-    def __init__(self, shape: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
+    def __init__(self, shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
 
     @property
-    def shape(self) -> Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace: ...
+    def shape(self) -> Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid: ...
 
     @property
     def position(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]:
@@ -691,7 +691,7 @@ class Overlap:
 def overlap(a: Placed, b: Placed, /) -> Overlap: ...
 
 @overload
-def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001, method: Literal['auto', 'paper'] = 'auto') -> Overlap:
+def overlap(*shapes: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001, method: Literal['auto', 'paper'] = 'auto') -> Overlap:
     """
     The common set of two or more convex shapes.
 
@@ -709,18 +709,18 @@ def overlap(*shapes: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | Roun
     deciding by exact signs inside its hulls. Where no shift lands inside, it says 'touching'.
     """
 
-def distance(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float:
+def distance(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike) -> float:
     """
     Distance (m) of the nearest points of two shapes; 0 if they touch or overlap.
     """
 
-def penetration_depth(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike) -> float:
+def penetration_depth(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike) -> float:
     """
     Length (m) of the least translation that separates two shapes; 0 if they do not overlap. Positive where pybullet's contact
     distance is negative. Raises ValueError for two half-spaces.
     """
 
-def iou(a: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, b: Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001) -> float:
+def iou(a: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, b: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | Placed | numpy.typing.ArrayLike, tolerance: float = 0.001) -> float:
     """
     Intersection over union of two shapes: common volume over the volume of their union, from 0 to 1.
     """
@@ -864,7 +864,7 @@ class Batch:
     A pickle has the shapes alone.
     """
 
-    def __init__(self, shapes: Sequence[Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace]) -> None: ...
+    def __init__(self, shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid]) -> None: ...
 
     def __repr__(self) -> str: ...
 
@@ -894,7 +894,7 @@ class Batch:
         two half-spaces are no pair.
         """
 
-def overlaps(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
+def overlaps(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike, pairs: numpy.typing.ArrayLike | None = None, tolerance: float = 0.001, threads: int | None = 1, method: Literal['auto', 'paper'] = 'auto', separated: bool = True) -> Overlaps:
     """
     What pairs of placed shapes share, in one call that lets other Python threads run: volume, centroid, normal, depth,
     gradient as arrays.
@@ -910,7 +910,7 @@ def overlaps(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Ellipsoid | Hu
     unbounded.
     """
 
-def candidate_pairs(shapes: Sequence[Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
+def candidate_pairs(shapes: Sequence[Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid], positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike) -> numpy.typing.NDArray[numpy.int32]:
     """
     (p, 2) indices i < j, sorted, of the shapes whose boxes in the world meet. A half-space meets a box that reaches into it;
     two half-spaces are no pair.
