@@ -68,8 +68,7 @@ class Cutter {
     if (half == 0) return whole_ball(r.radius);
     begin();
     cylinder({}, {{}, {}, {1}}, r.radius, half);
-    for (const double sign : {-1.0, 1.0})
-      wall({{}, {}, {sign}}, {half}, r.round_ends ? slicing::kCut : owner_);
+    for (const double sign : {-1.0, 1.0}) wall({{}, {}, {sign}}, {half}, r.round_ends ? slicing::kCut : owner_);
     end();
     if (!r.round_ends) return;
     for (const double sign : {-1.0, 1.0}) {
