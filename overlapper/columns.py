@@ -61,27 +61,27 @@ class Tabular(ABC):
     __slots__ = ()
 
     @abstractmethod
-    def _columns(self) -> Columns:
-        """By name, all of one length; numbers that are missing are not numbers."""
+    def columns(self) -> Columns:
+        """The columns by name, all of one length; a missing number is NaN."""
 
     def to_arrow(self) -> pyarrow.Table:
         """A pyarrow.Table, columns as those of `overlapper run`. ImportError without pyarrow."""
         arrow = _library("pyarrow")
-        return arrow.table({name: arrow.array(values, from_pandas=True) for name, values in self._columns().items()})
+        return arrow.table({name: arrow.array(values, from_pandas=True) for name, values in self.columns().items()})
 
     def to_pandas(self) -> pandas.DataFrame:
         """A pandas.DataFrame, columns as those of `overlapper run`. ImportError without pandas."""
-        frame: pandas.DataFrame = _library("pandas").DataFrame(self._columns())
+        frame: pandas.DataFrame = _library("pandas").DataFrame(self.columns())
         return frame
 
     def to_polars(self) -> polars.DataFrame:
         """A polars.DataFrame, columns as those of `overlapper run`. ImportError without polars."""
-        frame: polars.DataFrame = _library("polars").DataFrame(self._columns(), nan_to_null=True)
+        frame: polars.DataFrame = _library("polars").DataFrame(self.columns(), nan_to_null=True)
         return frame
 
     def _repr_html_(self) -> str:
         """The first rows, as notebooks show a table."""
-        columns = self._columns()
+        columns = self.columns()
         count = len(next(iter(columns.values())))
         shown = range(min(count, MOST_ROWS))
         rows = ["".join(f"<th>{name}</th>" for name in columns)]

@@ -1,4 +1,4 @@
-"""What a scene is, and how it is found: by name or by path.
+"""Scenes: what they are, and how they are found by name or by path.
 
 A scene is a Python file with a docstring that says what is hard about it, `STEPS`, and `build(client)`, which fills the
 pybullet client and may return `step(i)`, called before every stepSimulation. What `build` takes beside the client,
@@ -28,9 +28,9 @@ from overlapper.simulation.engine import ENGINES
 
 Step = Callable[[int], object]
 ContactModel = Literal["bullet", "volumetric"]
-"""What pushes bodies apart."""
+"""The forces that push bodies apart."""
 
-# What a scene may tell simulation.VolumetricContact.
+# The arguments that a scene may give simulation.VolumetricContact.
 TOLD = frozenset({"stiffness", "dissipation", "friction", "substeps"})
 
 
@@ -191,7 +191,7 @@ def _imported(path: Path, source: bytes) -> ModuleType:
 
 @lru_cache(maxsize=1)
 def _compiled(path: Path, source: bytes) -> CodeType:
-    """Kept for the next run of the same scene, of which a sweep has thousands."""
+    """The code of a scene, kept for its next run: a sweep has thousands."""
     return compile(source, path, "exec")
 
 

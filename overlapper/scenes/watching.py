@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class How(TypedDict, total=False):
-    """What a Watch may be told, but for whom it watches and where that is written."""
+    """The options of a Watch, without its simulation and its files."""
 
     every: int
     pairs: Among
@@ -100,7 +100,7 @@ class Watch:
         self.steps, self.time = 0, 0.0
         """Steps since the watch began, measured or not, and the seconds that they took in the simulation."""
         self.measured = 0
-        """How many of them were measured."""
+        """The number of steps that were measured."""
         self.summary = Summary(name)
         self.written: list[Path] = []
         """The files that there are, once the watch is over."""
@@ -165,7 +165,7 @@ class Watch:
             self.measured += 1
 
     def _begun(self, bodies: AnyBodies) -> Callable[[Frame[AnyBodies]], None]:
-        """What takes the frames; the files are there from now on."""
+        """The function that takes the frames; the files are there from now on."""
         settings = {"simulation": self.summary.scene, "every": self.every, **self._asked, **bodies.settings}
         files = outputs(self.summary, settings, self.written, self.out, self.html, self._per, self._fcl)
         return self._files.enter_context(files)
@@ -214,7 +214,7 @@ class Watches:
         """Those that have measured something, in the order in which they began to."""
         self.failed: list[tuple[Watch, Exception]] = []
         self.steps = 0
-        """Of all clients, measured or not."""
+        """The steps of all clients, measured or not."""
         self.in_real_time = False
         """Whether a simulation was let run by the clock."""
         self._of: dict[Hashable, Watch] = {}

@@ -20,7 +20,7 @@ Numbered = Literal["simulated", "all"] | Iterable[tuple[Who, Who]]  # without na
 
 
 def listed(pairs: Any) -> list[tuple[Any, Any]]:
-    """Pairs, one by one; bodies or names that are two are one pair. ValueError of what is none."""
+    """A list of pairs; two bodies or names are one pair. ValueError if `pairs` is no list of pairs."""
     asked = list(pairs) if isinstance(pairs, Iterable) else None
     if asked and len(asked) == 2 and all(isinstance(each, (int, str)) for each in asked):
         asked = [tuple(asked)]

@@ -38,7 +38,7 @@ class AnyBodies:
         self._source = source
         self._grounds = Grounds()
         self._nowhere: set[int] = set()  # bodies without a finite pose
-        # What the last overlaps() was asked for, how many if it was a list, and what it has found.
+        # The pairs that the last overlaps() was asked for, or their number if they were a list, and its result.
         self._asked: Literal["simulated", "all"] | int = "simulated"
         self._found = overlaps([], np.empty((0, 3)), np.empty((0, 4)))
         self._last: tuple[Contacts, Layout, partial[Mask]] | None = None
@@ -67,7 +67,7 @@ class AnyBodies:
         """Pairs of shapes that overlap or touch, sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB).
 
         `tolerance`, `method` and `threads` are those of `overlapper.overlaps`, `pairs` is what `Bodies.pairs` is asked
-        for. What is found is kept for the next call: pairs of which neither shape has moved by a bit cost nothing.
+        for. Results are kept for the next call: a pair costs nothing if neither of its shapes has moved by a bit.
         """
         among: Numbered = pairs if isinstance(pairs, str) else self._asked_for(pairs)
         if among == "simulated":

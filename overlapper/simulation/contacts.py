@@ -88,7 +88,7 @@ class Contacts(Tabular, Sequence[Contact]):
     def __reduce__(self) -> tuple[Any, ...]:
         return Contacts, (self._keys, self.overlaps, dict(self.names))
 
-    def _columns(self) -> Columns:
+    def columns(self) -> Columns:
         found = self.overlaps
         keys = self.keys
         columns: Columns = {}

@@ -42,7 +42,7 @@ class Simulation(Protocol):
 
 
 class Engine(Protocol):
-    """What a module of ENGINES has."""
+    """The functions that a module of ENGINES has."""
 
     def begin(self) -> Simulation:
         """A new, empty simulation."""

@@ -44,7 +44,7 @@ class GroundBelow:
         return bool(moved.any())
 
     def numbers(self) -> set[int]:
-        """Of the triangles that any of the shapes is near."""
+        """The numbers of the triangles that any of the shapes is near."""
         return set(np.unique(np.concatenate([np.empty(0, dtype=np.int64), *self._near])).tolist())
 
 

@@ -31,7 +31,7 @@ class HeightField:
 
     @property
     def count(self) -> int:
-        """Of its triangles."""
+        """The number of triangles."""
         columns, rows = self.heights.shape
         return int(2 * (columns - 1) * (rows - 1))
 

@@ -16,7 +16,7 @@ Kind = Literal["revolute", "prismatic", "spherical", "planar", "held"]
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """What moves a link in its parent, or, without being moved, ties a base to the world.
+    """A joint moves a link in its parent, or ties a base to the world without moving it.
 
     The joint's frame, at zero, is at `position` (3,) in m and `orientation` (4,) xyzw of the inertial frame of the
     parent. A revolute joint turns it by an angle in rad about `axis` (3,), which is unit, a prismatic one moves it by

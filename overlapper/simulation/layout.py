@@ -29,7 +29,7 @@ class Poses(Protocol):
 
 
 class Layout:
-    """What is modelled of `bodies`, parallel to `keys`, which are (body, link, shape), sorted.
+    """The modelled shapes of `bodies`, parallel to `keys`, which are (body, link, shape), sorted.
 
     `key_rows` (k, 3) are the same as an array, `shapes` and `batch` the shapes, `owners` (k,) their bodies, `colliders`
     (k,) the places of their links in `collider_rows`, by (body, link). `of_several_colliders` are the bodies that have
@@ -70,7 +70,7 @@ class Layout:
         return np.array([_reach(self.shapes[row]) for row in rows])
 
     def pose(self) -> set[int]:
-        """Place the shapes where their colliders are now; the bodies of which one is nowhere."""
+        """Place the shapes where their colliders are now. Returns the bodies with a shape that has no finite pose."""
         self._read = self.poses.read()
         self.positions, self.orientations = _core.world_poses(
             self._read, self._places, self._local_positions, self._local_orientations

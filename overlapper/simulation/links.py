@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class LinkContact:
-    """Two links of which shapes overlap or touch. True only if they overlap.
+    """Two links whose shapes overlap or touch. True only if they overlap.
 
     `bodyA`, `linkA`, `bodyB` and `linkB` are pybullet's indices, link -1 is the base. `overlap` is what the unions of
     their shapes share, `contacts` are the pairs of their shapes, and `deepest` is the one of them with the largest
@@ -98,7 +98,7 @@ class LinkContacts(Tabular, list[LinkContact]):
         super().__init__(pairs)
         self.names = names or {}
 
-    def _columns(self) -> Columns:
+    def columns(self) -> Columns:
         columns: Columns = {}
         for side, links in (
             ("A", [(pair.bodyA, pair.linkA) for pair in self]),

@@ -1,4 +1,4 @@
-"""What volumetric contact asks a simulator: masses and joints, velocities, and steps with forces."""
+"""The questions of volumetric contact to a simulator: masses and joints, velocities, and steps with forces."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Dynamics(Protocol):
         """The inertial frames of `links`, now."""
 
     def velocity(self) -> Array:
-        """Of all coordinates: of bases in m/s and rad/s, in the world, and of joints in rad/s or m/s."""
+        """The velocities of all coordinates: of bases in m/s and rad/s, in the world, and of joints in rad/s or m/s."""
 
     def apply(self, wrenches: Array, frames: Sequence[Pose]) -> None:
         """Let forces and torques (n, 6) act on `links` in the next step, about the origins of their `frames`."""

@@ -1,4 +1,4 @@
-"""What is modelled of a simulator's bodies: convex shapes in the frames of their links, and what is left out."""
+"""A simulator's bodies as they are modelled: convex shapes in the frames of their links, and what is left out."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How shapes are modelled: see `simulation.Bodies`. ValueError if there is no such way."""
+    """How shapes are modelled: see `simulation.Bodies`. ValueError for an invalid setting."""
 
     concave: Concave
     threshold: float

@@ -55,7 +55,7 @@ def _solid(data: bytes, settings: Settings) -> Decomposition:
 
 @lru_cache(maxsize=64)
 def _decomposition(data: bytes, enclose: bool, threshold: float) -> Decomposition | NotDecomposed:
-    """Of a mesh that many bodies may have; also the failure is kept, as it may have taken minutes."""
+    """The decomposition of a mesh that many bodies may have. A failure is kept, too: it may have taken minutes."""
     try:
         return decompose(np.frombuffer(data).reshape(-1, 3, 3), threshold, enclose)
     except NotDecomposed as error:

@@ -1,4 +1,4 @@
-"""What a person would call a body: by its file, by the name of its robot, or by what it is made of."""
+"""Names of bodies as a person would call them: by file, by the name of a robot, or by mesh or kind of shape."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def body_name(own: str, file: str | None, alone: bool, meshes: Sequence[str], ki
     named_after_a_file = own.lower().endswith(ENDINGS)
     plain = PurePath(own.replace("\\", "/")).stem if named_after_a_file else own
     of_file = [name for name in (stem, folder) if _says_something(name, IN_FILE_NAMES)]
-    # Of a file of many bodies, their own names are all that tells them apart.
+    # The bodies of one file are told apart by nothing but their own names.
     own_says = _says_something(plain, EMPTY) and not (named_after_a_file and alone)
     candidates = [plain] if own_says else []
     if alone and of_file[:1] == [stem]:
@@ -58,7 +58,7 @@ def _without_words_of_tools(name: str) -> str:
 
 
 def named(names: Mapping[int, str] | None) -> dict[int, str]:
-    """The names given to bodies by their numbers, fit to be seen. ValueError if they are none."""
+    """The names given to bodies by their numbers, fit to be seen. ValueError for an invalid name."""
     wanted = "names must have names by the numbers of bodies, such as {3: 'duck'}, not "
     if not isinstance(names or {}, Mapping):
         raise ValueError(f"{wanted}{names!r}")

@@ -1,4 +1,4 @@
-"""What `AnyBodies` asks a simulator: which bodies there are, what is new, where they are, and who may collide."""
+"""The questions of `AnyBodies` to a simulator: which bodies, what is new, where they are, and who may collide."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Source(Protocol):
         """
 
     def poses(self, links: Mapping[int, Sequence[int]]) -> Poses:
-        """What reads the frames of these bodies' bases, and of their `links`."""
+        """The reader of the frames of these bodies' bases, and of their `links`."""
 
     def rules(self, layout: Layout) -> Rules:
         """The rules in force; the same object as long as they and the layout are the same."""
@@ -53,11 +53,11 @@ class Source(Protocol):
 
     @property
     def skipped(self) -> Sequence[Skipped]:
-        """What is left out that belongs to none of `bodies`."""
+        """The shapes that are left out and belong to none of `bodies`."""
         return ()
 
     def cautions(self, layout: Layout) -> Iterable[Warning]:
-        """What to warn of before the pairs are measured that the simulator lets collide."""
+        """Warnings before the pairs are measured that the simulator lets collide."""
         return ()
 
     def within_margins(self, found: Contacts, layout: Layout, chosen: Callable[[NDArray[np.int32]], Mask]) -> int:
@@ -65,7 +65,7 @@ class Source(Protocol):
         return 0
 
     def mechanics(self) -> Mechanics:
-        """What forces are applied by. ValueError if the simulator takes no forces."""
+        """The simulation as forces are applied to it. ValueError if the simulator takes no forces."""
         raise ValueError("this simulator takes no forces, so there is no volumetric contact in it")
 
     def close(self) -> None:

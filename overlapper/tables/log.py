@@ -93,7 +93,7 @@ class Log:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        # What ends a loop of one's own without an error is no failure; of no step nothing is written then.
+        # A loop that ends without an error has not failed. Without a step nothing is written.
         if error is None or (self.steps and not isinstance(error, Exception)):
             self.close()
         elif self._table:

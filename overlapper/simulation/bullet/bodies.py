@@ -57,8 +57,8 @@ class Bodies(AnyBodies):
     them apart. Bodies that another process adds to a shared simulation are noticed after `pybullet.syncBodyInfo()`. To
     those that loadBullet brings pybullet gives no ids; they are counted in `skipped`.
 
-    ValueError if `physicsClientId` is not connected, the recorder is of another client, or a name is none; RuntimeError
-    if the physics server writes where this process cannot read.
+    ValueError if `physicsClientId` is not connected, the recorder is of another client, or a name is invalid.
+    RuntimeError if the physics server writes where this process cannot read.
     """
 
     def __init__(

@@ -100,7 +100,7 @@ def read_body(
 
 
 def _name(client: int, id: int, own: str, loaded: Loaded | None, leaves: Mapping[int, tuple[Leaf, ...]]) -> str:
-    """What a body is called that has been given no name; empty if nothing says anything."""
+    """The name of a body that was given none; empty if nothing says anything."""
     meshes: list[str] = []
     only = leaves.get(BASE, ()) if pybullet.getNumJoints(id, client) == 0 else ()
     if only:
@@ -153,7 +153,7 @@ def _in_double_precision(client: int, id: int, link: int, leaves: tuple[Leaf, ..
 
 
 def _reported(client: int, id: int, link: int) -> list[Leaf]:
-    """What getCollisionShapeData lists, in the order of the file; hulls without their points."""
+    """The shapes that getCollisionShapeData lists, in the order of the file; hulls without their points."""
     leaves = []
     for _, _, number, size, _, position, orientation in pybullet.getCollisionShapeData(id, link, client):
         kind, dimensions = REPORTED[number], np.array(size)

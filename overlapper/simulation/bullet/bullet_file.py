@@ -240,7 +240,7 @@ class BulletFile:
 
 @contextmanager
 def _damage() -> Iterator[None]:
-    """What bytes that no simulator has written lead to, wherever it is noticed, as one ValueError."""
+    """One ValueError for every error that damaged bytes lead to."""
     causes = (KeyError, IndexError, StopIteration, struct.error, RecursionError, OverflowError, TypeError)
     try:
         with np.errstate(over="ignore", invalid="ignore"):
@@ -254,7 +254,7 @@ def _damage() -> Iterator[None]:
 
 
 def _colliders(records: NDArray[np.void]) -> list[Collider]:
-    """Of collision objects: many at once, as every look at a single struct takes its time."""
+    """Collision objects, many at once: reading structs one by one is slow."""
     transforms = records["m_worldTransform"]
     return list(
         map(

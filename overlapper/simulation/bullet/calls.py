@@ -92,7 +92,7 @@ def listen(listener: Listener) -> None:
 
 
 def unlisten(listener: Listener) -> None:
-    """The opposite, also if it was none; once nobody listens, pybullet is as before."""
+    """Let a listener hear nothing any more; once nobody listens, pybullet is as before."""
     if listener in _listeners:
         _listeners.remove(listener)
         if not _listeners:
@@ -101,7 +101,7 @@ def unlisten(listener: Listener) -> None:
 
 
 def unheard(name: str) -> Callable[..., Any]:
-    """The function of pybullet of that name, of whose calls no listener hears."""
+    """The function of pybullet of that name; listeners do not hear its calls."""
     function: Callable[..., Any] = _ORIGINALS[name] if _listeners else getattr(pybullet, name)
     return function
 

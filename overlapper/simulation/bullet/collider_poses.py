@@ -51,7 +51,7 @@ class ColliderPoses:
         return frames
 
     def _saved_frames(self) -> dict[tuple[int, int], Pose]:
-        """Of the hidden bodies, by place in a .bullet file and link."""
+        """The frames of the hidden bodies, by place in a .bullet file and link."""
         bodies = save(self._client).bodies
         keys = [(row, link) for row, links in self._hidden for link in (BASE, *links)]
         colliders = [bodies[row].colliders[link] for row, link in keys]

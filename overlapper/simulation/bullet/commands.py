@@ -1,4 +1,4 @@
-"""What a script tells motors, constraints and bodies between two steps, told again in each substep."""
+"""The commands that a script gives motors, constraints and bodies between two steps, given again in each substep."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PUSHES = frozenset({"applyExternalForce", "applyExternalTorque"})
 
 COMMANDS = MOTORS | PUSHES | {"changeConstraint", "resetSimulation", "stepSimulation"}
 
-# What pybullet takes where a script says nothing: parts of an error that a step takes away.
+# The gains that pybullet takes by default: parts of an error that a step takes away.
 DEFAULT_GAINS = {"positionGain": 0.1, "velocityGain": 1.0}
 
 MAX_FORCE, DEFAULT_MAX_FORCE = 10, 500.0  # of getConstraintInfo
@@ -40,9 +40,9 @@ class Commands:
         self._length = 0.0  # of the steps that lasting ones have been told for
 
     def learn(self) -> None:
-        """What pybullet tells of constraints that were told before anybody heard it: their forces.
+        """Take the forces of constraints from pybullet that were set before anybody listened.
 
-        Of one that it was never told for it says its default, which it does not keep as that of any length.
+        For a constraint without a force of its own pybullet reports its default, which is not an impulse of a step.
         """
         client = self._client
         for k in range(pybullet.getNumConstraints(client)):
@@ -92,7 +92,7 @@ class Commands:
             joints = arguments["jointIndices"] if name in ARRAYS else [arguments["jointIndex"]]
             self._keep([(body, joint) for joint in joints], command)
         elif name == "changeConstraint":
-            # What a call leaves out stays as it was.
+            # An argument that a call leaves out stays as it was.
             constraint = arguments["userConstraintUniqueId"]
             before = self._lasting.get(constraint, command)[1]
             self._keep([constraint], (name, before | command[1]))
@@ -121,7 +121,7 @@ def _gains(name: str, arguments: Arguments, share: float) -> Arguments:
         [*arguments[gain + s]] if name in ARRAYS and gain + s in arguments else [arguments.get(gain, default)] * many
         for gain, default in DEFAULT_GAINS.items()
     )
-    # Of an error in the velocity, `share` of a step leaves what would leave the gain's rest after a whole one.
+    # After all parts of a step, as much of an error in the velocity is left as after one whole step.
     slower = [1 - (1 - each) ** share if 0 <= each <= 1 else each for each in velocities]
     told: dict[str, list[float]] = {"velocityGain": slower}
     if mode == pybullet.POSITION_CONTROL:

@@ -1,4 +1,4 @@
-"""What pybullet's own contact points say of pairs in which no overlap is found."""
+"""Pybullet's own contact points between links in which no overlap is found."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class BulletDynamics:
 
     @property
     def gravity(self) -> Array:
-        """The acceleration of all coordinates of which it is known before anything has moved: of free bases."""
+        """The acceleration of all coordinates that is known before anything has moved: gravity on free bases."""
         told = pybullet.getPhysicsEngineParameters(self._client)
         down = [told[f"gravityAcceleration{axis}"] for axis in "XYZ"]
         found = np.zeros(self.solver.coordinates)
@@ -113,7 +113,7 @@ class BulletDynamics:
         return found
 
     def velocity(self) -> Array:
-        """Of all coordinates: of bases in m/s and rad/s, in the world, and of joints in rad/s or m/s."""
+        """The velocities of all coordinates: of bases in m/s and rad/s, in the world, and of joints in rad/s or m/s."""
         client = self._client
         velocity = np.empty(self.solver.coordinates)
         bases = np.array([*map(pybullet.getBaseVelocity, self._joints, repeat(client))]).reshape(-1, 6)

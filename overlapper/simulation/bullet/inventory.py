@@ -1,4 +1,4 @@
-"""What is modelled of a file that pybullet can load: every shape, and which links the simulator lets collide.
+"""The list of what is modelled of a file for pybullet: every shape, and which links the simulator lets collide.
 
 It is read in a process of its own (`overlapper.simulation.bullet.model_file`).
 """
@@ -121,7 +121,7 @@ def _read(path: Path, self_collision: bool, settings: dict[str, Any]) -> Invento
 def _of_bullet_file(
     path: Path, surface: Surface = "nominal", concave: Concave = "decompose", concave_threshold: float = 0.05
 ) -> Inventory:
-    """Of what saveBullet wrote; loadBullet would not load all of it. Bodies have numbers, and no names."""
+    """The inventory of a file that saveBullet wrote; loadBullet would not load all of it. Bodies have no names."""
     from overlapper.simulation.bullet.bullet_file import BulletFile
     from overlapper.simulation.collision_rules import Colliders, CollisionRules, partners
     from overlapper.simulation.model import Settings

@@ -56,7 +56,7 @@ def _read(path: Path, settings: Settings) -> KinematicTree:
 
     client = pybullet.connect(pybullet.DIRECT)
     with Recorder(client) as recorder:
-        # What is only seen takes most of the time of loading a URDF.
+        # Visual shapes take most of the time of loading a URDF.
         load(path, client, pybullet.URDF_IGNORE_VISUAL_SHAPES if path.suffix.lower() == ".urdf" else 0)
         known = KnownBodies(client, settings, recorder, {})
         known.refresh()
@@ -104,7 +104,7 @@ def joint_between(client: int, id: int, told: Any, parent: Any, link: Any) -> Jo
     number, name, type_ = told[:3]
     kind = KINDS.get(type_, "held")
     axis, position = np.array(told[13]), np.array(told[14])
-    # What pybullet tells is the rotation from the axes of the parent to those of the joint.
+    # Pybullet tells the rotation from the axes of the parent to those of the joint.
     orientation = np.array(told[15]) * [-1, -1, -1, 1]
     if kind == "revolute":
         axis = axis / np.linalg.norm(axis)

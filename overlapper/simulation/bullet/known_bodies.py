@@ -103,7 +103,7 @@ class KnownBodies:
         if loaded or not ids or len(known) < len(ids) or self.hidden:
             file, rows, hidden = saved_bodies(client, ids)
             if len(rows) < len(file.bodies):
-                # Of the bodies that createMultiBody makes from batchPositions, only the last is known before a sync.
+                # Before a sync, only the last of the bodies is known that createMultiBody makes from batchPositions.
                 # Without them, a sync is left out, as it takes longer than all the rest.
                 pybullet.syncBodyInfo(client)
                 pybullet.syncUserData(physicsClientId=client)
@@ -139,5 +139,5 @@ class KnownBodies:
 
 
 def _margin(client: int, id: int) -> float:
-    """Of the outermost shape of a base, as Bullet has it."""
+    """The margin of the outermost shape of a base, as Bullet has it."""
     return float(pybullet.getDynamicsInfo(id, BASE, client)[11])

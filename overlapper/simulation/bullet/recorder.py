@@ -1,4 +1,4 @@
-"""What a pybullet simulation has been told and cannot be asked for later."""
+"""A recorder of what pybullet is told and cannot be asked for later."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ class Recorder:
         self.masks_set = 0
         """How often groups and masks were set."""
         self.scenes_loaded = 0
-        """How often bodies may have come or gone that pybullet tells nothing of: those of loadBullet."""
+        """How often bodies may have come or gone without a word of pybullet: those of loadBullet."""
         self.commands = Commands(physicsClientId)
-        """What motors, constraints and bodies were told to do."""
+        """The commands to motors, constraints and bodies."""
         self._forget()
         listen(self._hear)
 

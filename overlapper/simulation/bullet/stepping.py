@@ -20,7 +20,7 @@ def time_step(client: int) -> float:
 
 
 _INSIDE: WeakValueDictionary[int, Stepping] = WeakValueDictionary()
-"""Who has entered, by client."""
+"""The one that has entered, by client."""
 
 
 class Stepping:
@@ -74,7 +74,7 @@ class Stepping:
 
 
 class Response:
-    """Which pairs of links of a client Bullet pushes apart no more.
+    """The pairs of links of a client that Bullet does not push apart any more.
 
     A pair filter takes a pair from Bullet's collision detection, so that it costs nothing there and has no contact
     points. No recorder hears of it: to `Bodies` the pair is as before.
@@ -85,13 +85,13 @@ class Response:
         self._off: set[tuple[Link, Link]] = set()
 
     def turn_off(self, pairs: Iterable[tuple[Link, Link]]) -> None:
-        """Of those pairs, too."""
+        """Turn the response to those pairs off, too."""
         for pair in pairs:
             self._set(pair, 0)
             self._off.add(pair)
 
     def turn_on(self, recorder: Recorder | None) -> None:
-        """Of all pairs of which it is off, but for those that a script has filtered itself, as a recorder has heard."""
+        """Turn the response on again, but to pairs that a script has filtered itself, as a recorder has heard."""
         filters = recorder.pair_filters if recorder else {}
         for pair in sorted(self._off):
             if filters.get(pair, True):

@@ -25,13 +25,13 @@ COARSE = 2.0
 # There is no patch where the area vector is less than this part of the surface of what is shared, as to the solver.
 NO_PATCH = 1e-6
 
-# What moves by less than that (m, rad) in a step rests.
+# A body that moves by less than that (m, rad) in a step rests.
 STILL = 1e-9
 
 # How often a step is halved to find when what is swallowed by its end has a patch.
 BISECTIONS = 8
 
-# What is swept in a step at most: stiffness beyond is damped.
+# The most substeps of a step: contacts that are stiffer are damped.
 MOST_SUBSTEPS = 200
 
 
@@ -117,7 +117,7 @@ class VolumetricContact:
         none = np.empty((0, 3))
         self._found = Forces(bodies.overlaps(pairs=[]), none, none, none, none, np.empty(0, dtype=bool), np.empty(0))
         self.substeps = 0
-        """How many the last step was taken in."""
+        """The number of substeps of the last step."""
         self.sweeps = 0
         """How often the solver went through all pairs in the last substep."""
 
@@ -278,7 +278,7 @@ class VolumetricContact:
             self._parts = []
 
     def _codes(self, found: Overlaps) -> NDArray[np.int64]:
-        """Of the pairs of rows, a number each."""
+        """The pairs of rows, as one number each."""
         first, second = found.pairs.T.astype(np.int64)
         return np.asarray(first * len(self._keys) + second)
 
@@ -292,7 +292,7 @@ class VolumetricContact:
         self._forget()
 
     def _forget(self) -> None:
-        """What acted before is of other bodies."""
+        """Forget the accelerations of before: they are of other bodies."""
         self._after = None
         self._before: tuple[Array, float, Array] | None = None  # velocity, duration and our part of the acceleration
         self._other = self._dynamics.gravity
@@ -333,12 +333,12 @@ class VolumetricContact:
             velocity = velocity + duration / length * (velocity - before)
         else:
             velocity = velocity + duration * self._other
-        # What rests brings nothing that is not there.
+        # Bodies at rest bring no new contact.
         if np.abs(velocity).max(initial=0.0) * duration < STILL:
             return 0.0
         highest = 0.0
         known: set[tuple[int, int]] | None = None
-        # What is small and fast is swallowed within the step: then it counts when it was half in, and for how long.
+        # A small and fast body is swallowed within the step: then it counts when it was half in, and for how long.
         lost: set[tuple[int, int]] = set()
         early, late, part = 0.0, 1.0, 1.0
         for _ in range(BISECTIONS):
@@ -359,7 +359,7 @@ class VolumetricContact:
         return max(highest, (2 / (late - early) / duration) ** 2) if lost else highest
 
     def _at(self, duration: float, velocity: Array) -> Overlaps:
-        """What bodies share that have gone on for a duration with that velocity of all coordinates."""
+        """The overlaps after a duration in which all coordinates go on with that velocity."""
         bodies = self.bodies
         positions, orientations = self._dynamics.solver.ahead(
             duration, velocity, self._links, bodies.positions, bodies.orientations
@@ -435,7 +435,7 @@ def _followed(frequency2: float, duration: float) -> int:
 
 
 def _swallowed(found: Overlaps) -> set[tuple[int, int]]:
-    """The pairs of which one lies wholly in the other: what they share has no patch."""
+    """The pairs in which one lies wholly in the other: their overlap has no patch."""
     area = found.gradient[:, 1, :3]
     rows = (found.volume > 0) & ((area * area).sum(axis=1) <= (NO_PATCH * found.area) ** 2)
     return {(a, b) for a, b in found.pairs[rows].tolist()} if rows.any() else set()

@@ -83,8 +83,8 @@ class Forces(Tabular):
         """(p, 10) force, torque, energy and slip, by the columns of `overlapper run`."""
         return np.column_stack([getattr(self, name) for name in FORCE_MEASURES])
 
-    def _columns(self) -> Columns:
-        return {**self.contacts._columns(), **dict(zip(FORCE_COLUMNS, self.measures.T))}
+    def columns(self) -> Columns:
+        return {**self.contacts.columns(), **dict(zip(FORCE_COLUMNS, self.measures.T))}
 
     def __len__(self) -> int:
         return len(self.force)

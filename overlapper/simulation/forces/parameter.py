@@ -1,4 +1,4 @@
-"""What contacts are told about themselves: numbers, or functions of the pair of links."""
+"""Parameters of contacts: numbers, or functions of the pair of links."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from overlapper.simulation.model import Array, Link
 
 OfPair = Callable[[Link, Link], float]
-"""What a pair of links ((body, link), (body, link)) has, the lesser first."""
+"""The value for a pair of links ((body, link), (body, link)), the lesser first."""
 
 
 class Parameter:
