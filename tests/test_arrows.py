@@ -26,6 +26,14 @@ FLOORS = ["python", "batch", "overlap", "methods", "distance", "shapes", "forces
 # The ways that know nothing of each other.
 APART = ["methods/clipping", "methods/tracing", "methods/dual"]
 
+# The folders of the ways for round pairs, each with those that its files may include.
+ROUND = {
+    "closed_forms": ["closed_forms", "quadric"],
+    "pieces": ["pieces", "slicing", "quadric"],
+    "slicing": ["slicing", "quadric"],
+    "quadric": ["quadric"],
+}
+
 
 def contracts(folder: Path) -> tuple[int, str]:
     """The exit code and the report of import-linter on the sources in a folder."""
@@ -92,7 +100,9 @@ def broken_includes(native: Path) -> set[tuple[str, str]]:
             floor, below = (FLOORS.index(each.partition("/")[0]) for each in (file, included))
             ways = [next((way for way in APART if each.startswith(f"{way}/")), None) for each in (file, included)]
             beside = ways[0] is not None and floor == below and ways[1] != ways[0]
-            if below < floor or beside:
+            rooms = [each.removeprefix("methods/round/").partition("/")[0] for each in (file, included)]
+            within_round = included.startswith("methods/round/") and rooms[0] in ROUND
+            if below < floor or beside or (within_round and rooms[1] not in ROUND[rooms[0]]):
                 found.add((file, included))
     return found
 
@@ -111,6 +121,12 @@ def test_the_core_includes_only_downwards():
         ("methods/paper.cpp", "overlap/overlap.h", True),
         ("methods/clipping/clip.cpp", "methods/dual/region.h", True),
         ("methods/tracing/trace.cpp", "methods/choose.h", True),
+        ("methods/round/closed_forms/lens.cpp", "methods/round/round.h", True),
+        ("methods/round/closed_forms/lens.cpp", "methods/round/pieces/measure.h", True),
+        ("methods/round/slicing/slice.cpp", "methods/round/pieces/pieces.h", True),
+        ("methods/round/quadric/ball.cpp", "methods/round/slicing/wall.h", True),
+        ("methods/round/pieces/cap.cpp", "methods/round/quadric/stretch.h", False),
+        ("methods/round/round.cpp", "methods/round/closed_forms/closed_forms.h", False),
         ("methods/tracing/trace.cpp", "methods/tracing/seam.h", False),
         ("methods/paper.cpp", "methods/clipping/clip.h", False),
         ("overlap/overlap.cpp", "geometry/vec.h", False),

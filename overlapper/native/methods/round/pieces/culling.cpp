@@ -16,12 +16,12 @@ constexpr size_t kMostCorners = 512;
 
 }  // namespace
 
-Culling::Solid::Solid(const Round& round) : radius(round.radius) {
+Culling::PlainRound::PlainRound(const Round& round) : radius(round.radius) {
   if (!round.ball) axis = rounded(round.axis);
   centre = rounded(round.ball ? round.centre : foot(round));
 }
 
-Vec3 Culling::Solid::outward(Vec3 point) const {
+Vec3 Culling::PlainRound::outward(Vec3 point) const {
   Vec3 from = point - centre;
   // If the point is far along the axis, the first time leaves rounding.
   for (int again = 0; again < 2; ++again) from -= dot(from, axis) * axis;
@@ -40,19 +40,19 @@ bool Culling::cut_around(const Pieces& pieces, const Piece& piece) {
   for (int w = piece.first_wall; w < piece.first_wall + piece.walls; ++w)
     uncut_.push_back({{rounded(pieces.walls[w].normal), pieces.walls[w].slack.head, w}, 0});
   while (uncut_.size() > kMostInOrder) {
-    for (Cut& cut : uncut_) {
+    for (WallCut& cut : uncut_) {
       cancellation_point(around_.corners.size());
       cut.depth = around_.range(cut.face.normal).second - cut.face.slack;
     }
-    std::erase_if(uncut_, [&](const Cut& cut) { return cut.depth < -margin_; });
+    std::erase_if(uncut_, [&](const WallCut& cut) { return cut.depth < -margin_; });
     if (around_.corners.size() > kMostCorners) return true;
     const size_t few = std::min(kDeepest, uncut_.size());
-    std::ranges::partial_sort(uncut_, uncut_.begin() + few, std::ranges::greater{}, &Cut::depth);
+    std::ranges::partial_sort(uncut_, uncut_.begin() + few, std::ranges::greater{}, &WallCut::depth);
     for (size_t i = 0; i < few; ++i)
       if (!around_.cut(uncut_[i].face)) return false;
     uncut_.erase(uncut_.begin(), uncut_.begin() + few);
   }
-  for (const Cut& cut : uncut_) {
+  for (const WallCut& cut : uncut_) {
     cancellation_point(around_.corners.size());
     if (!around_.cut(cut.face)) return false;
   }
@@ -60,15 +60,15 @@ bool Culling::cut_around(const Pieces& pieces, const Piece& piece) {
   return true;
 }
 
-void Culling::enclose(const Pieces& pieces, const EnclosingPolytope& common, Side& side) {
+void Culling::enclose(const Pieces& pieces, const EnclosingPolytope& common, EnclosedBody& side) {
   side.pieces = &pieces;
   if (side.parts.size() < pieces.pieces.size()) side.parts.resize(pieces.pieces.size());
   for (size_t i = 0; i < pieces.pieces.size(); ++i) {
     cancellation_point(common.corners.size());
     const Piece& piece = pieces.pieces[i];
-    Part& part = side.parts[i];
+    EnclosedPiece& part = side.parts[i];
     around_ = common;
-    part.round = piece.round < 0 ? Solid{} : Solid(pieces.rounds[piece.round]);
+    part.round = piece.round < 0 ? PlainRound{} : PlainRound(pieces.rounds[piece.round]);
     bool something = cut_around(pieces, piece);
     // Planes that touch a round where the rest is: the second time, less of that is left.
     for (int again = 0; something && piece.round >= 0 && again < 2; ++again) {
@@ -81,7 +81,7 @@ void Culling::enclose(const Pieces& pieces, const EnclosingPolytope& common, Sid
     part.around = around_;
     part.middle = around_.middle(), part.reach = around_.reach(part.middle), part.box = around_.bounds();
     part.walls.clear(), part.uncut.clear(), part.planes.clear();
-    for (const Cut& cut : uncut_) part.uncut.push_back(cut.face.wall);
+    for (const WallCut& cut : uncut_) part.uncut.push_back(cut.face.wall);
     std::ranges::sort(part.uncut);
     part.walls = part.uncut;
     for (const EnclosingPolytope::Face& face : around_.faces)
@@ -91,10 +91,10 @@ void Culling::enclose(const Pieces& pieces, const EnclosingPolytope& common, Sid
   }
 }
 
-void Culling::sweep(const Side& side, std::vector<Swept>& swept) {
+void Culling::sweep(const EnclosedBody& side, std::vector<Swept>& swept) {
   swept.clear();
   for (size_t i = 0; i < side.pieces->pieces.size(); ++i) {
-    const Part& part = side.parts[i];
+    const EnclosedPiece& part = side.parts[i];
     if (!part.empty) swept.push_back({part.box.lower.x, part.box.upper.x, static_cast<int>(i)});
   }
   std::ranges::sort(swept, {}, &Swept::low);
@@ -124,10 +124,10 @@ void Culling::near(std::vector<std::array<int, 2>>& pairs) {
   std::ranges::sort(pairs);
 }
 
-bool Culling::keep_walls(const Side& side, int piece, const Part& other, std::vector<int>& kept,
+bool Culling::keep_walls(const EnclosedBody& side, int piece, const EnclosedPiece& other, std::vector<int>& kept,
                          std::vector<Wall>& walls) const {
   kept.clear();
-  const Part& part = side.parts[piece];
+  const EnclosedPiece& part = side.parts[piece];
   cancellation_point(part.walls.size());
   for (size_t i = 0; i < part.walls.size(); ++i) {
     const auto& [normal, slack] = part.planes[i];
@@ -139,14 +139,14 @@ bool Culling::keep_walls(const Side& side, int piece, const Part& other, std::ve
   return true;
 }
 
-bool Culling::beyond(const Solid& round, const EnclosingPolytope& other, Vec3 middle) const {
+bool Culling::beyond(const PlainRound& round, const EnclosingPolytope& other, Vec3 middle) const {
   if (!(round.radius > 0)) return false;
   const Vec3 normal = round.outward(middle);
   return normal != Vec3{} && other.least(normal) > round.reach(normal) + margin_;
 }
 
 bool Culling::meet(int p, int q, Meeting& meeting) const {
-  const Part &one = a_.parts[p], &two = b_.parts[q];
+  const EnclosedPiece &one = a_.parts[p], &two = b_.parts[q];
   meeting.p = p, meeting.q = q, meeting.walls.clear();
   if (!keep_walls(a_, p, two, meeting.of_p, meeting.walls) || !keep_walls(b_, q, one, meeting.of_q, meeting.walls))
     return false;
@@ -155,7 +155,7 @@ bool Culling::meet(int p, int q, Meeting& meeting) const {
 
 bool Culling::share(const Meeting& meeting, EnclosingPolytope& polytope) const {
   // Every cut looks at all corners.
-  const auto work = [](const Part& part, const std::vector<int>& of_other) {
+  const auto work = [](const EnclosedPiece& part, const std::vector<int>& of_other) {
     return part.around.corners.size() * (of_other.size() + part.uncut.size() + 1);
   };
   const bool from_p = work(a_.parts[meeting.p], meeting.of_q) <= work(b_.parts[meeting.q], meeting.of_p);

@@ -36,19 +36,19 @@ class Culling {
 
  private:
   /// A ball, or a cylinder by the point of its axis that is nearest to the origin; nothing without a radius.
-  struct Solid {
+  struct PlainRound {
     Vec3 centre, axis;
     double radius = 0;
 
-    Solid() = default;
-    explicit Solid(const Round& round);
+    PlainRound() = default;
+    explicit PlainRound(const Round& round);
     /// From the centre or the axis to a point; unit, or zero.
     Vec3 outward(Vec3 point) const;
     double reach(Vec3 outward_normal) const { return dot(outward_normal, centre) + radius; }
   };
-  struct Part {
+  struct EnclosedPiece {
     EnclosingPolytope around;
-    Solid round;
+    PlainRound round;
     Vec3 middle;
     double reach = 0;  ///< no corner is farther from the middle
     Bounds box;
@@ -57,34 +57,34 @@ class Culling {
     std::vector<Plane> planes;  ///< of the former
     bool empty = false;
   };
-  struct Side {
+  struct EnclosedBody {
     const Pieces* pieces = nullptr;
-    std::vector<Part> parts;
+    std::vector<EnclosedPiece> parts;
   };
   /// A wall that a piece may be cut with, and by how much it would be.
-  struct Cut {
+  struct WallCut {
     EnclosingPolytope::Face face;
     double depth;
   };
-  void enclose(const Pieces& pieces, const EnclosingPolytope& common, Side& side);
+  void enclose(const Pieces& pieces, const EnclosingPolytope& common, EnclosedBody& side);
   /// Cuts around_ with the walls of a piece; false if that leaves nothing. Those that it was not cut with, and that may
   /// matter, are left in uncut_.
   bool cut_around(const Pieces& pieces, const Piece& piece);
-  bool keep_walls(const Side& side, int piece, const Part& other, std::vector<int>& kept,
+  bool keep_walls(const EnclosedBody& side, int piece, const EnclosedPiece& other, std::vector<int>& kept,
                   std::vector<Wall>& walls) const;
-  bool beyond(const Solid& round, const EnclosingPolytope& other, Vec3 middle) const;
+  bool beyond(const PlainRound& round, const EnclosingPolytope& other, Vec3 middle) const;
 
   /// A piece along the axis along which all are swept.
   struct Swept {
     double low, high;
     int piece;
   };
-  static void sweep(const Side& side, std::vector<Swept>& swept);
+  static void sweep(const EnclosedBody& side, std::vector<Swept>& swept);
 
-  Side a_, b_;
+  EnclosedBody a_, b_;
   std::vector<Swept> swept_a_, swept_b_;
   EnclosingPolytope around_;  ///< what a piece leaves of the polytope around the common set
-  std::vector<Cut> uncut_;
+  std::vector<WallCut> uncut_;
   double margin_ = 0;  ///< m: of rounding
 };
 

@@ -1,6 +1,7 @@
 #include "methods/round/quadric/ball.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -194,6 +195,17 @@ void add_short_edge(const Edge& edge, const BallAndPolyhedron& at, BallSums& sum
   ++sums.characteristic;
 }
 
+/// The ends of an edge's part inside, along the edge; nothing if there is none. An edge along the sphere may seem to
+/// end on that beyond a corner: the corner counts.
+std::optional<std::array<double, 2>> range_inside(const SeenEdge& edge, bool from_inside, bool to_inside,
+                                                  const Disc& left, const Disc& right) {
+  const double half = std::sqrt(std::max(0.0, left.square - edge.height * edge.height));
+  const double first = edge.first, last = edge.last;
+  if (!from_inside && !to_inside && !(half > 0 && right.square > 0 && first < 0 && last > 0)) return std::nullopt;
+  return std::array{from_inside ? first : std::clamp(-half, first, to_inside ? last : 0),
+                    to_inside ? last : std::clamp(half, from_inside ? first : 0, last)};
+}
+
 void add_edge(const Edge& edge, const BallAndPolyhedron& at, BallSums& sums) {
   if (norm2(at.polyhedron.corners[edge.to] - at.polyhedron.corners[edge.from]) == 0)
     return add_short_edge(edge, at, sums);
@@ -201,12 +213,9 @@ void add_edge(const Edge& edge, const BallAndPolyhedron& at, BallSums& sums) {
   const bool from_inside = at.inside[edge.from], to_inside = at.inside[edge.to];
   const SeenEdge seen(edge, at, left.height);
   add_border(seen, left, right);
-  const double half = std::sqrt(std::max(0.0, left.square - seen.height * seen.height));
-  const double first = seen.first, last = seen.last;
-  if (!from_inside && !to_inside && !(half > 0 && right.square > 0 && first < 0 && last > 0)) return;
-  // An edge along the sphere may seem to end on that beyond a corner: the corner counts.
-  const double from = from_inside ? first : std::clamp(-half, first, to_inside ? last : 0);
-  const double to = to_inside ? last : std::clamp(half, from_inside ? first : 0, last);
+  const auto range = range_inside(seen, from_inside, to_inside, left, right);
+  if (!range) return;
+  const auto [from, to] = *range;
   const auto turn = [&](double t) { return turn_at(t, at.r, seen.cosine, seen.sine, seen.height * seen.other); };
   const int ends = !from_inside + !to_inside;
   left.ends += ends, right.ends += ends;
