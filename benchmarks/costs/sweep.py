@@ -43,8 +43,6 @@ def build(client, *, seed=0):
     p.createMultiBody(1, ball, physicsClientId=client)
 '''
 
-SETTINGS = {"tolerance": 1e-3, "method": "auto", "concave": "decompose", "concave_threshold": 0.05}
-SETTINGS |= {"surface": "nominal", "pairs": None}
 
 GRASP_STEPS = 130
 
@@ -60,7 +58,7 @@ class Cost(NamedTuple):
 
 def swept(scene: Path, steps: int, seeds: str, workers: int) -> Cost:
     """The cost of a whole sweep."""
-    study = Study.of(scene, {"steps": steps, **SETTINGS})
+    study = Study.of(scene, steps)
     space = Space(study.scene, study.loaded().parameters)
     sweep = Sweep(study, space.crossed([space.grid(seeds)]))
     heard: list[tuple[float, float]] = []
@@ -83,7 +81,7 @@ def spent() -> float:
 
 def in_a_worker(scene: Path, steps: int, count: int) -> tuple[float, float]:
     """Seconds of the processor for a run, and for what a task takes beyond it."""
-    study = Study.of(scene, {"steps": steps, **SETTINGS})
+    study = Study.of(scene, steps)
     loaded, do = study.loaded(), prepared(study)
     task = Task("0" * 32, loaded.parameters)
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from overlapper.simulation.bullet.joints import ENDINGS
 from overlapper.simulation.bullet.model_file import NotRead
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.links import link_contacts
+from overlapper.simulation.settings import Modelling
 
 MESHES = (".obj", ".off", ".ply", ".stl", ".3mf", ".glb", ".gltf", ".step", ".stp")
 
@@ -72,16 +72,16 @@ def asset_files(folder: Path) -> list[Path]:
     return found
 
 
-def read_asset(folder: Path, path: Path, units: str, least_depth: float, **settings: Any) -> Asset:
-    """One of the files; `units` are those of meshes that do not say theirs, `settings` those of `simulation.Bodies`.
+def read_asset(folder: Path, path: Path, units: str, least_depth: float, modelling: Modelling) -> Asset:
+    """One of the files; `units` are those of meshes that do not say theirs.
 
-    What overlaps by a depth of `least_depth` (m) or less, or by what the rounding of corners with six digits explains,
-    is taken not to. Whatever is wrong with a file, or a library that it needs and that is missing, is its failure.
+    Overlaps of a depth of `least_depth` (m) or less do not count, nor do those that the rounding of corners to six
+    digits explains. A file that cannot be read, or needs a missing library, has this as its failure.
     """
     name = path.relative_to(folder).as_posix()
     of_kind: Callable[..., Asset] = _model if path.suffix.lower() in ENDINGS else _mesh
     try:
-        return of_kind(name, path, units, least_depth, settings)
+        return of_kind(name, path, units, least_depth, modelling)
     except OSError as error:
         return _unread(name, f"{error.strerror}")
     except (ImportError, NotRead, RuntimeError, ValueError) as error:
@@ -92,8 +92,8 @@ def _unread(name: str, failure: str) -> Asset:
     return Asset(name, failure, 0, 0, None, (), None, ())
 
 
-def _model(name: str, path: Path, units: str, least_depth: float, settings: dict[str, Any]) -> Asset:
-    robot = read_robot(path, **settings)
+def _model(name: str, path: Path, units: str, least_depth: float, modelling: Modelling) -> Asset:
+    robot = read_robot(path, modelling)
     links = robot.tree.links
     skipped = [f"{label}: {link.skipped}" for label, link in zip(robot.link_names, links) if link.skipped]
     met = [each for each in audit(robot, 1, least_depth=least_depth).pairs if not each.pair.adjacent]
@@ -105,7 +105,7 @@ def _model(name: str, path: Path, units: str, least_depth: float, settings: dict
     return Asset(name, "", bodies, len(robot.tree.shapes), None, tuple(skipped), excess, tuple(overlaps))
 
 
-def _mesh(name: str, path: Path, units: str, least_depth: float, settings: dict[str, Any]) -> Asset:
+def _mesh(name: str, path: Path, units: str, least_depth: float, modelling: Modelling) -> Asset:
     from overlapper.polytopes.mesh_file import read_parts
 
     parts = read_parts(path, units)
@@ -123,9 +123,9 @@ def _mesh(name: str, path: Path, units: str, least_depth: float, settings: dict[
             continue
         closed = closed and surface.volume is not None and not surface.open_edges
         try:
-            if settings["concave"] == "skip" and not surface.convex_bodies():
+            if modelling.concave == "skip" and not surface.convex_bodies():
                 raise NotDecomposed("the mesh is concave, and --concave skip asks to leave it out")
-            made = decompose(part.triangles, settings["concave_threshold"], settings["concave"] == "enclose")
+            made = decompose(part.triangles, modelling.concave_threshold, modelling.concave == "enclose")
             placed = [Hull(part.placed(each.vertices)) for each in made.parts]
         except ValueError as error:
             skipped.append(f"{names[number]}: {first_line(error)}")

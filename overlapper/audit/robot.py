@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -18,6 +18,7 @@ from overlapper.printable import first_line
 from overlapper.simulation.bullet.joints import kinematic_tree
 from overlapper.simulation.bullet.model_file import NotRead
 from overlapper.simulation.kinematic_tree import KinematicTree
+from overlapper.simulation.settings import Modelling
 
 TURN = ("x", "y", "z", "w")  # of a spherical joint
 
@@ -130,13 +131,13 @@ def shape_keys(robot: Robot) -> NDArray[np.int64]:
     return np.array(keys, dtype=np.int64).reshape(-1, 3)
 
 
-def read_robot(path: Path, **settings: Any) -> Robot:
-    """The robot of a URDF, SDF or MJCF file; `settings` are those of `simulation.Bodies`.
+def read_robot(path: Path, modelling: Modelling = Modelling()) -> Robot:  # noqa: B008
+    """The robot of a URDF, SDF or MJCF file.
 
     pybullet passes over mimic joints: those of a URDF are read from its text. NotRead if pybullet cannot read it, or if
     a joint mimics one that is not there or, in the end, itself.
     """
-    tree = kinematic_tree(path, **settings)
+    tree = kinematic_tree(path, modelling)
     if path.suffix.lower() != ".urdf":
         return Robot(tree.bodies[0], tree, {})
     root = _root(path)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import typer
 from rich.text import Text
@@ -15,24 +15,25 @@ from overlapper.cli.figures import plain_table, show
 from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Interrupted, input_refusals, quiet, say
 from overlapper.printable import printable
+from overlapper.simulation.settings import Modelling, settings_of
 
 if TYPE_CHECKING:
     from overlapper.audit.assets import Asset
 
 
-def audit_folder(folder: Path, units: str, least_depth: float, settings: Mapping[str, Any], as_json: bool) -> NoReturn:
+def audit_folder(folder: Path, units: str, least_depth: float, modelling: Modelling, as_json: bool) -> NoReturn:
     """Tell of every asset; exit code 1 if anything is wrong with one."""
     try:
         with input_refusals(), quiet():
             from overlapper.audit.assets import asset_files, read_asset
 
             files = asset_files(folder)
-            read = (read_asset(folder, file, units, least_depth, **settings) for file in files)
+            read = (read_asset(folder, file, units, least_depth, modelling) for file in files)
             assets = list(with_progress(read, folder.name, len(files)))
     except KeyboardInterrupt as error:
         raise Interrupted from error
     if as_json:
-        told = {"units": units, "least_depth": least_depth, **settings}
+        told = {"units": units, "least_depth": least_depth, **settings_of(modelling)}
         print(json.dumps({"settings": told, "assets": [asdict(asset) | {"sound": asset.sound} for asset in assets]}))
     else:
         _show(assets)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -11,25 +12,27 @@ from rich.table import Table
 from rich.text import Text
 
 from overlapper.cli.assets import audit_folder
-from overlapper.cli.engine import AddressOption, EngineOption, WorkersOption, engine_of, refuse_address
+from overlapper.cli.engine import working
 from overlapper.cli.figures import VOLUME_UNITS, plain_table, show, volume_unit
 from overlapper.cli.options import (
-    ConcaveOption,
     ExpectOption,
     HtmlOption,
     LeastDepthOption,
-    SurfaceOption,
-    ThresholdOption,
     ToleranceOption,
     expected_pairs,
-    refuse_out_of_range,
+    modelling,
+    refuse_table,
+    refuse_tolerance,
+    with_options,
 )
 from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say
 from overlapper.printable import printable
+from overlapper.simulation.settings import Modelling, settings_of
 
 if TYPE_CHECKING:
     from overlapper.audit.audit import Audit, PairAudit
+    from overlapper.jobs.engines import Engine
 
 LISTED = 20  # pairs at most
 CAPTION = (
@@ -38,6 +41,7 @@ CAPTION = (
 )
 
 
+@with_options(engine=working, modelled=modelling)
 def audit(
     robot: Annotated[
         Path,
@@ -45,6 +49,7 @@ def audit(
             metavar="ROBOT|FOLDER", help="A model, .urdf, .sdf, .xml (MJCF), or a folder of assets.", show_default=False
         ),
     ],
+    *,
     configurations: Annotated[int, typer.Option(min=1, help="How many are looked at.")] = 100_000,
     seed: Annotated[int, typer.Option(min=0, help="Of the random ones.")] = 0,
     expect: ExpectOption = None,
@@ -55,13 +60,9 @@ def audit(
     srdf: Annotated[Path | None, typer.Option(help="SRDF file to write, for a planner.")] = None,
     out: Annotated[Path | None, typer.Option(help="Table of all pairs of links: .csv, .parquet, .sqlite.")] = None,
     html: HtmlOption = None,
-    workers: WorkersOption = None,
-    engine: EngineOption = "processes",
-    address: AddressOption = None,
+    engine: AbstractContextManager[Engine],
     tolerance: ToleranceOption = 1e-3,
-    surface: SurfaceOption = "nominal",
-    concave: ConcaveOption = "decompose",
-    concave_threshold: ThresholdOption = 0.05,
+    modelled: Modelling,
     units: Annotated[
         Literal["mm", "cm", "m", "in"], typer.Option(help="Of meshes in a folder that do not say theirs.")
     ] = "m",
@@ -87,8 +88,8 @@ def audit(
 
     [bold]overlapper audit assets --units mm[/bold]  a folder of models and meshes
     """
-    refuse_out_of_range(tolerance, concave_threshold, out)
-    refuse_address(engine, address)
+    refuse_tolerance(tolerance)
+    refuse_table(out)
     pairs = expected_pairs(expect)
     settings: dict[str, Any] = {
         "configurations": configurations,
@@ -97,16 +98,13 @@ def audit(
         "least_depth": least_depth,
         "against": str(against) if against else None,
         "tolerance": tolerance,
-        "surface": surface,
-        "concave": concave,
-        "concave_threshold": concave_threshold,
+        **settings_of(modelled),
     }
     if robot.is_dir():
         asked = {"--expect": expect, "--against": against, "--srdf": srdf, "--out": out, "--html": html}
         if of_robots := [name for name, value in asked.items() if value]:
             raise Refused(f"{of_robots[0]} is for a robot, and {robot} is a folder")
-        geometry = {"surface": surface, "concave": concave, "concave_threshold": concave_threshold}
-        audit_folder(robot, units, least_depth, geometry, as_json)
+        audit_folder(robot, units, least_depth, modelled, as_json)
     written: list[Path] = []
     try:
         with input_refusals(), quiet():
@@ -123,11 +121,11 @@ def audit(
             can_be_written(out, html, srdf)
             disabled = read_srdf(against) if against else {}
             try:
-                read = read_robot(robot, concave=concave, concave_threshold=concave_threshold, surface=surface)
+                read = read_robot(robot, modelled)
             except NotRead as error:
                 raise Refused(str(error)) from error
             must_name_some(pairs, read.link_names, "link")
-            with engine_of(engine, address, workers) as working:
+            with engine as working:
                 found = look(
                     read,
                     configurations,

@@ -18,7 +18,8 @@ from overlapper.cli.options import (
     LeastDepthOption,
     ThresholdOption,
     expected_pairs,
-    refuse_out_of_range,
+    refuse_table,
+    refuse_threshold,
 )
 from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say
 from overlapper.printable import printable
@@ -68,7 +69,8 @@ def clashes(
 
     [bold]overlapper clashes gearbox.step --expect "bolt*,plate" --least-depth 1e-5[/bold]  what CI asks of an assembly
     """
-    refuse_out_of_range(0.5, concave_threshold, out)
+    refuse_threshold(concave_threshold)
+    refuse_table(out)
     pairs = expected_pairs(expect)
     settings: dict[str, Any] = {
         "units": units,

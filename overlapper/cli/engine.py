@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -26,15 +26,17 @@ WorkersOption = Annotated[
 ]
 
 
-def refuse_address(engine: str, address: str | None) -> None:
-    """Refuse an address that nobody asks for."""
+def working(
+    workers: WorkersOption = None, engine: EngineOption = "processes", address: AddressOption = None
+) -> AbstractContextManager[Engine]:
+    """The engine, for a block. To enter raises NotStarted if there is no cluster, ImportError without Ray."""
     if address and engine != "ray":
         raise Refused("--address is for --engine ray")
+    return _engine(engine, address, workers)
 
 
 @contextmanager
-def engine_of(name: str, address: str | None, workers: int | None) -> Iterator[Engine]:
-    """The engine of that name; NotStarted if there is no cluster, ImportError without Ray."""
+def _engine(name: str, address: str | None, workers: int | None) -> Iterator[Engine]:
     if name == "processes":
         from overlapper.jobs.processes import Processes
 

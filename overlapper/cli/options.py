@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import inspect
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
 from overlapper.cli.refusals import Refused
+from overlapper.simulation.settings import Asking, Modelling
 
 SceneArgument = Annotated[
     str, typer.Argument(help="Name of a scene, or path of a scene file (.py).", show_default=False)
@@ -95,13 +99,84 @@ def expected_pairs(given: list[str] | None) -> list[tuple[str, str]]:
         raise Refused(str(error)) from error
 
 
-def refuse_out_of_range(tolerance: float, concave_threshold: float, out: Path | None) -> None:
-    """Refuse what types cannot."""
-    from overlapper.tables.table_file import TABLES
-
+def refuse_tolerance(tolerance: float) -> None:
+    """Refuse a tolerance that is out of range."""
     if not 0 < tolerance < 1:
         raise Refused(f"--tolerance must lie between 0 and 1, not {tolerance}")
-    if out and out.suffix not in TABLES:
-        raise Refused(f"--out must end in {', '.join(TABLES)}, not {out.name!r}")
+
+
+def refuse_threshold(concave_threshold: float) -> None:
+    """Refuse a threshold that CoACD does not take."""
     if not 0.01 <= concave_threshold <= 1:
         raise Refused(f"--concave-threshold must lie between 0.01 and 1, not {concave_threshold}")
+
+
+def refuse_table(out: Path | None) -> None:
+    """Refuse a table of an unknown kind."""
+    from overlapper.tables.table_file import TABLES
+
+    if out and out.suffix not in TABLES:
+        raise Refused(f"--out must end in {', '.join(TABLES)}, not {out.name!r}")
+
+
+def modelling(
+    concave: ConcaveOption = "decompose", concave_threshold: ThresholdOption = 0.05, surface: SurfaceOption = "nominal"
+) -> Modelling:
+    """How shapes are modelled."""
+    refuse_threshold(concave_threshold)
+    return Modelling(concave, concave_threshold, surface)
+
+
+def asking(method: MethodOption = "auto", tolerance: ToleranceOption = 1e-3, pairs: PairsOption = None) -> Asking:
+    """Which pairs are measured, and how."""
+    refuse_tolerance(tolerance)
+    return Asking(pairs, tolerance, method)
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The files that a run writes, whether rows are of shapes or of links, and whether FCL is asked, too."""
+
+    out: Path | None
+    html: Path | None
+    per: Literal["shape", "link"]
+    check: Literal["fcl"] | None
+
+
+def files(
+    out: OutOption = None, html: HtmlOption = None, check: CheckOption = None, per: PerOption = "shape"
+) -> Written:
+    """The files that a run writes."""
+    refuse_table(out)
+    return Written(out, html, per, check)
+
+
+def with_options(**groups: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """For commands: a parameter of each of these names has the options that the function takes, and is its answer."""
+
+    def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
+        taken = {name: _parameters(make) for name, make in groups.items()}
+        own = _parameters(command, leave=groups.keys())
+        told = {each: value for name, one in own.items() for each, value in taken.get(name, {name: one}).items()}
+
+        @wraps(command)
+        def called(**given: Any) -> Any:
+            made = {name: make(**{each: given.pop(each) for each in taken[name]}) for name, make in groups.items()}
+            return command(**given, **made)
+
+        called.__signature__ = inspect.Signature([*told.values()])  # type: ignore[attr-defined]
+        called.__annotations__ = {name: each.annotation for name, each in told.items()}
+        return called
+
+    return decorated
+
+
+def _parameters(function: Callable[..., Any], leave: Collection[str] = ()) -> dict[str, inspect.Parameter]:
+    """The parameters by name, with their annotations evaluated but for those to `leave`."""
+    where = function.__globals__
+    return {
+        name: each.replace(
+            kind=each.KEYWORD_ONLY, annotation=each.annotation if name in leave else eval(each.annotation, where)
+        )
+        for name, each in inspect.signature(function).parameters.items()
+    }

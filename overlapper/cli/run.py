@@ -6,53 +6,43 @@ import json
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from overlapper.cli.figures import show
 from overlapper.cli.options import (
-    CheckOption,
-    ConcaveOption,
     ContactOption,
-    HtmlOption,
-    MethodOption,
-    OutOption,
-    PairsOption,
-    PerOption,
     SceneArgument,
     SetOption,
-    SurfaceOption,
-    ThresholdOption,
-    ToleranceOption,
+    Written,
+    asking,
+    files,
     given_parameters,
-    refuse_out_of_range,
+    modelling,
+    with_options,
 )
 from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Refused, import_engine, quiet, say, scene_refusals
 from overlapper.scenes.parameters import heading_of
-from overlapper.scenes.scene import Scene, load_scene
+from overlapper.scenes.scene import ContactModel, Scene, load_scene
+from overlapper.simulation.settings import Asking, Modelling, settings_of
 
 if TYPE_CHECKING:
     from overlapper.tables.summary import Summary
 
 
+@with_options(files=files, asked=asking, modelled=modelling)
 def run(
     scene: SceneArgument,
+    *,
     given: SetOption = None,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Steps to simulate; by default as many as the scene says.")
     ] = None,
-    out: OutOption = None,
-    html: HtmlOption = None,
-    check: CheckOption = None,
-    method: MethodOption = "auto",
-    tolerance: ToleranceOption = 1e-3,
-    per: PerOption = "shape",
-    concave: ConcaveOption = "decompose",
-    concave_threshold: ThresholdOption = 0.05,
-    surface: SurfaceOption = "nominal",
-    pairs: PairsOption = None,
+    files: Written,
+    asked: Asking,
+    modelled: Modelling,
     contact: ContactOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
@@ -77,30 +67,22 @@ def run(
 
     [bold]overlapper run kuka_jenga --check fcl --json[/bold]  compared with FCL, for a program to read
     """
-    refuse_out_of_range(tolerance, concave_threshold, out)
     parameters = given_parameters(given)
-    geometry = {
-        "tolerance": tolerance,
-        "method": method,
-        "concave": concave,
-        "concave_threshold": concave_threshold,
-        "surface": surface,
-        "pairs": pairs,
-        "contact": contact,
-    }
     written: list[Path] = []
     try:
-        chosen, summary, finished = _measure(
-            scene, parameters, steps, out, html, check is not None, per, geometry, written
-        )
+        chosen, summary, finished = _measure(scene, parameters, steps, files, asked, modelled, contact, written)
     except Refused as refused:
         kept = f"; what came before is in {' and '.join(map(str, written))}" if written else ""
         raise Refused(f"{refused}{kept}") from refused
     if as_json:
-        files = {name: str(path) for name, path in (("out", out), ("html", html)) if path in written}
-        asked = {**geometry, "contact": contact or chosen.contact, "per": per, "check": check}
-        settings = {"settings": asked, "parameters": chosen.parameters}
-        print(json.dumps(settings | summary.as_dict() | {"finished": finished} | files))
+        places = {name: str(path) for name, path in (("out", files.out), ("html", files.html)) if path in written}
+        settings = settings_of(asked, modelled) | {
+            "contact": contact or chosen.contact,
+            "per": files.per,
+            "check": files.check,
+        }
+        told = {"settings": settings, "parameters": chosen.parameters}
+        print(json.dumps(told | summary.as_dict() | {"finished": finished} | places))
     else:
         _show(chosen.title, summary, finished, written)
     if not finished:
@@ -111,14 +93,13 @@ def _measure(
     name: str,
     parameters: Mapping[str, str],
     steps: int | None,
-    out: Path | None,
-    html: Path | None,
-    check: bool,
-    per: Literal["shape", "link"],
-    geometry: Mapping[str, Any],
+    files: Written,
+    asked: Asking,
+    modelled: Modelling,
+    contact: ContactModel | None,
     written: list[Path],
 ) -> tuple[Scene, Summary, bool]:
-    """The scene, and the run, with its files; False if it was interrupted, and then both have what was done until then.
+    """The scene, its summary, and False if the run was interrupted: then the summary ends with the last step.
 
     `written` gets the files that there are in the end: in their place, or, if the run fails, beside it.
     """
@@ -130,15 +111,25 @@ def _measure(
         from overlapper.tables.summary import Summary
 
         scene = load_scene(name, parameters)
-        fcl = stack.enter_context(Fcl()) if check else None
-        geometry = {**geometry, "contact": geometry["contact"] or scene.contact}
-        settings = {"scene": scene.name, "steps": steps or scene.steps, **geometry, **heading_of(scene.parameters)}
+        fcl = stack.enter_context(Fcl()) if files.check else None
+        steps, contact = steps or scene.steps, contact or scene.contact
+        settings = {"scene": scene.name, "steps": steps, **settings_of(asked, modelled), "contact": contact}
         summary = Summary(scene.name)
-        forces = geometry["contact"] == "volumetric"
-        take = stack.enter_context(outputs(summary, settings, written, out, html, per, fcl, forces))
-        frames = stack.enter_context(closing(frames_of(scene, steps, **geometry)))
+        take = stack.enter_context(
+            outputs(
+                summary,
+                settings | heading_of(scene.parameters),
+                written,
+                files.out,
+                files.html,
+                files.per,
+                fcl,
+                contact == "volumetric",
+            )
+        )
+        frames = stack.enter_context(closing(frames_of(scene, steps, asked, modelled, contact)))
         try:
-            for frame in with_progress(frames, scene.name, steps or scene.steps):
+            for frame in with_progress(frames, scene.name, steps):
                 take(frame)
         except KeyboardInterrupt:
             if not summary.steps:

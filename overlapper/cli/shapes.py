@@ -12,21 +12,22 @@ from rich.table import Table
 from rich.text import Text
 
 from overlapper.cli.figures import plain_table, show
-from overlapper.cli.options import ConcaveOption, SurfaceOption, ThresholdOption
+from overlapper.cli.options import modelling, with_options
 from overlapper.cli.refusals import Refused, say
 from overlapper.printable import printable
+from overlapper.simulation.settings import Modelling
 
 if TYPE_CHECKING:
     from overlapper.simulation.bullet.inventory import Inventory, ListedShape
 
 
+@with_options(modelled=modelling)
 def shapes(
     file: Annotated[
         Path, typer.Argument(help="A model or a scene: .urdf, .sdf, .xml (MJCF), .bullet.", show_default=False)
     ],
-    surface: SurfaceOption = "nominal",
-    concave: ConcaveOption = "decompose",
-    concave_threshold: ThresholdOption = 0.05,
+    *,
+    modelled: Modelling,
     self_collision: Annotated[
         bool, typer.Option("--self-collision", help="Load it with pybullet's URDF_USE_SELF_COLLISION.")
     ] = False,
@@ -46,7 +47,7 @@ def shapes(
     from overlapper.simulation.bullet.model_file import NotRead
 
     try:
-        found = inventory(file, self_collision, surface=surface, concave=concave, concave_threshold=concave_threshold)
+        found = inventory(file, self_collision, modelled)
     except (NotRead, ImportError) as error:
         raise Refused(str(error)) from error
     if as_json:

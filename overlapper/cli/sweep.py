@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,21 +13,18 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from overlapper.cli.engine import AddressOption, EngineOption, WorkersOption, engine_of, refuse_address
+from overlapper.cli.engine import working
 from overlapper.cli.options import (
-    ConcaveOption,
     ContactOption,
-    MethodOption,
-    PairsOption,
     SceneArgument,
     SetOption,
-    SurfaceOption,
-    ThresholdOption,
-    ToleranceOption,
+    asking,
     given_parameters,
-    refuse_out_of_range,
+    modelling,
+    with_options,
 )
 from overlapper.cli.refusals import Refused, import_engine, input_refusals, quiet, say, scene_refusals
+from overlapper.simulation.settings import Asking, Modelling
 
 if TYPE_CHECKING:
     from overlapper.jobs.engines import Engine
@@ -40,11 +38,26 @@ FAILURES_SHOWN = 5
 MOVED_SHOWN = 10
 
 
-def sweep(
-    scene: SceneArgument,
-    out: Annotated[
-        Path, typer.Option(help="Folder of the sweep; what is there is not done again.", show_default=False)
-    ],
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """What is crossed to the points of a sweep."""
+
+    grid: list[str] | None
+    seeds: int | None
+    points: Path | None
+    sample: int | None
+    ranges: list[str] | None
+    sample_seed: int
+
+    def of(self, space: Space) -> list[list[Point]]:
+        """The points of each axis, seeds last."""
+        axes = [space.read(self.points)] if self.points else []
+        axes += [space.samples(self.sample, self.ranges or [], self.sample_seed)] if self.sample else []
+        axes += [space.grid(each) for each in self.grid or ()]
+        return axes + ([space.seeds(self.seeds)] if self.seeds else [])
+
+
+def axes(
     grid: Annotated[
         list[str] | None,
         typer.Option(
@@ -69,6 +82,21 @@ def sweep(
         ),
     ] = None,
     sample_seed: Annotated[int, typer.Option(min=0, help="Another one draws other points.")] = 0,
+) -> Axes:
+    """What is crossed to the points of a sweep."""
+    if ranges and not sample:
+        raise Refused("--range says what --sample draws, and there is no --sample")
+    return Axes(grid, seeds, points, sample, ranges, sample_seed)
+
+
+@with_options(axes=axes, engine=working, asked=asking, modelled=modelling)
+def sweep(
+    scene: SceneArgument,
+    out: Annotated[
+        Path, typer.Option(help="Folder of the sweep; what is there is not done again.", show_default=False)
+    ],
+    *,
+    axes: Axes,
     given: SetOption = None,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Steps of each task; by default as many as the scene says.")
@@ -80,20 +108,14 @@ def sweep(
         float | None, typer.Option(min=0.001, help="Seconds that a task may take; then it has failed.")
     ] = None,
     retry: Annotated[bool, typer.Option("--retry", help="Do tasks again that have failed.")] = False,
-    workers: WorkersOption = None,
-    engine: EngineOption = "processes",
-    address: AddressOption = None,
+    engine: AbstractContextManager[Engine],
     check: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="A recorded sweep: say what has moved since.", show_default=False),
     ] = None,
     pages: Annotated[int, typer.Option(min=0, help="Pages of so many of the worst tasks, beside the summary.")] = 0,
-    method: MethodOption = "auto",
-    tolerance: ToleranceOption = 1e-3,
-    concave: ConcaveOption = "decompose",
-    concave_threshold: ThresholdOption = 0.05,
-    surface: SurfaceOption = "nominal",
-    pairs: PairsOption = None,
+    asked: Asking,
+    modelled: Modelling,
     contact: ContactOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the text.")] = False,
 ) -> None:
@@ -118,23 +140,10 @@ def sweep(
 
     [bold]overlapper sweep box_pile --seeds 50 --out today --check piles[/bold]
     """
-    refuse_out_of_range(tolerance, concave_threshold, None)
     parameters = given_parameters(given)
     kept = _kept(steps_kept)
-    refuse_address(engine, address)
     if check and check.resolve() == out.resolve():
         raise Refused("--check and --out are the same folder")
-    if ranges and not sample:
-        raise Refused("--range says what --sample draws, and there is no --sample")
-    settings: dict[str, Any] = {
-        "steps": steps,
-        "tolerance": tolerance,
-        "method": method,
-        "concave": concave,
-        "concave_threshold": concave_threshold,
-        "surface": surface,
-        "pairs": pairs,
-    }
     with ExitStack() as stack:
         noise = stack.enter_context(quiet())
         stack.enter_context(scene_refusals(noise))
@@ -152,12 +161,12 @@ def sweep(
         chosen = load_scene(scene, parameters)
         must_be_no_columns(chosen.parameters)
         space = Space(chosen.name, chosen.parameters, parameters.keys())
-        settings |= {"steps": steps or chosen.steps, "contact": contact or chosen.contact}
-        study = Study.of(find_scene(scene), settings, kept)
-        todo = Sweep(study, space.crossed(_axes(space, grid, seeds, points, sample, ranges, sample_seed)))
+        contact = contact or chosen.contact
+        study = Study.of(find_scene(scene), steps or chosen.steps, contact, asked, modelled, kept)
+        todo = Sweep(study, space.crossed(axes.of(space)))
         recorded = Recorded(check, chosen.expected, todo) if check else None
         store = stack.enter_context(todo.opened(out))
-        working = stack.enter_context(engine_of(engine, address, workers))
+        working = stack.enter_context(engine)
         reached, finished = _run(todo, store, working, limit, retry)
         compared = recorded.compare(store) if recorded and finished else None
         done = store.done & todo.tasks.keys()
@@ -174,22 +183,6 @@ def _kept(text: str) -> int:
     if every and int(every[1]):
         return int(every[1])
     raise Refused(f"--steps-kept must be summary, 'every N' or all, not {text!r}")
-
-
-def _axes(
-    space: Space,
-    grid: list[str] | None,
-    seeds: int | None,
-    points: Path | None,
-    sample: int | None,
-    ranges: list[str] | None,
-    sample_seed: int,
-) -> list[list[Point]]:
-    """What is to be crossed, seeds last."""
-    axes = [space.read(points)] if points else []
-    axes += [space.samples(sample, ranges or [], sample_seed)] if sample else []
-    axes += [space.grid(each) for each in grid or ()]
-    return axes + ([space.seeds(seeds)] if seeds else [])
 
 
 def _run(todo: Sweep, store: Store, engine: Engine, limit: float | None, retry: bool) -> tuple[Reached, bool]:

@@ -5,33 +5,31 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from overlapper.cli.figures import show
 from overlapper.cli.options import (
-    CheckOption,
-    ConcaveOption,
-    HtmlOption,
-    MethodOption,
-    OutOption,
-    PerOption,
-    SurfaceOption,
-    ThresholdOption,
-    ToleranceOption,
-    refuse_out_of_range,
+    Written,
+    asking,
+    files,
+    modelling,
+    with_options,
 )
 from overlapper.cli.refusals import Refused, say
 from overlapper.printable import first_line
+from overlapper.simulation.settings import Asking, Modelling, settings_of
 
 if TYPE_CHECKING:
-    from overlapper.scenes.watching import How, Watches
+    from overlapper.scenes.watching import Watches
 
 
+@with_options(files=files, asked=asking, modelled=modelling)
 def watch(
     script: Annotated[
         Path, typer.Argument(help="A Python script that steps pybullet.", show_default=False, metavar="SCRIPT.py")
@@ -39,20 +37,11 @@ def watch(
     arguments: Annotated[
         list[str] | None, typer.Argument(help="Arguments of the script.", show_default=False, metavar="[ARGS]...")
     ] = None,
+    *,
     every: Annotated[int, typer.Option(min=1, help="Steps from one that is measured to the next.")] = 1,
-    out: OutOption = None,
-    html: HtmlOption = None,
-    check: CheckOption = None,
-    method: MethodOption = "auto",
-    tolerance: ToleranceOption = 1e-3,
-    per: PerOption = "shape",
-    concave: ConcaveOption = "decompose",
-    concave_threshold: ThresholdOption = 0.05,
-    surface: SurfaceOption = "nominal",
-    pairs: Annotated[
-        Literal["simulated", "all"],
-        typer.Option(help="Pairs that the simulator lets collide, or all of different bodies."),
-    ] = "simulated",
+    files: Written,
+    asked: Asking,
+    modelled: Modelling,
     direct: Annotated[
         bool, typer.Option("--direct", help="Give the script no window if it asks for one: pybullet.DIRECT for GUI.")
     ] = False,
@@ -73,20 +62,10 @@ def watch(
 
     [bold]overlapper watch --direct my_script.py[/bold]  a script that opens a window, on a machine without a screen
     """
-    refuse_out_of_range(tolerance, concave_threshold, out)
     if not script.is_file():
         raise Refused(f"there is no script {script}")
-    how: How = {
-        "every": every,
-        "pairs": pairs,
-        "surface": surface,
-        "concave": concave,
-        "concave_threshold": concave_threshold,
-        "tolerance": tolerance,
-        "method": method,
-        "per": per,
-        "check": check,
-    }
+    asked = replace(asked, pairs=asked.pairs or "simulated")
+    how = {"every": every, **settings_of(asked, modelled), "per": files.per, "check": files.check}
     try:
         from overlapper.reference import Fcl
         from overlapper.scenes.watching import Watches
@@ -96,9 +75,9 @@ def watch(
         from overlapper.simulation.bullet.windows import open_no_window, tell_of_windows
         from overlapper.tables.outputs import can_be_written
 
-        if check:
+        if files.check:
             Fcl().close()
-        can_be_written(out, html)
+        can_be_written(files.out, files.html)
     except ImportError as error:
         raise Refused(str(error)) from error
     except OSError as error:
@@ -109,10 +88,10 @@ def watch(
         sentence = f"{script} asks pybullet for a window, and there is no screen to show it on, so pybullet ends it"
         tell_of_windows(lambda: say(f"overlapper: {sentence}: --direct runs it without one", sys.stderr))
     # What ends the script is not to be taken for something of ours.
-    return lambda: _run(script, arguments or [], Watches(script.name, out, html, how), how, as_json)
+    return lambda: _run(script, arguments or [], Watches(script.name, files.out, files.html, how), how, as_json)
 
 
-def _run(script: Path, arguments: list[str], watches: Watches, how: How, as_json: bool) -> int:
+def _run(script: Path, arguments: list[str], watches: Watches, how: Mapping[str, Any], as_json: bool) -> int:
     from overlapper.scenes.script import end_as, run_script
 
     process = os.getpid()
@@ -159,7 +138,7 @@ def _show(watches: Watches, interrupted: bool) -> None:
         say(f"Interrupted after step {watches.all[-1].steps}; what came before is kept.", sys.stderr)
 
 
-def _say_json(watches: Watches, how: How, finished: bool) -> None:
+def _say_json(watches: Watches, how: Mapping[str, Any], finished: bool) -> None:
     simulations = [
         watch.summary.as_dict() | {"measured": watch.measured, "written": [str(path) for path in watch.written]}
         for watch in watches.all

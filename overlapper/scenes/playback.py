@@ -17,6 +17,7 @@ from overlapper.scenes.run import run
 from overlapper.scenes.scene import ContactModel, Scene, load_scene
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.links import link_contacts
+from overlapper.simulation.settings import Asking, Modelling, read_settings
 from overlapper.tables.frame import Frame
 from overlapper.tables.still import Still
 from overlapper.tables.table import Row, link_rows, rows
@@ -95,28 +96,16 @@ def _views(expected: Expected) -> Generator[View, None, None]:
         yield Frame(step, step * STEP, still, still.contacts(expected.tolerance))
 
 
-def _settings(path: Path, metadata: dict[str, str]) -> dict[str, Any]:
-    """The settings in a table's heading that `run` takes, which knows what each may be."""
-    kinds = {
-        "tolerance": float,
-        "method": str,
-        "surface": str,
-        "concave": str,
-        "concave_threshold": float,
-        "pairs": str,
-        "contact": str,
-    }
-    try:
-        return {name: kind(metadata[name]) for name, kind in kinds.items() if metadata.get(name, "None") != "None"}
-    except ValueError as error:
-        raise ValueError(f"{path} has a setting that is none: {error}") from error
-
-
 def _held_against(
     path: Path, scene: Scene, metadata: dict[str, str], recorded: list[Row], playback: Playback
 ) -> Generator[View, None, None]:
     found: list[Row] = []
-    for frame in run(scene, playback.total, **_settings(path, metadata)):
+    try:
+        asking, modelling = read_settings(Asking, metadata), read_settings(Modelling, metadata)
+    except ValueError as error:
+        raise ValueError(f"{path} has a setting that is none: {error}") from error
+    contact: Any = metadata.get("contact")
+    for frame in run(scene, playback.total, asking, modelling, None if contact == "None" else contact):
         where = frame.step, frame.time, frame.bodies
         if metadata.get("per") == "link":
             found += link_rows(*where, link_contacts(frame.contacts))

@@ -10,7 +10,7 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from overlapper.reference import Fcl
 from overlapper.simulation.asked_pairs import Among
@@ -18,27 +18,13 @@ from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.cautions import SelfCollisionWarning, SkippedShapeWarning
 from overlapper.simulation.engine import Happening
 from overlapper.simulation.engine import engine as engine_of
-from overlapper.simulation.model import Concave, Settings, Surface
+from overlapper.simulation.settings import Asking, Concave, Method, Modelling, Surface, settings_of
 from overlapper.tables.frame import Frame
 from overlapper.tables.outputs import Per, can_be_written, outputs
 from overlapper.tables.summary import Summary
 
 if TYPE_CHECKING:
     from overlapper.simulation import Recorder
-
-
-class How(TypedDict, total=False):
-    """The options of a Watch, without its simulation and its files."""
-
-    every: int
-    pairs: Among
-    surface: Surface
-    concave: Concave
-    concave_threshold: float
-    tolerance: float
-    method: Literal["auto", "paper"]
-    per: Per
-    check: Literal["fcl"] | None
 
 
 class Watch:
@@ -77,7 +63,7 @@ class Watch:
         concave: Concave = "decompose",
         concave_threshold: float = 0.05,
         tolerance: float = 1e-3,
-        method: Literal["auto", "paper"] = "auto",
+        method: Method = "auto",
         per: Per = "shape",
         check: Literal["fcl"] | None = None,
         recorder: Recorder | None = None,
@@ -92,7 +78,8 @@ class Watch:
             raise ValueError(f"check must be 'fcl' or None, not {check!r}")
         if per not in get_args(Per):
             raise ValueError(f"per must be 'shape' or 'link', not {per!r}")
-        Settings(concave, concave_threshold, surface)
+        self._modelling = Modelling(concave, concave_threshold, surface)
+        self._asking = Asking(pairs, tolerance, method)
         self.physicsClientId = physicsClientId
         self.out, self.html = (Path(path) if path else None for path in (out, html))
         can_be_written(self.out, self.html)
@@ -105,13 +92,7 @@ class Watch:
         self.written: list[Path] = []
         """The files that there are, once the watch is over."""
         self.open = True
-        self._how_read = {
-            "concave": concave,
-            "concave_threshold": concave_threshold,
-            "surface": surface,
-            "names": names,
-        }
-        self._asked: dict[str, Any] = {"tolerance": tolerance, "method": method, "pairs": pairs}
+        self._names = names
         self._fcl = Fcl() if check else None
         self._simulation = of_engine.running(physicsClientId, recorder)
         self._bodies: AnyBodies | None = None
@@ -154,10 +135,10 @@ class Watch:
             # The summary names what is left out. Only what is told here is not said.
             for kind in (SkippedShapeWarning, SelfCollisionWarning):
                 warnings.filterwarnings("ignore", category=kind, module=rf"{__name__}$")
-            self._bodies = self._simulation.bodies(**self._how_read)
+            self._bodies = self._simulation.bodies(**settings_of(self._modelling), names=self._names)
         else:
             self._bodies.update()
-        contacts = self._bodies.overlaps(**self._asked)
+        contacts = self._bodies.overlaps(**settings_of(self._asking))
         with interrupted_later():
             if self._take is None:
                 self._take = self._begun(self._bodies)
@@ -166,7 +147,12 @@ class Watch:
 
     def _begun(self, bodies: AnyBodies) -> Callable[[Frame[AnyBodies]], None]:
         """The function that takes the frames; the files are there from now on."""
-        settings = {"simulation": self.summary.scene, "every": self.every, **self._asked, **bodies.settings}
+        settings = {
+            "simulation": self.summary.scene,
+            "every": self.every,
+            **settings_of(self._asking),
+            **bodies.settings,
+        }
         files = outputs(self.summary, settings, self.written, self.out, self.html, self._per, self._fcl)
         return self._files.enter_context(files)
 
@@ -208,7 +194,7 @@ class Watches:
     that client, and goes to `failed`, not to the code that makes steps.
     """
 
-    def __init__(self, name: str, out: Path | None, html: Path | None, how: How) -> None:
+    def __init__(self, name: str, out: Path | None, html: Path | None, how: Mapping[str, Any]) -> None:
         self._name, self._out, self._html, self._how = name, out, html, how
         self.all: list[Watch] = []
         """Those that have measured something, in the order in which they began to."""

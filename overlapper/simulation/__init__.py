@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from overlapper.simulation.forces.contact import VolumetricContact
     from overlapper.simulation.forces.forces import Forces
     from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
-    from overlapper.simulation.model import Concave, Decomposed, Skipped, Surface
+    from overlapper.simulation.model import Decomposed, Skipped
     from overlapper.simulation.report import Report
+    from overlapper.simulation.settings import Concave, Surface
 
 __all__ = [
     "Among",
@@ -56,7 +57,8 @@ __getattr__ = lazily(
         "asked_pairs": ("Among",),
         "bullet.bodies": ("Bodies",),
         "contacts": ("Contact", "Contacts"),
-        "model": ("Concave", "Decomposed", "Skipped", "Surface"),
+        "model": ("Decomposed", "Skipped"),
+        "settings": ("Concave", "Surface"),
         "cautions": ("NoDirectionWarning", "SelfCollisionWarning", "SkippedShapeWarning", "SubstepsWarning"),
         "forces.contact": ("VolumetricContact",),
         "forces.forces": ("Forces",),

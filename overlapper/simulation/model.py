@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from overlapper import Shape
-from overlapper.polytopes.decomposition import check_threshold
 from overlapper.simulation.height_field import HeightField
 
 Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]
-Concave = Literal["decompose", "enclose", "skip"]
-Surface = Literal["nominal", "margin"]
 
 Link = tuple[int, int]
 """Body and link, -1 for the base."""
@@ -103,21 +99,6 @@ class Ground:
 
     def prism(self, number: int) -> ModelledShape:
         return ModelledShape(BASE, number, self.field.prism(number), self.position, self.orientation)
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """How shapes are modelled: see `simulation.Bodies`. ValueError for an invalid setting."""
-
-    concave: Concave
-    threshold: float
-    surface: Surface
-
-    def __post_init__(self) -> None:
-        for name, choices in (("concave", get_args(Concave)), ("surface", get_args(Surface))):
-            if (chosen := getattr(self, name)) not in choices:
-                raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, not {chosen!r}")
-        check_threshold(self.threshold)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,12 @@ import numpy as np
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, RoundedHull, Shape, Sphere
 from overlapper.polytopes.decomposition import Decomposition, NotDecomposed, decompose
 from overlapper.quaternion import composed, rotated
-from overlapper.simulation.model import Leaf, ModelledShape, Settings
+from overlapper.simulation.model import Leaf, ModelledShape
+from overlapper.simulation.settings import Modelling
 
 
 def modelled(
-    link: int, leaves: tuple[Leaf, ...], settings: Settings
+    link: int, leaves: tuple[Leaf, ...], modelling: Modelling
 ) -> tuple[list[ModelledShape], list[str], list[tuple[range, Decomposition]]]:
     """The leaves of a link as shapes, a reason for each that has none, and which shapes are parts of a concave mesh."""
     made: list[ModelledShape] = []
@@ -27,11 +28,11 @@ def modelled(
         try:
             shapes: Sequence[Shape]
             if leaf.kind == "concave mesh":
-                mesh = _solid(leaf.figures.tobytes(), settings)
+                mesh = _solid(leaf.figures.tobytes(), modelling)
                 shapes = mesh.parts
                 meshes.append((range(first, first + len(shapes)), mesh))
             else:
-                margin = leaf.margin if settings.surface == "margin" else 0.0
+                margin = leaf.margin if modelling.surface == "margin" else 0.0
                 shapes = [_shape(leaf.kind, leaf.figures.tobytes(), margin)]
         except ValueError as error:
             reasons.append(str(error))
@@ -43,11 +44,11 @@ def modelled(
     return made, reasons, meshes
 
 
-def _solid(data: bytes, settings: Settings) -> Decomposition:
+def _solid(data: bytes, modelling: Modelling) -> Decomposition:
     """A concave mesh as convex parts. NotDecomposed says why there are none."""
-    if settings.concave == "skip":
+    if modelling.concave == "skip":
         raise NotDecomposed("a concave mesh is left out, as concave='skip' asks")
-    found = _decomposition(data, settings.concave == "enclose", settings.threshold)
+    found = _decomposition(data, modelling.concave == "enclose", modelling.concave_threshold)
     if isinstance(found, NotDecomposed):
         raise NotDecomposed(str(found))
     return found

@@ -1,4 +1,4 @@
-"""What a task comes to: one row of the figures that people plot."""
+"""The measures of a task: one row of the figures that people plot."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.simulation.links import LinkContact, link_contacts
+from overlapper.simulation.links import LinkContact
+from overlapper.tables.summary import Links, PairSummary, overlapping_links
 
 if TYPE_CHECKING:
     from overlapper.tables.frame import Frame
@@ -37,29 +38,15 @@ MEASURES: dict[str, type] = {
 # What volumetric contact adds: the largest force between two links.
 FORCES: dict[str, type] = {"largest_force_n": float, "hardest_step": int, "hardestA": str, "hardestB": str}
 
-Links = tuple[int, int, int, int]
-
 
 @dataclass(slots=True)
-class _Pair:
-    """Two links so far: the largest volume, depth and force, each with its step, and the sum of the wrenches."""
+class _Pair(PairSummary):
+    """Two links so far, with the sum of their wrenches."""
 
-    volume: float = 0.0
-    volume_error: float = 0.0
-    volume_step: int = 0
-    depth: float = 0.0
-    depth_step: int = 0
-    force: float = 0.0
-    force_step: int = 0
     wrench: NDArray[np.float64] = field(default_factory=lambda: np.zeros(6))
 
-    def add(self, step: int, pair: LinkContact, force: float) -> None:
-        if force > self.force:
-            self.force, self.force_step = force, step
-        if pair.volume > self.volume:
-            self.volume, self.volume_error, self.volume_step = pair.volume, pair.volume_error, step
-        if pair.depth > self.depth:
-            self.depth, self.depth_step = pair.depth, step
+    def add(self, step: int, pair: LinkContact, force: float = 0.0) -> None:
+        PairSummary.add(self, step, pair, force)  # super() does not know a dataclass with slots
         self.wrench += unit_wrench(pair)
 
 
@@ -83,22 +70,20 @@ class Measures:
         self._steps, self._time, self._contact = 0, 0.0, 0.0
         self._volume = 0.0
         self._pairs: dict[Links, _Pair] = {}
-        self._names: dict[tuple[int, int], str] = {}
 
     def add(self, frame: Frame[Any]) -> None:
         """Take in the next step."""
         passed, self._time = frame.time - self._time, frame.time
         self._steps += 1
-        found = [pair for pair in link_contacts(frame.contacts) if pair]
-        if not found:
-            return
-        self._contact += passed
-        self._names |= frame.bodies.names
-        between = {} if frame.forces is None else frame.forces.between_links()
-        for pair in found:
-            links = pair.bodyA, pair.linkA, pair.bodyB, pair.linkB
-            self._pairs.setdefault(links, _Pair()).add(frame.step, pair, float(np.linalg.norm(between.get(links, 0.0))))
+        touched = False
+        for links, pair, force in overlapping_links(frame):
+            names = frame.bodies.names
+            known = self._pairs.setdefault(links, _Pair((names[links[:2]], names[links[2:]])))
+            known.add(frame.step, pair, force)
             self._volume += pair.volume
+            touched = True
+        if touched:
+            self._contact += passed
 
     def row(self) -> dict[str, Value]:
         """The columns of MEASURES and of FORCES."""
@@ -113,19 +98,16 @@ class Measures:
             "largest_force_n": 0.0,
         }
         if self._pairs:
-            links, worst = max(self._pairs.items(), key=lambda item: item[1].volume)
+            worst = max(self._pairs.values(), key=lambda pair: pair.volume)
             row |= {"largest_volume_m3": worst.volume, "largest_volume_error_m3": worst.volume_error}
-            row |= {"worst_step": worst.volume_step, **self._named("worst", links)}
+            row |= {"worst_step": worst.volume_step, "worstA": worst.names[0], "worstB": worst.names[1]}
             wrench = (worst.wrench / self._steps).tolist()
             row |= dict(zip((name for name in MEASURES if name.startswith(("mean_force", "mean_torque"))), wrench))
-            links, deepest = max(self._pairs.items(), key=lambda item: item[1].depth)
+            deepest = max(self._pairs.values(), key=lambda pair: pair.depth)
             row |= {"largest_depth_m": deepest.depth, "deepest_step": deepest.depth_step}
-            row |= self._named("deepest", links)
-            links, hardest = max(self._pairs.items(), key=lambda item: item[1].force)
+            row |= {"deepestA": deepest.names[0], "deepestB": deepest.names[1]}
+            hardest = max(self._pairs.values(), key=lambda pair: pair.force)
             if hardest.force:
                 row |= {"largest_force_n": hardest.force, "hardest_step": hardest.force_step}
-                row |= self._named("hardest", links)
+                row |= {"hardestA": hardest.names[0], "hardestB": hardest.names[1]}
         return row
-
-    def _named(self, word: str, links: Links) -> dict[str, Value]:
-        return {f"{word}A": self._names[links[:2]], f"{word}B": self._names[links[2:]]}

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from overlapper.scenes.run import run
+from overlapper.simulation.settings import Asking, Modelling, settings_of
 from overlapper.sweep import charts
 from overlapper.sweep.comparison import Comparison, mean_force
 from overlapper.sweep.part import FAILURES, TASKS
@@ -30,10 +30,6 @@ WORST = 10
 
 # Parameters drawn at most, the first ones: of more, a page of pictures would be no summary.
 DRAWN = 5
-
-# What `overlapper view` measures by, and the options of `overlapper run` for anything else.
-DEFAULTS = {"tolerance": 1e-3, "method": "auto", "concave": "decompose", "concave_threshold": 0.05}
-DEFAULTS |= {"surface": "nominal", "pairs": None}
 
 MOVED = charts.Measure("moved", "tasks that moved, %", 100.0)
 
@@ -92,25 +88,24 @@ def _view(row: Row) -> Path:
 def _show(sweep: Sweep, row: Row, place: Path) -> None:
     """The page of a task, as the command beside it writes it."""
     place.parent.mkdir(exist_ok=True)
-    scene = sweep.study.loaded(sweep.tasks[row["task"]].parameters)
-    settings = dict(sweep.study.settings)
-    with recorder(place, []) as record, closing(run(scene, settings.pop("steps"), **settings)) as frames:
+    parameters = sweep.tasks[row["task"]].parameters
+    with recorder(place, []) as record, closing(sweep.study.frames(parameters)) as frames:
         for frame in frames:
             record(frame)
 
 
 def command(sweep: Sweep, scene: str, row: Row, place: Path) -> str:
     """What writes the page of a task, as a shell takes it."""
-    study = sweep.study
+    study, settings = sweep.study, sweep.study.settings
     defaults = study.loaded()
     words = [f"--set={name}={row[name]}" for name, value in defaults.parameters.items() if row[name] != value]
     for name, value in (("steps", defaults.steps), ("contact", defaults.contact)):
-        if study.settings[name] != value:
-            words.append(f"--{name}={study.settings[name]}")
+        if settings[name] != value:
+            words.append(f"--{name}={settings[name]}")
     others = [
-        f"--{name.replace('_', '-')}={study.settings[name]}"
-        for name, value in DEFAULTS.items()
-        if study.settings[name] != value
+        f"--{name.replace('_', '-')}={settings[name]}"
+        for name, value in settings_of(Asking(), Modelling()).items()  # of `overlapper view`
+        if settings[name] != value
     ]
     return shlex.join(["overlapper", "run" if others else "view", scene, *words, *others, f"--html={place}"])
 

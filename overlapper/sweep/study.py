@@ -4,35 +4,55 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from overlapper.scenes.parameters import Parameter
-from overlapper.scenes.scene import Scene, scene_of
+from overlapper.scenes.run import run
+from overlapper.scenes.scene import ContactModel, Scene, scene_of
+from overlapper.simulation.bodies import AnyBodies
+from overlapper.simulation.settings import Asking, Modelling, settings_of
+from overlapper.tables.frame import Frame
 from overlapper.tables.table_file import origin
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """A scene as its file was read, with the settings of every run of it.
+    """A scene as its file was read, and how it is run: for `steps` steps, as `scenes.run.run` takes the rest.
 
-    `settings` are `steps` and those of `scenes.run.run`; `kept` is the number of steps from one whose rows are kept to
-    the next, 0 for none. `versions` are those of what measures: other ones may find other bits.
+    The rows of every step that `kept` divides are kept, of none if it is 0. `versions` are those of the packages that
+    measure: other versions may find other bits.
     """
 
     scene: str
     path: str
     source: bytes
-    settings: Mapping[str, Any]
+    steps: int
+    contact: ContactModel
+    asking: Asking
+    modelling: Modelling
     kept: int
     versions: Mapping[str, str]
 
     @classmethod
-    def of(cls, path: Path, settings: Mapping[str, Any], kept: int = 0) -> Study:
-        """Of the file as it is now."""
-        return cls(path.stem, str(path), path.read_bytes(), dict(settings), kept, origin())
+    def of(
+        cls,
+        path: Path,
+        steps: int,
+        contact: ContactModel = "bullet",
+        asking: Asking = Asking(),  # noqa: B008
+        modelling: Modelling = Modelling(),  # noqa: B008
+        kept: int = 0,
+    ) -> Study:
+        """The study of the file as it is now."""
+        return cls(path.stem, str(path), path.read_bytes(), steps, contact, asking, modelling, kept, origin())
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """How the scene is run, by the names of options."""
+        return {"steps": self.steps, **settings_of(self.asking, self.modelling), "contact": self.contact}
 
     def loaded(self, parameters: Mapping[str, Parameter] | None = None) -> Scene:
         """The scene, with its defaults if not with other parameters. SceneError says what is wrong with it.
@@ -41,6 +61,10 @@ class Study:
         """
         scene = scene_of(Path(self.path), self.source)
         return scene if parameters is None else replace(scene, parameters=dict(parameters))
+
+    def frames(self, parameters: Mapping[str, Parameter]) -> Generator[Frame[AnyBodies], None, None]:
+        """The frames of a run with these parameters."""
+        return run(self.loaded(parameters), self.steps, self.asking, self.modelling, self.contact)
 
     def identity(self) -> dict[str, str]:
         """All that tells this study from another, by name, as text."""

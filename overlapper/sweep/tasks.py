@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import closing
 
-from overlapper.scenes.run import run
 from overlapper.sweep.measures import Measures
 from overlapper.sweep.part import STEPS, TASKS, part
 from overlapper.sweep.study import Study, Task
@@ -21,14 +20,11 @@ def prepared(study: Study) -> Callable[[Task], Parts]:
     if here != dict(study.versions):
         raise ValueError(f"the sweep is of {_said(study.versions)}, but here is {_said(here)}")
     heading = study.identity()
-    settings = dict(study.settings)
-    steps = settings.pop("steps")
 
     def done(task: Task) -> Parts:
-        scene = study.loaded(task.parameters)
         measures = Measures()
         kept: list[Row] = []
-        with closing(run(scene, steps, **settings)) as frames:
+        with closing(study.frames(task.parameters)) as frames:
             for frame in frames:
                 measures.add(frame)
                 if study.kept and frame.step % study.kept == 0:

@@ -1,9 +1,9 @@
-"""What a run came to: the figures of each pair of links, what FCL said of it, and how little had to be modelled."""
+"""The summary of a run: the figures of each pair of links, the answers of FCL, and what was not modelled."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,14 +18,18 @@ if TYPE_CHECKING:
     from overlapper.tables.frame import Frame
 
 
+Links = tuple[int, int, int, int]  # bodyA, linkA, bodyB, linkB
+
+
 @dataclass(slots=True)
 class PairSummary:
-    """Two links over a run, by their `names`: in how many `steps` they overlap, and the figures of the worst.
+    """Two links over a run, by their `names`: in how many `steps` they overlap, and their largest figures.
 
-    `volume`, with its `volume_error`, is the largest, in m³ and of the links as a whole, where the shapes of one
-    overlap each other counted once; `volume_step` is the step in which it was met. `depth`, met in `depth_step`, is the
-    largest of two of their shapes, in m, and `normal` is its normal, from the second link to the first. `force`, met in
-    `force_step`, is the largest that pushes the two apart, in N, with volumetric contact.
+    - `volume` ± `volume_error`: the largest volume, in m³, in step `volume_step`. It is the volume common to the links
+      as a whole: where shapes of one link overlap each other, it counts once.
+    - `depth`: the largest depth of two of their shapes, in m, in step `depth_step`. `normal` points from the second
+      link to the first.
+    - `force`: the largest force that pushes the two apart, in N, in step `force_step`, with volumetric contact.
     """
 
     names: tuple[str, str]
@@ -48,6 +52,14 @@ class PairSummary:
             self.volume, self.volume_error, self.volume_step = pair.volume, pair.volume_error, step
         if pair.depth > self.depth:
             self.depth, self.depth_step, self.normal = pair.depth, step, tuple(pair.normal.tolist())
+
+
+def overlapping_links(frame: Frame[Any]) -> Iterator[tuple[Links, LinkContact, float]]:
+    """The pairs of links that overlap in a frame, and the force between the two in N, 0 without volumetric contact."""
+    between = {} if frame.forces is None else frame.forces.between_links()
+    for pair in filter(None, link_contacts(frame.contacts)):
+        links = pair.bodyA, pair.linkA, pair.bodyB, pair.linkB
+        yield links, pair, float(np.linalg.norm(between.get(links, 0.0)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +85,7 @@ class Summary:
     scene: str
     steps: int = 0
     seconds: float = 0.0
-    pairs: dict[tuple[int, int, int, int], PairSummary] = field(default_factory=dict)
+    pairs: dict[Links, PairSummary] = field(default_factory=dict)
     report: Report | None = None
     skipped: list[Skipped] = field(default_factory=list)
     decomposed: list[Decomposed] = field(default_factory=list)
@@ -87,13 +99,10 @@ class Summary:
         self.report = _sum(self.report, frame.bodies.report())
         self.skipped, self.decomposed = frame.bodies.skipped, frame.bodies.decomposed
         names = frame.bodies.names
-        between = {} if frame.forces is None else frame.forces.between_links()
         self.forces |= frame.forces is not None
-        for pair in filter(None, link_contacts(frame.contacts)):
-            key = pair.bodyA, pair.linkA, pair.bodyB, pair.linkB
-            self.pairs.setdefault(key, PairSummary((names[key[:2]], names[key[2:]]))).add(
-                frame.step, pair, float(np.linalg.norm(between.get(key, 0.0)))
-            )
+        for links, pair, force in overlapping_links(frame):
+            known = self.pairs.setdefault(links, PairSummary((names[links[:2]], names[links[2:]])))
+            known.add(frame.step, pair, force)
         for contact, opinion in zip(frame.contacts, opinions):
             self._add_opinion(
                 frame.step, (names[contact.bodyA, contact.linkA], names[contact.bodyB, contact.linkB]), opinion

@@ -13,6 +13,7 @@ from overlapper import Hull, write_mesh
 from overlapper.audit.assets import read_asset
 from overlapper.cli.audit import audit as command
 from overlapper.cli.refusals import Refused
+from overlapper.simulation.settings import Modelling
 
 # Makes the convex hull of all, in the place of CoACD.
 WRAP = """
@@ -22,7 +23,6 @@ class Mesh:
 def run_coacd(mesh, threshold):
     return [[mesh.vertices, None]]
 """
-SETTINGS = {"surface": "nominal", "concave": "decompose", "concave_threshold": 0.05}
 
 
 @pytest.fixture
@@ -85,19 +85,19 @@ def test_people_get_a_table_and_sentences(folder):
 
 
 def test_concave_meshes_may_be_left_out_and_shallow_overlaps_passed_over(folder):
-    skipped = read_asset(folder, folder / "bent.obj", "mm", 0.0, **SETTINGS | {"concave": "skip"})
+    skipped = read_asset(folder, folder / "bent.obj", "mm", 0.0, Modelling("skip"))
     assert skipped.skipped == ("bent.obj: the mesh is concave, and --concave skip asks to leave it out",)
     assert (skipped.closed, skipped.sound) == (True, False)
-    assert read_asset(folder, folder / "pair.glb", "mm", 2.1, **SETTINGS).sound
-    table = read_asset(folder, folder / "robots" / "table.urdf", "mm", 0.05, **SETTINGS)
+    assert read_asset(folder, folder / "pair.glb", "mm", 2.1, Modelling()).sound
+    table = read_asset(folder, folder / "robots" / "table.urdf", "mm", 0.05, Modelling())
     assert table.sound
 
 
 def test_what_stops_one_asset_stops_no_other(folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "pybullet", None)
-    table = read_asset(folder, folder / "robots" / "table.urdf", "mm", 0.0, **SETTINGS)
+    table = read_asset(folder, folder / "robots" / "table.urdf", "mm", 0.0, Modelling())
     assert table.failure.startswith("overlapper.simulation needs pybullet: pip install pybullet")
-    assert read_asset(folder, folder / "cube.stl", "mm", 0.0, **SETTINGS).sound
+    assert read_asset(folder, folder / "cube.stl", "mm", 0.0, Modelling()).sound
 
 
 def test_what_is_for_robots_and_a_folder_of_nothing_are_refused(folder, tmp_path):

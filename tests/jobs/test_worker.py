@@ -8,8 +8,10 @@ import sys
 import tempfile
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
+import pybullet_data
 import pytest
 
 from overlapper import Placed, Sphere, overlap
@@ -164,7 +166,6 @@ def test_fcl_that_cannot_be_started_is_an_error_of_one_sentence(monkeypatch):
         fcl.compare(overlap(Sphere(1.0), Placed(Sphere(1.0), (1.5, 0, 0))))
 
 
-def test_an_inventory_that_fails_says_what_went_wrong(tmp_path):
-    (tmp_path / "box.bullet").write_text("")
-    with pytest.raises(RuntimeError, match=r"reads .*box\.bullet ended with exit code 1 \(TypeError: .*'roundness'"):
-        inventory(tmp_path / "box.bullet", roundness=1)
+def test_an_inventory_that_fails_says_what_went_wrong():
+    with pytest.raises(RuntimeError, match=r"reads .*cube\.urdf ended with exit code 1 \(TypeError: .* dataclass"):
+        inventory(Path(pybullet_data.getDataPath()) / "cube.urdf", modelling=None)

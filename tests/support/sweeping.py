@@ -42,9 +42,6 @@ def build(client, *, apart=0.15, seed=0, fate="good", seconds=0.0):
         os.kill(os.getpid(), 9)
 '''
 
-SETTINGS = {"tolerance": 1e-3, "method": "auto", "concave": "decompose", "concave_threshold": 0.05}
-SETTINGS |= {"surface": "nominal", "pairs": None, "contact": "bullet"}
-
 # Sixty tasks of which a kill comes in the middle.
 SLOW = ["apart=0.05:0.25:20", "seed=0,1,2", "seconds=0.06"]
 
@@ -55,7 +52,7 @@ def sweep_of(grids, kept=0, steps=3):
     from overlapper.sweep.study import Study
     from overlapper.sweep.sweep import Sweep
 
-    study = Study.of(Path("balls.py"), {"steps": steps, **SETTINGS}, kept)
+    study = Study.of(Path("balls.py"), steps, kept=kept)
     space = Space("balls", study.loaded().parameters)
     return Sweep(study, space.crossed([space.grid(each) for each in grids]))
 

@@ -5,10 +5,12 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
 from overlapper.scenes.scene import Scene
+from overlapper.simulation.settings import Asking, Modelling
 from overlapper.sweep import part as parts
 from overlapper.sweep.part import FAILURES, STEPS, TASKS, must_be_no_columns, part
 from overlapper.sweep.store import Store
@@ -120,16 +122,17 @@ def test_a_folder_that_does_not_say_what_it_is_of_is_refused(tmp_path, text):
 def test_a_task_is_called_by_all_that_its_answer_depends_on(tmp_path):
     scene = tmp_path / "s.py"
     scene.write_text("STEPS = 1\ndef build(client, *, a=1.0): pass\n")
-    settings = {"steps": 3, "tolerance": 1e-3}
-    study = Study.of(scene, settings)
+    study = Study.of(scene, 3)
     name = study.digest({"a": 1.0})
-    assert len(name) == 32 and name == Study.of(scene, settings).digest({"a": 1.0})
+    assert len(name) == 32 and name == Study.of(scene, 3).digest({"a": 1.0})
     assert name != study.digest({"a": 1.0000000000000002})
-    assert name != Study.of(scene, settings | {"steps": 4}).digest({"a": 1.0})
-    assert name != Study.of(scene, settings, kept=2).digest({"a": 1.0})
-    assert name != Study("s", study.path, study.source, settings, 0, {"overlapper": "9"}).digest({"a": 1.0})
+    assert name != Study.of(scene, 4).digest({"a": 1.0})
+    others = {"contact": "volumetric"}, {"asking": Asking(tolerance=1e-4)}, {"modelling": Modelling(surface="margin")}
+    assert name not in [Study.of(scene, 3, **each).digest({"a": 1.0}) for each in others]
+    assert name != Study.of(scene, 3, kept=2).digest({"a": 1.0})
+    assert name != replace(study, versions={"overlapper": "9"}).digest({"a": 1.0})
     scene.write_text(scene.read_text() + "# other\n")
-    assert name != Study.of(scene, settings).digest({"a": 1.0})
+    assert name != Study.of(scene, 3).digest({"a": 1.0})
     # A sweep that has begun goes on with the file as it was read.
     assert isinstance(study.loaded({"a": 2.0}), Scene) and study.loaded({"a": 2.0}).parameters == {"a": 2.0}
     assert json.loads(json.dumps(study.identity())) == study.identity()

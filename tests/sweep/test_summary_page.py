@@ -1,12 +1,14 @@
 """The summary of a sweep: its charts group what a grid or a sample has, and its commands show what they say."""
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from sweeping import rows, sweep_of, swept
 
+from overlapper.simulation.settings import Modelling
 from overlapper.sweep import charts, page
 from overlapper.sweep.charts import APART, BINS, MEASURES, axis
 
@@ -47,7 +49,7 @@ def test_a_page_of_samples_and_settings_has_maps_and_whole_commands():
     grids = ["apart=0.1:0.19:30", "seconds=0.0,0.001", "seed=0,1"]
     swept("runs", grids, steps=1)
     sweep = sweep_of(grids, steps=1)
-    sweep.study.settings["surface"] = "margin"
+    sweep.study = replace(sweep.study, modelling=Modelling(surface="margin"))
     with sweep_of(grids, steps=1).opened(Path("runs")) as store:
         assert page.write(sweep_of(grids, steps=1), store, "my scene.py") == Path("runs/summary.html")
     text = Path("runs/summary.html").read_text()
@@ -57,7 +59,7 @@ def test_a_page_of_samples_and_settings_has_maps_and_whole_commands():
     assert page.command(sweep, "my scene.py", row, Path("a.html")) == (
         "overlapper run 'my scene.py' --set=apart=0.125 --steps=1 --surface=margin --html=a.html"
     )
-    sweep.study.settings.update(surface="nominal", contact="volumetric")
+    sweep.study = replace(sweep.study, modelling=Modelling(), contact="volumetric")
     assert page.command(sweep, "my scene.py", row, Path("a.html")).endswith(
         " --steps=1 --contact=volumetric --html=a.html"
     )

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.bullet.recorder import Recorder
 from overlapper.simulation.bullet.source import BulletSource
-from overlapper.simulation.model import Concave, Settings, Surface
 from overlapper.simulation.naming import named
+from overlapper.simulation.settings import Concave, Modelling, Surface
 
 
 class Bodies(AnyBodies):
@@ -75,8 +75,8 @@ class Bodies(AnyBodies):
             raise ValueError(f"recorder is of client {recorder.physicsClientId}, not of {physicsClientId}")
         self.physicsClientId = physicsClientId
         self._recorder = recorder
-        settings = Settings(concave, concave_threshold, surface)
-        super().__init__(BulletSource(physicsClientId, settings, recorder, named(names)))
+        modelling = Modelling(concave, concave_threshold, surface)
+        super().__init__(BulletSource(physicsClientId, modelling, recorder, named(names)))
 
     @property
     def recorder(self) -> Recorder | None:

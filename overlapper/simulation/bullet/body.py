@@ -25,11 +25,11 @@ from overlapper.simulation.model import (
     Leaf,
     ModelledBody,
     ModelledShape,
-    Settings,
     Skipped,
 )
 from overlapper.simulation.modelling import in_one_sentence, modelled
 from overlapper.simulation.naming import body_name
+from overlapper.simulation.settings import Modelling
 
 REPORTED = {  # by getCollisionShapeData
     pybullet.GEOM_MESH: "hull",
@@ -47,7 +47,7 @@ def read_body(
     id: int,
     file: BulletFile,
     saved: SavedBody | None,
-    settings: Settings,
+    modelling: Modelling,
     field: HeightField | None = None,
     loaded: Loaded | None = None,
     given: str | None = None,
@@ -72,7 +72,7 @@ def read_body(
         ground = Ground(field, leaf.position, leaf.orientation)
         shape_count += field.count
     for link, each in leaves.items():
-        made, reasons, meshes = modelled(link, each, settings)
+        made, reasons, meshes = modelled(link, each, modelling)
         shapes += made
         count = len(made) + len(reasons)
         shape_count += count

@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,7 @@ from overlapper import Placed
 from overlapper.quaternion import composed, rotated
 from overlapper.shapes.table import facts
 from overlapper.simulation.bullet.model_file import NotRead, load, read_apart
-
-if TYPE_CHECKING:
-    from overlapper.simulation.model import Concave, Surface
+from overlapper.simulation.settings import Modelling, settings_of
 
 Listed = dict[tuple[int, int], list[Placed]]
 
@@ -71,17 +69,17 @@ class Inventory:
         return made
 
 
-def inventory(path: Path, self_collision: bool = False, **settings: Any) -> Inventory:
-    """What is modelled of a URDF, SDF, MJCF or .bullet file; `settings` are those of `simulation.Bodies`.
+def inventory(path: Path, self_collision: bool = False, modelling: Modelling = Modelling()) -> Inventory:  # noqa: B008
+    """What is modelled of a URDF, SDF, MJCF or .bullet file.
 
     With `self_collision` a URDF or MJCF model is loaded with pybullet's URDF_USE_SELF_COLLISION. NotRead if the file is
     not there, or pybullet refuses it or dies of it.
     """
-    found: Inventory = read_apart(path, _answers, (path, self_collision, settings))
+    found: Inventory = read_apart(path, _answers, (path, self_collision, modelling))
     return found
 
 
-def _answers(request: tuple[Path, bool, dict[str, Any]]) -> Iterator[Inventory | str]:
+def _answers(request: tuple[Path, bool, Modelling]) -> Iterator[Inventory | str]:
     """In the process in which pybullet reads the file: what is in it, or the reason why it cannot be read."""
     try:
         yield _read(*request)
@@ -89,9 +87,9 @@ def _answers(request: tuple[Path, bool, dict[str, Any]]) -> Iterator[Inventory |
         yield str(error)
 
 
-def _read(path: Path, self_collision: bool, settings: dict[str, Any]) -> Inventory:
+def _read(path: Path, self_collision: bool, modelling: Modelling) -> Inventory:
     if path.suffix.lower() == ".bullet":
-        return _of_bullet_file(path, **settings)
+        return _of_bullet_file(path, modelling)
     import pybullet
 
     from overlapper.simulation import Bodies, Recorder
@@ -101,7 +99,7 @@ def _read(path: Path, self_collision: bool, settings: dict[str, Any]) -> Invento
         load(path, client, pybullet.URDF_USE_SELF_COLLISION if self_collision else 0)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of shapes left out, which the inventory names
-            bodies = Bodies(client, recorder=recorder, **settings)
+            bodies = Bodies(client, recorder=recorder, **settings_of(modelling))
     listed: Listed = {}
     for (body, link, _), placed in zip(bodies.keys, bodies.placed):
         listed.setdefault((body, link), []).append(placed)
@@ -118,16 +116,13 @@ def _read(path: Path, self_collision: bool, settings: dict[str, Any]) -> Invento
     )
 
 
-def _of_bullet_file(
-    path: Path, surface: Surface = "nominal", concave: Concave = "decompose", concave_threshold: float = 0.05
-) -> Inventory:
-    """The inventory of a file that saveBullet wrote; loadBullet would not load all of it. Bodies have no names."""
+def _of_bullet_file(path: Path, modelling: Modelling) -> Inventory:
+    """The inventory of a file that saveBullet wrote, and loadBullet would not load whole. Its bodies have no names."""
     from overlapper.simulation.bullet.bullet_file import BulletFile
     from overlapper.simulation.collision_rules import Colliders, CollisionRules, partners
-    from overlapper.simulation.model import Settings
     from overlapper.simulation.modelling import in_one_sentence, modelled
 
-    file, settings = BulletFile(path), Settings(concave, concave_threshold, surface)
+    file = BulletFile(path)
     colliders = {
         (number, link): collider
         for number, body in enumerate(file.bodies)
@@ -137,7 +132,7 @@ def _of_bullet_file(
     listed: Listed = {}
     skipped, decomposed = [], []
     for key, collider in colliders.items():
-        parts, reasons, meshes = modelled(key[1], file.leaves(collider.shape), settings)
+        parts, reasons, meshes = modelled(key[1], file.leaves(collider.shape), modelling)
         for part in parts:
             position = collider.position + rotated(collider.orientation, part.position)
             orientation = composed(collider.orientation, part.orientation)

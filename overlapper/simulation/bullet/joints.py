@@ -15,8 +15,9 @@ from overlapper.printable import printable
 from overlapper.quaternion import composed, rotated
 from overlapper.simulation.bullet.model_file import NotRead, load, read_apart
 from overlapper.simulation.kinematic_tree import Joint, Kind, KinematicTree, LinkShape, TreeLink
-from overlapper.simulation.model import BASE, Concave, Settings, Surface
+from overlapper.simulation.model import BASE
 from overlapper.simulation.naming import labels
+from overlapper.simulation.settings import Modelling
 
 ENDINGS = (".urdf", ".sdf", ".xml")
 
@@ -28,19 +29,16 @@ KINDS: dict[int, Kind] = {
 }  # by pybullet's numbers of joint types
 
 
-def kinematic_tree(
-    path: Path, concave: Concave = "decompose", concave_threshold: float = 0.05, surface: Surface = "nominal"
-) -> KinematicTree:
-    """The links of a URDF, SDF or MJCF file; the settings are those of `simulation.Bodies`.
+def kinematic_tree(path: Path, modelling: Modelling) -> KinematicTree:
+    """The links of a URDF, SDF or MJCF file.
 
     NotRead if the file is not there, or pybullet refuses it or dies of it.
     """
-    request = path, Settings(concave, concave_threshold, surface)
-    found: KinematicTree = read_apart(path, _answers, request, ENDINGS)
+    found: KinematicTree = read_apart(path, _answers, (path, modelling), ENDINGS)
     return found
 
 
-def _answers(request: tuple[Path, Settings]) -> Iterator[KinematicTree | str]:
+def _answers(request: tuple[Path, Modelling]) -> Iterator[KinematicTree | str]:
     """In the process in which pybullet reads the file: what is in it, or the reason why it cannot be read."""
     try:
         yield _read(*request)
@@ -48,7 +46,7 @@ def _answers(request: tuple[Path, Settings]) -> Iterator[KinematicTree | str]:
         yield str(error)
 
 
-def _read(path: Path, settings: Settings) -> KinematicTree:
+def _read(path: Path, modelling: Modelling) -> KinematicTree:
     import pybullet
 
     from overlapper.simulation.bullet.known_bodies import KnownBodies
@@ -58,7 +56,7 @@ def _read(path: Path, settings: Settings) -> KinematicTree:
     with Recorder(client) as recorder:
         # Visual shapes take most of the time of loading a URDF.
         load(path, client, pybullet.URDF_IGNORE_VISUAL_SHAPES if path.suffix.lower() == ".urdf" else 0)
-        known = KnownBodies(client, settings, recorder, {})
+        known = KnownBodies(client, modelling, recorder, {})
         known.refresh()
     names = labels(known.by_id)
     links: list[TreeLink] = []

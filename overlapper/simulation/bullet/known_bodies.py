@@ -11,7 +11,8 @@ from overlapper.simulation.bullet.body_marks import BodyMarks
 from overlapper.simulation.bullet.bullet_file import BulletFile
 from overlapper.simulation.bullet.recorder import Recorder
 from overlapper.simulation.bullet.saved_scene import body_ids, saved_bodies
-from overlapper.simulation.model import BASE, ModelledBody, Settings, Skipped
+from overlapper.simulation.model import BASE, ModelledBody, Skipped
+from overlapper.simulation.settings import Modelling
 
 
 class KnownBodies:
@@ -23,9 +24,9 @@ class KnownBodies:
     """
 
     def __init__(
-        self, client: int, settings: Settings, recorder: Recorder | None, given_names: Mapping[int, str]
+        self, client: int, modelling: Modelling, recorder: Recorder | None, given_names: Mapping[int, str]
     ) -> None:
-        self._client, self._settings, self._recorder = client, settings, recorder
+        self._client, self._modelling, self._recorder = client, modelling, recorder
         self._given_names = given_names
         self._marks = BodyMarks(client)
         self.unidentified = 0
@@ -69,7 +70,7 @@ class KnownBodies:
 
     def _margins_changed(self) -> bool:
         """Whether a base has another margin than before, where that counts; its body is then new."""
-        if self._settings.surface == "nominal":
+        if self._modelling.surface == "nominal":
             return False
         shaped = {id for id, body in self.by_id.items() if body.shapes or body.ground}
         watched = body_ids(self._client).intersection(shaped)
@@ -117,7 +118,9 @@ class KnownBodies:
             body = file.bodies[rows[id]] if id in rows else None
             field = self._recorder.height_field(id) if self._recorder else None
             loaded_from = self._recorder.loaded.get(id) if self._recorder else None
-            known[id] = read_body(client, id, file, body, self._settings, field, loaded_from, self._given_names.get(id))
+            known[id] = read_body(
+                client, id, file, body, self._modelling, field, loaded_from, self._given_names.get(id)
+            )
             self._margins[id] = _margin(client, id)
             self._marks.put(id)
         self.by_id = dict(sorted(known.items()))

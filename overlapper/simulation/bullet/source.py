@@ -18,7 +18,8 @@ from overlapper.simulation.cautions import SelfCollisionWarning
 from overlapper.simulation.collision_rules import CollisionRules, Mask
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.layout import Layout
-from overlapper.simulation.model import ModelledBody, Settings, Skipped
+from overlapper.simulation.model import ModelledBody, Skipped
+from overlapper.simulation.settings import Modelling, settings_of
 from overlapper.simulation.source import Source
 
 
@@ -26,10 +27,10 @@ class BulletSource(Source):
     """See `Source`; the arguments are those of `Bodies`."""
 
     def __init__(
-        self, client: int, settings: Settings, recorder: Recorder | None, given_names: Mapping[int, str]
+        self, client: int, modelling: Modelling, recorder: Recorder | None, given_names: Mapping[int, str]
     ) -> None:
-        self._client, self._settings, self._recorder = client, settings, recorder
-        self._known = KnownBodies(client, settings, recorder, given_names)
+        self._client, self._modelling, self._recorder = client, modelling, recorder
+        self._known = KnownBodies(client, modelling, recorder, given_names)
         self.bodies = self._known.by_id
         self._in_force = RulesInForce(recorder)
         self._fresh = False  # whether filters have been read since the rules were asked for
@@ -42,8 +43,7 @@ class BulletSource(Source):
 
     @property
     def settings(self) -> dict[str, str | float]:
-        given = self._settings
-        return {"concave": given.concave, "concave_threshold": given.threshold, "surface": given.surface}
+        return settings_of(self._modelling)
 
     @property
     def unidentified(self) -> int:
@@ -87,7 +87,7 @@ class BulletSource(Source):
                 )
 
     def within_margins(self, found: Contacts, layout: Layout, chosen: Callable[[NDArray[np.int32]], Mask]) -> int:
-        if self._settings.surface == "margin":
+        if self._modelling.surface == "margin":
             return 0
         return touching_within_margins(self._client, found, layout, chosen)
 

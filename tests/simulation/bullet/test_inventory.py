@@ -12,6 +12,7 @@ import pytest
 
 from overlapper.simulation.bullet.inventory import inventory
 from overlapper.simulation.bullet.model_file import NotRead
+from overlapper.simulation.settings import Modelling
 
 DATA = Path(pybullet_data.getDataPath())
 FLAT = """<robot name="plate"><link name="top"><collision><geometry><mesh filename="flat.obj"/></geometry></collision>
@@ -39,7 +40,7 @@ def test_every_link_is_listed_with_its_shapes_and_whom_it_meets():
 
 def test_self_collision_shows_in_whom_a_link_meets():
     path = DATA / "TwoJointRobot_wo_fixedJoints.urdf"
-    alone, together = inventory(path), inventory(path, self_collision=True, surface="margin")
+    alone, together = inventory(path), inventory(path, self_collision=True, modelling=Modelling(surface="margin"))
     assert alone.pairs == 0 and {link.meets for link in alone.links} == {0}
     assert together.pairs == sum(link.meets for link in together.links) // 2 > 0
     sizes = [shape.size for link in together.links for shape in link.shapes if shape.kind == "hull"]

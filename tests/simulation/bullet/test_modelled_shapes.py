@@ -24,8 +24,8 @@ from simulated import (
 from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Sphere, distance
 from overlapper.simulation import Bodies, Recorder, SkippedShapeWarning
 from overlapper.simulation.bullet.bullet_file import Leaf
-from overlapper.simulation.model import Settings
 from overlapper.simulation.modelling import modelled
+from overlapper.simulation.settings import Modelling
 
 # --- shapes
 
@@ -315,7 +315,7 @@ def test_the_rest_of_a_link_with_a_flat_hull_is_modelled(client, tmp_path):
 def test_the_hull_of_unequal_spheres_is_not_taken_for_a_capsule():
     spheres = np.array([[0, 0, 0, 0.1], [0, 0, 1, 0.2]])
     leaf = Leaf("multisphere", np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), spheres)
-    found = modelled(0, (leaf,), Settings("skip", 0.05, "nominal"))
+    found = modelled(0, (leaf,), Modelling("skip"))
     assert found == ([], ["the hull of unequal spheres is not modelled"], [])
 
 

@@ -1,0 +1,61 @@
+"""How bodies are modelled and how their overlaps are asked for: the settings that runs, tables and sweeps have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
+
+if TYPE_CHECKING:
+    from overlapper.simulation.asked_pairs import Among
+
+Concave = Literal["decompose", "enclose", "skip"]
+Surface = Literal["nominal", "margin"]
+Method = Literal["auto", "paper"]
+
+
+@dataclass(frozen=True, slots=True)
+class Modelling:
+    """How shapes are modelled, as `simulation.Bodies` describes it. ValueError for an invalid choice."""
+
+    concave: Concave = "decompose"
+    concave_threshold: float = 0.05
+    surface: Surface = "nominal"
+
+    def __post_init__(self) -> None:
+        for name, choices in (("concave", get_args(Concave)), ("surface", get_args(Surface))):
+            if (chosen := getattr(self, name)) not in choices:
+                raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, not {chosen!r}")
+        from overlapper.polytopes.decomposition import check_threshold
+
+        check_threshold(self.concave_threshold)
+
+
+@dataclass(frozen=True, slots=True)
+class Asking:
+    """Which pairs are measured, and how, as `simulation.Bodies.overlaps` describes it.
+
+    Without `pairs`, a scene says which pairs.
+    """
+
+    pairs: Among | None = None
+    tolerance: float = 1e-3
+    method: Method = "auto"
+
+
+Settings = TypeVar("Settings", Modelling, Asking)
+
+
+def settings_of(*values: Modelling | Asking) -> dict[str, Any]:
+    """The settings by name, as keyword arguments and the headings of tables have them."""
+    return {each.name: getattr(value, each.name) for value in values for each in fields(value)}
+
+
+def read_settings(kind: type[Settings], heading: Mapping[str, str]) -> Settings:
+    """The settings that the heading of a table has; the others are as by default. ValueError for an invalid one."""
+    told = {
+        each.name: float(heading[each.name]) if isinstance(each.default, float) else heading[each.name]
+        for each in fields(kind)
+        if heading.get(each.name, "None") != "None"
+    }
+    return kind(**told)  # type: ignore[arg-type]  # texts are checked where they are used
