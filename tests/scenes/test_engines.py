@@ -1,10 +1,12 @@
-"""An engine other than pybullet, whose bodies only move by script: scenes, loops, watches, pages and verdicts."""
+"""An engine without pybullet, whose bodies only move by script: scenes, loops, watches, pages, verdicts, sweeps."""
 
 import subprocess
 import sys
 from contextlib import closing
 from pathlib import Path
 
+import pyarrow
+import pyarrow.parquet
 import pytest
 from scripted_engine import World
 
@@ -18,6 +20,8 @@ from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.cautions import SkippedShapeWarning
 from overlapper.simulation.engine import ENGINES
 from overlapper.simulation.forces.contact import VolumetricContact
+from overlapper.sweep.study import Study, Task
+from overlapper.sweep.tasks import prepared
 from overlapper.tables.table_file import read_table
 
 SCENE = '''
@@ -103,6 +107,14 @@ def test_a_scene_is_held_against_its_expected_file():
     assert outcome.page.is_file()
 
 
+def test_a_task_of_a_sweep_is_done():
+    study = Study.of(Path("sinking.py"), {"steps": 8, "pairs": "all"})
+    (written,) = prepared(study)(Task("one", {"sinks": 0.02})).values()
+    (row,) = pyarrow.parquet.read_table(pyarrow.BufferReader(written)).to_pylist()
+    assert row["sinks"] == 0.02
+    assert max(sunk(step).volume for step in range(1, 9)) in row.values()
+
+
 def test_bodies_that_come_or_are_nowhere_are_noticed():
     world = World()
     world.add("ball", Sphere(0.1), (0, 0, 0))
@@ -138,6 +150,8 @@ def test_pybullet_is_not_needed():
     code = f"""
 import sys
 sys.modules["pybullet"] = None
+import pyarrow
+import pyarrow.parquet
 import pytest
 sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "-k", "not pybullet_is_not_needed", {str(Path(__file__))!r}]))
 """
