@@ -89,6 +89,7 @@ class Contacts(Tabular, Sequence[Contact]):
         return Contacts, (self._keys, self.overlaps, dict(self.names))
 
     def columns(self) -> Columns:
+        """The columns of the table by name, each an array or a list with a value for each row."""
         found = self.overlaps
         keys = self.keys
         columns: Columns = {}

@@ -99,6 +99,7 @@ class LinkContacts(Tabular, list[LinkContact]):
         self.names = names or {}
 
     def columns(self) -> Columns:
+        """The columns of the table by name, each an array or a list with a value for each row."""
         columns: Columns = {}
         for side, links in (
             ("A", [(pair.bodyA, pair.linkA) for pair in self]),

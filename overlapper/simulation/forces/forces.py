@@ -84,6 +84,7 @@ class Forces(Tabular):
         return np.column_stack([getattr(self, name) for name in FORCE_MEASURES])
 
     def columns(self) -> Columns:
+        """The columns of the table by name, each an array or a list with a value for each row."""
         return {**self.contacts.columns(), **dict(zip(FORCE_COLUMNS, self.measures.T))}
 
     def __len__(self) -> int:
