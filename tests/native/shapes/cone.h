@@ -43,6 +43,7 @@ struct Cone : Bounded,
   Vec3 support(Vec3 d) const {
     const double across = tangents::radial(d);
     if (d.z * length >= radius * across) return apex();
+    if (!(across > 0)) return {radius, 0, -length / 2};
     return {radius * d.x / across, radius * d.y / across, -length / 2};
   }
 
@@ -81,6 +82,7 @@ struct Cone : Bounded,
   WideVector wide_core_support(const WideVector& d) const {
     const DoubleDouble across = norm(tangents::across(d));
     if (!(DoubleDouble{length} * d.z < DoubleDouble{radius} * across)) return wide(apex());
+    if (!(across.head > 0)) return wide({radius, 0, -length / 2});
     return (DoubleDouble{radius} / across) * tangents::across(d) + WideVector{{}, {}, {-length / 2}};
   }
 
