@@ -74,7 +74,7 @@ def scenes() -> None:
         say(f"{name:22}{headline(path)}")
 
 
-# What stands behind a script is the script's.
+# Options behind the path of the script belong to the script.
 app.command(context_settings={"allow_interspersed_args": False})(watch)
 for command in (scenes, run, sweep, view, check, diff, intersect, clashes, shapes, audit, stability, chart):
     app.command()(command)

@@ -29,7 +29,7 @@ DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
 # s that a process has beyond the limit to end itself, which it does with a traceback.
 GRACE = 10.0
 
-# How often an item may be under way when its process dies: somebody else may have killed it the first time.
+# An item fails once its process has died this often: the first time, somebody else may have killed the process.
 TRIES = 2
 
 TIMED_OUT = re.compile(r"^Timeout \(\d", re.MULTILINE)  # of faulthandler
