@@ -47,7 +47,8 @@ MeasuresAndInertia measures_of(const quadric::BallPart& part, const Moments& mom
   return {std::move(q), rotation * moments.inertia_about_centroid() * transposed(rotation)};
 }
 
-/// What a ball about that point, in the polyhedron's own coordinates, shares with it in a shallow contact.
+/// The common part of a polyhedron and a ball in a shallow contact. The ball's centre is in the polyhedron's own
+/// coordinates.
 std::optional<quadric::ShallowPart> shallow_part(const OwnPolyhedron& polyhedron, const Placed& other,
                                                  const WideVector& centre, double radius) {
   const auto plane = [&](int f) { return unit_facet(other.shape, f); };

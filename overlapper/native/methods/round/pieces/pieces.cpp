@@ -9,12 +9,12 @@
 namespace overlapper::pieces {
 namespace {
 
-/// Planes that are cut with, the six of the box included, to enclose the common set: what does so need not be tight,
-/// and every piece of a body is cut out of it.
+/// The number of planes, those of the box included, that the polytope around the common set is cut with. The polytope
+/// need not be tight, and every piece of a body is cut out of it.
 constexpr size_t kMostFaces = 64;
 
-/// Of a hull whose facets hold their corners but for rounding, the triangles whose planes are looked at instead, and
-/// how many of these may matter: slices have lines for as many, and as many again for the other body.
+/// If facets of a hull hold their corners but for rounding, the planes of so many triangles are looked at instead. So
+/// many of these may matter: slices have lines for as many, and as many again for the other body.
 constexpr size_t kMostTriangles = 256;
 constexpr size_t kMostOfTriangles = slicing::kMostLines / 2;
 
@@ -37,7 +37,7 @@ class Cutter {
     margin_ = 1e-12 * (norm(body.pose.translation) + norm(other.pose.translation) + reach(body.shape));
   }
 
-  /// Of a shape that Traits::other does not tell of.
+  /// The shape is one that Traits::other does not tell of.
   void cut(const Shape& shape) {
     const HullData* hull = polytope_of(shape);
     if (smooth(shape) && hull) rounded_hull(*hull, core_radius(shape));
@@ -212,7 +212,7 @@ class Cutter {
     WideVector normal;
     DoubleDouble offset;
   };
-  /// Of a facet from three corners, exactly; further corners may be off its plane by the flatness.
+  /// The plane of a facet through three of its corners, exactly. Other corners may be off it by the flatness.
   static WidePlane plane_of(const HullData& hull, int f) {
     const auto [a, b, c] = hull.facet_corners[f];
     if (a < 0) return {unit(wide(hull.planes[f].normal)), {hull.planes[f].offset}};
@@ -277,7 +277,7 @@ class Cutter {
     end();
   }
 
-  /// Of a vertex and each of those it shares an edge with.
+  /// `beside` has the vertex with each vertex that it shares an edge with.
   void vertex_wedge(const HullData& hull, std::span<const std::pair<int, int>> beside, double radius) {
     const Vec3 vertex = hull.vertices[beside[0].first];
     for (const auto& [_, other] : beside)
