@@ -108,7 +108,7 @@ def test_a_scene_is_held_against_its_expected_file():
 
 
 def test_a_task_of_a_sweep_is_done():
-    study = Study.of(Path("sinking.py"), {"steps": 8, "pairs": "all"})
+    study = Study.of(Path("sinking.py"), 8)
     (written,) = prepared(study)(Task("one", {"sinks": 0.02})).values()
     (row,) = pyarrow.parquet.read_table(pyarrow.BufferReader(written)).to_pylist()
     assert row["sinks"] == 0.02
