@@ -159,8 +159,11 @@ def with_options(**groups: Callable[..., Any]) -> Callable[[Callable[..., Any]],
         own = _parameters(command, leave=groups.keys())
         told = {each: value for name, one in own.items() for each, value in taken.get(name, {name: one}).items()}
 
+        defaults = {name: each.default for name, each in told.items() if each.default is not each.empty}
+
         @wraps(command)
-        def called(**given: Any) -> Any:
+        def called(*arguments: Any, **given: Any) -> Any:
+            given = defaults | dict(zip(told, arguments)) | given
             made = {name: make(**{each: given.pop(each) for each in taken[name]}) for name, make in groups.items()}
             return command(**given, **made)
 
