@@ -616,7 +616,10 @@ def test_scenes_are_refused_for_which_there_can_be_no_process(two_scenes, monkey
     [
         (lambda folder: folder / "nowhere", "there is no scene file"),
         (lambda folder: folder / "expected", "there is no scene in"),
-        (lambda folder: (folder / "expected" / "one.csv").write_text("# steps") and folder, "must say `# steps"),
+        (
+            lambda folder: (folder / "expected" / "one.csv").write_text("# steps") and folder,
+            "expected/one.csv is not a table of overlaps: it has no columns",
+        ),
     ],
 )
 def test_what_cannot_be_checked_is_refused(two_scenes, spoil, words):
