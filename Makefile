@@ -6,6 +6,8 @@ SCENE := franka_grasp
 FUZZ := -max_total_time=60
 MUTANTS := --seed 0 --count 200
 GROWTH := --rounds 50 --seed 0
+# A kind of shape that joins the sanitized core alone, to show that one header is enough.
+CONE := tests/native/shapes/cone.h
 NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
 # Shares in percent that tests are to reach: of the lines and branches of Python, and of the lines of the core.
 LEAST_OF_PYTHON := 86
@@ -113,8 +115,9 @@ $(VENV)/run $(VENV)/dev: pyproject.toml | $(VENV)/built
 # $(VENV): what a .pth names is on the path, but its own .pth, of which one is for the package, are not read. Only clang
 # makes fuzzers.
 build/coverage/dev: OPTION := OVERLAPPER_COVERAGE
-build/sanitized/dev: OPTION := OVERLAPPER_SANITIZE
+build/sanitized/dev: OPTION := OVERLAPPER_MORE_SHAPES=$(CURDIR)/$(CONE);OVERLAPPER_SANITIZE
 build/sanitized/dev: COMPILER := CC=clang CXX=clang++
+build/sanitized/dev: $(CONE)
 build/coverage/dev build/sanitized/dev: build/%/dev: $(VENV)/dev $(VENV)/built
 	@$(VENV)/bin/python -m venv build/$*/venv
 	@$(VENV)/bin/python -c 'import sys; print(*(path for path in sys.path if path.endswith("site-packages")), sep="\n")' \
