@@ -195,6 +195,33 @@ def test_pressure_on_a_blade_has_no_torque_about_the_blade():
     assert 0.1 * HALF * force < abs(across) <= (1 + 1e-9) * HALF * force
 
 
+@pytest.mark.parametrize("spin", [(-120, 60, 0), (60, -120, 5), (-80, -100, -5)])
+def test_the_centre_of_pressure_of_a_rocking_box_is_on_the_border(spin):
+    """A box that is not level, turns fast and slides: the centre is drawn back to sqrt(3) radii of gyration."""
+    tilt = Rotation.from_rotvec([0.004, -0.003, 0.2]).as_quat()
+    shapes = [Placed(FLOOR), Placed(Box([HALF, 0.7 * HALF, HALF]), (0.01, 0.02, HALF - 1e-3), tilt)]
+    links = at_rest(Link(mass=0), Link(inertia=[2, 3, 4]), positions=[(0, 0, 0), (0.02, 0.01, HALF)])
+    velocity = np.array([0] * 6 + [0.1, 0.2, -0.05, *spin])
+    found = Scene(links, shapes, [0, 1], [(1, 0)], stiffness=1e7, velocity=velocity, friction=0.3).solve()
+    assert broken_laws(found) == []
+    (patch,) = found.scene.patches()
+    force, torque, normal = found.force[0], found.torque[0], found.normal[0]
+    pressure = force @ normal
+    pressed = patch.found.patch_centre - patch.found.centroid
+    area, product = patch.found.patch_area, np.cross(normal, torque) / pressure - pressed
+    radii = patch.found.patch_moments / np.linalg.norm(area)
+    assert pressure > 0
+    assert product @ np.linalg.pinv(radii, rcond=1e-6) @ product == pytest.approx(3, rel=1e-6)
+
+
+def test_a_pair_that_is_apart_has_no_force():
+    links = at_rest(Link(mass=0), Link())
+    for direction in (-1, 1):
+        velocity = np.array([0] * 8 + [direction, 0, 0, 0])
+        found = cube_on(links, position=(0, 0, HALF + 1e-3), velocity=velocity, friction=0.5).solve()
+        assert not found.force.any() and not found.torque.any() and not found.acceleration.any()
+
+
 def test_a_body_inside_another_is_pushed_in_its_last_direction():
     """Its area vector is zero: the force does not depend on the motion, and has no torque."""
     inside, leaving = (Placed(Sphere(0.02), (x, 0.01, 0)) for x in (0, 0.1))
