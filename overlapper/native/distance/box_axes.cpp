@@ -7,7 +7,7 @@
 namespace overlapper {
 namespace {
 
-/// Two boxes in the axes of the first: the columns of `turn` are the axes of the second.
+/// Two boxes in the axes of the first box: the columns of `turn` are the axes of the second box.
 class AxisSearch {
  public:
   AxisSearch(Vec3 half_a, Vec3 half_b, const Mat3& turn, Vec3 apart)
@@ -19,8 +19,8 @@ class AxisSearch {
     // Where a face and two edges agree to rounding, the face is the better witness.
     const double worth = rounding(max_component(half_a_) + max_component(half_b_));
     for (Vec3 column : {columns_.row0, columns_.row1, columns_.row2})
-      // In these axes the products with the first box's edges are orthogonal to them to the last bit, so that the
-      // rounding of two nearly parallel edges turns the axis only across both.
+      // The products with the first box's edges are exactly orthogonal to these edges. The rounding of two nearly
+      // parallel edges therefore turns the axis only across both edges.
       for (Vec3 axis : {Vec3{0, -column.z, column.y}, Vec3{column.z, 0, -column.x}, Vec3{-column.y, column.x, 0}}) {
         const double length = std::sqrt(norm2(axis));
         if (length > 0 && consider(axis / length, worth) < -far) return best_;

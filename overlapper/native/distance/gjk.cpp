@@ -21,7 +21,7 @@ DifferencePoint core_support(const Placed& a, const Placed& b, Vec3 direction) {
   return {a.core_support(direction), b.core_support(-direction)};
 }
 
-/// How far the origin is from the nearest facet of a tetrahedron around it.
+/// The distance of the origin from the nearest facet of a tetrahedron around it.
 double depth_in(const Simplex& simplex) {
   if (simplex.size < 4) return 0;
   double least = std::numeric_limits<double>::infinity();
@@ -33,15 +33,15 @@ double depth_in(const Simplex& simplex) {
   return least;
 }
 
-/// The sine of an angle between an axis and a direction: GJK knows that of a rim to half of the digits.
+/// The sine of an angle between an axis and a direction. At a rim GJK finds the direction to half of the digits.
 constexpr double kAboutUpright = 0x1p-20;
 
-/// What one body adds to the nearest points: a point that it keeps, or one of a rim or of a curved core that goes with
-/// the direction, and flats along which the point is free.
+/// A body's part in the nearest points: a fixed point, or a point of a rim or of a curved core that depends on the
+/// direction. Along flats the point is free.
 struct Contactor {
   const Placed& body;
   CoreKind kind;
-  Vec3 point;  ///< of the body; of a rim its centre
+  Vec3 point;  ///< of the body; the centre of a rim
   std::vector<Vec3> flats;
   double rim_radius = 0;
   Vec3 axis;
@@ -69,7 +69,7 @@ struct Contactor {
     if (norm(along) > 0x1p-40 * length) flats.push_back(unit(along));
   }
 
-  /// The point farthest along a direction, flats aside.
+  /// The farthest point along a direction, without the flats.
   Vec3 farthest(Vec3 direction) const {
     switch (kind) {
       case CoreKind::kCurved: return body.core_support(direction);
@@ -80,7 +80,7 @@ struct Contactor {
   }
 };
 
-/// Takes the points for the nearest ones if rounding alone leaves them farther apart than the planes across `x`.
+/// Accepts the points as the nearest ones if they are no farther apart than the planes across `x`, but for rounding.
 bool accept(Separation& cores, const Placed& a, const Placed& b, Vec3 witness_a, Vec3 witness_b, Vec3 x) {
   const double length = norm(x), gap = dot(x / length, core_support(a, b, -x).difference());
   const double lost = rounding(norm(witness_a) + norm(witness_b));
@@ -93,7 +93,7 @@ bool accept(Separation& cores, const Placed& a, const Placed& b, Vec3 witness_a,
   return true;
 }
 
-/// Above a cap, the nearest points are a lowest one of the other body and its foot, if that is on the cap.
+/// Above a cap, the nearest points are a lowest point of the other body and its foot, if the foot is on the cap.
 bool above_cap(const Placed& a, const Placed& b, Separation& cores) {
   for (const Placed* body : {&a, &b}) {
     if (!has_rims(body->shape)) continue;
@@ -105,7 +105,7 @@ bool above_cap(const Placed& a, const Placed& b, Separation& cores) {
     const Vec3 up = dot(axis, x) * (body == &a ? -1 : 1) > 0 ? axis : -axis;
     const Vec3 lowest = other.core_support(-up),
                found = body == &a ? cores.simplex.witness_b() : cores.simplex.witness_a();
-    // An edge or a cap that lies level has points that are as low, of which one has been found.
+    // A level edge or cap has several lowest points, and only one has been found.
     for (Vec3 point : {lowest, found - dot(up, found - lowest) * up}) {
       const Vec3 arm = point - body->pose.translation;
       const double height = dot(up, arm) - cylinder.half_length;
@@ -118,10 +118,10 @@ bool above_cap(const Placed& a, const Placed& b, Separation& cores) {
   return false;
 }
 
-/// The nearest points of cores of which one has a rim or is curved: GJK knows a point of that, and with it the
-/// direction, to half of the digits only. At the nearest points x = a - b is across every flat, and the points of rims
-/// and curved cores are those farthest along x: Newton's method on these equations, whose matrix is the identity and
-/// more. False where they do not hold.
+/// The nearest points of two cores if one core has a rim or is curved. GJK finds a point there, and the direction, to
+/// half of the digits only. At the nearest points, x = a - b is across every flat, and the points of rims and curved
+/// cores are the farthest along x. Newton's method solves these equations; its matrix is the identity plus the
+/// curvature terms. False where the equations do not hold.
 bool sharpen(const Placed& a, const Placed& b, Separation& cores) {
   const Contactor on_a(a, cores.simplex, &DifferencePoint::on_a, cores.simplex.witness_a()),
       on_b(b, cores.simplex, &DifferencePoint::on_b, cores.simplex.witness_b());
@@ -157,7 +157,7 @@ bool sharpen(const Placed& a, const Placed& b, Separation& cores) {
     if (norm(step) <= 0x1p-51 * norm(x)) break;
   }
   Vec3 witness_a = on_a.farthest(-x), witness_b = on_b.farthest(x);
-  // What is left lies along the flats; those of two bodies may be nearly parallel.
+  // The rest lies along the flats; the flats of two bodies may be nearly parallel.
   for (int round = 0; round < 30; ++round) {
     for (Vec3 flat : on_a.flats) witness_a += dot(flat, x - (witness_a - witness_b)) * flat;
     for (Vec3 flat : on_b.flats) witness_b -= dot(flat, x - (witness_a - witness_b)) * flat;
@@ -171,7 +171,7 @@ Separation separate_cores(const Placed& a, const Placed& b) {
   Vec3 towards = a.pose.translation - b.pose.translation;
   if (norm2(towards) == 0) towards = {1, 0, 0};
   const auto support = [&](Vec3 direction) { return core_support(a, b, direction); };
-  // The best gap of all rounds: on a rim, those of single rounds scatter by more than this.
+  // The best gap of all rounds: on a rim, the gaps of single rounds scatter by more than this.
   const auto settled = [](double length, double, double best) { return length - best <= 4 * 0x1p-53 * length; };
   Separation cores = separate(support(-towards), support, settled);
   const bool curved = has_curved_core(a.shape) || has_curved_core(b.shape);
@@ -187,9 +187,9 @@ Distance distance(const Placed& a, const Placed& b) {
   Distance result;
   result.distance = cores.distance - radius_a - radius_b;
   result.gap = cores.gap - radius_a - radius_b;
-  // Along the line of the witness points, distance * normal is their difference. On a curved rim that direction is
-  // known to half of the digits only; where so little separates it that this matters, the direction that proves the gap
-  // is given.
+  // Along the line of the witness points, distance * normal is their difference. On a curved rim this direction is
+  // known to half of the digits only. Where the gap is so small that this matters, the normal is the direction that
+  // proves the gap.
   const Vec3 along = unit(cores.simplex.nearest);
   const double gap_along = dot(along, core_support(a, b, -along).difference());
   result.normal = cores.origin_inside || gap_along <= 0 ? cores.normal : along;

@@ -5,9 +5,9 @@
 
 namespace overlapper {
 
-/// GJK with witness points (Gilbert, Johnson, Keerthi 1988) on the cores of a and b: spheres and capsules count as the
-/// point or segment that their radius surrounds. Neither may be a half-space. Coordinates should be relative to
-/// something near.
+/// GJK with witness points (Gilbert, Johnson, Keerthi 1988) on the cores of a and b. The core of a sphere is its
+/// centre; the core of a capsule is its segment. Neither body may be a half-space. Coordinates should be relative to a
+/// nearby point.
 Separation separate_cores(const Placed& a, const Placed& b);
 
 /// Nearest points of two shapes.
@@ -16,7 +16,7 @@ struct Distance {
   double gap = 0;       ///< certified lower bound of the distance along `normal`
   Vec3 normal;          ///< unit, from b to a; {0, 0, 0} if the shapes' cores overlap
   Vec3 witness_a, witness_b;
-  /// m, of cores that overlap: at least so deep they are, but for the rounding of points.
+  /// m: lower bound of the overlap of the cores, but for the rounding of points.
   double overlap = 0;
 };
 Distance distance(const Placed& a, const Placed& b);

@@ -4,11 +4,11 @@
 
 namespace overlapper {
 
-/// The least translation that separates: moving a by depth * normal leaves the two touching.
+/// The least translation that separates: after moving a by depth * normal, the two bodies only touch.
 struct Penetration {
   double depth = 0;  ///< negative if the shapes are apart
   Vec3 normal;       ///< unit, from b to a
-  double open = 0;   ///< m: how far it may be off beside rounding, of rounded bodies whose cores are apart
+  double open = 0;   ///< m: error beside rounding, for rounded bodies with separated cores
 };
 
 }  // namespace overlapper

@@ -62,11 +62,11 @@ double NearPolytope::most_reach(Vec3 direction) const {
 
 void NearPolytope::complete(NearRidge& ridge) const {
   ridge.along = rounded(along(ridge));
-  const Vec3 from = corners[ridge.from].at, to = corners[ridge.to].at;  // all of them are there still
+  const Vec3 from = corners[ridge.from].at, to = corners[ridge.to].at;  // no corner has been removed yet
   const double t = std::clamp(-dot(from, to - from) / norm2(to - from), 0.0, 1.0);
   ridge.near.at = from + t * (to - from);
   ridge.near.lost = kLost * std::max(norm(from), norm(to));
-  // Of a long edge that passes nearby, doubles do not know where.
+  // Doubles do not locate the nearest point of a long edge that passes nearby.
   if (ridge.near.lost > 0x1p-20 * norm(ridge.near.at)) ridge.near = nearest(ridge);
 }
 

@@ -8,17 +8,17 @@
 
 namespace overlapper {
 
-/// Of directions in doubles that are right to the last bits, and of dot products with them: the share of a point's
-/// distance from the origin that may be lost.
+/// Bound of the rounding error of dot(direction, point), as a fraction of the point's distance from the origin. The
+/// direction is in doubles and right to the last bits.
 inline constexpr double kLost = 0x1p-46;
 
-/// Directions in double-double, per sine of the angle that they were made from.
+/// Error of a direction in double-double, times the sine of the angle between the two vectors it was made from.
 inline constexpr double kLostWide = 0x1p-96;
 
-/// A corner about a point near the contact.
+/// A corner, relative to a point near the contact.
 struct NearCorner {
   Vec3 at;
-  double lost;      ///< m: of dot products with it
+  double lost;      ///< m: rounding error of dot products with it
   int number = -1;  ///< among all corners
 };
 
@@ -28,34 +28,35 @@ struct NearFacet {
 };
 
 struct NearRidge {
-  int from, to, left, right;  ///< no facets beside a segment: -1
+  int from, to, left, right;  ///< -1: no facet beside the edge of a segment
   Vec3 along;                 ///< unit
   NearCorner near;            ///< its point nearest to the origin
 };
 
-/// What a polytope is made of, in doubles about a point near the contact: every number is as exact as it is near. A
-/// point and a segment, the cores of balls and capsules, are polytopes too.
+/// The corners, facets and ridges of a polytope, in doubles relative to a point near the contact. The error of a
+/// coordinate is proportional to its size. A point and a segment, the cores of spheres and capsules, count as
+/// polytopes.
 class NearPolytope {
  public:
   NearPolytope(const WideBody& body, const WideVector& about);
 
-  /// Keeps the corners beyond a plane, then finds the facets and ridges that any of them belongs to.
+  /// Keeps the corners beyond a plane. Then finds the facets and ridges with any of these corners.
   void cut(Vec3 direction, double height);
 
   std::vector<NearCorner> corners;
   std::vector<NearFacet> facets;
   std::vector<NearRidge> ridges;
-  double radius = 0;  ///< about the origin, of all corners
+  double radius = 0;  ///< of all corners, about the origin
 
   WideVector corner(int i) const { return body_.placed(wide(local_[i])); }
   WideVector corner(const NearCorner& c) const { return corner(c.number); }
   WideVector normal(const NearFacet& facet) const;
   WideVector along(const NearRidge& ridge) const;
 
-  /// How far off that normal may be: more for a needle.
+  /// Error of that normal; larger for a needle.
   double lost(const NearFacet& facet) const;
 
-  /// At least and at most so far it reaches along any direction that `direction` may be the rounding of.
+  /// Lower and upper bound of the support along any direction that rounds to `direction`.
   double least_reach(Vec3 direction) const;
   double most_reach(Vec3 direction) const;
 

@@ -15,7 +15,7 @@
 namespace overlapper {
 namespace {
 
-/// EPA's polytope: support points of the difference of two cores, and which of its facets are known to be final.
+/// EPA's polytope: support points of the difference of two cores, and whether each facet is final.
 class DepthSearch {
  public:
   DepthSearch(const Placed& a, const Placed& b) : a_(a), b_(b) {}
@@ -26,8 +26,8 @@ class DepthSearch {
     for (double x : {-1.0, 1.0})
       for (double y : {-1.0, 1.0})
         for (double z : {-1.0, 1.0}) ask({x, y, z});
-    // A slender difference may show its corners in one plane only. Asked across that plane, it shows more, unless it is
-    // flat itself, which the difference of two segments is.
+    // The support points of a slender difference may all lie in one plane. Its support across that plane adds more,
+    // unless the difference itself is flat, as for two segments.
     bool solid = hull_.build();
     for (int attempt = 0; attempt < 3 && !solid; ++attempt) {
       const Vec3 across = across_all();
@@ -44,7 +44,7 @@ class DepthSearch {
       const double before = offset_[facet];
       const double reached = ask(normal);
       const int p = static_cast<int>(hull_.points.size()) - 1;
-      // A smooth rim is never reached: stop when the facet's offset and the support agree to rounding.
+      // The polytope never reaches a smooth rim. Stop when the facet's offset and the support agree to rounding.
       if (reached - before <= rounding(extent_) || !hull_.sees(facet, p)) {
         final_.resize(hull_.facets.size(), false);
         final_[facet] = true;
@@ -56,7 +56,8 @@ class DepthSearch {
     return best_;
   }
 
-  /// No more than the depth of the polytope, and so of what holds it but for the rounding of its points.
+  /// A lower bound of the depth of the polytope, and so of the set around the polytope, but for the rounding of its
+  /// points.
   double lower() {
     if (hull_.facets.empty()) return -std::numeric_limits<double>::infinity();
     least_facet();
@@ -68,7 +69,8 @@ class DepthSearch {
 
  private:
   static constexpr int kMaxRounds = 2000;
-  /// Of the coordinates: a way out that is longer than the nearest facet is far by less is the least.
+  /// Relative to the coordinates. A way out counts as the least if it is no more than this longer than the distance of
+  /// the nearest facet.
   static constexpr double kSettled = 1e-12;
 
   Vec3 corner(int facet, int i) const { return hull_.points[hull_.facets[facet].vertex[i]]; }
@@ -80,7 +82,7 @@ class DepthSearch {
     extent_ = std::max(extent_, max_component(abs(w)));
     hull_.add(w);
     const double offset = dot(direction, w);
-    // `direction` pushes A - B away from the origin; a leaves b the opposite way.
+    // `direction` moves A - B away from the origin. Body a leaves b in the opposite direction.
     if (offset < best_.depth) best_ = {offset, -direction};
     return offset;
   }
@@ -89,8 +91,8 @@ class DepthSearch {
     return unit(accurate_normal(corner(facet, 0), corner(facet, 1), corner(facet, 2)));
   }
 
-  /// The facet nearest to the origin that is not final yet. Equally turned boxes make needles of collinear corners,
-  /// whose plain normals are all rounding: ranked by those, the nearest facet may come last.
+  /// The facet nearest to the origin that is not final yet. Boxes with parallel axes make needles of collinear corners,
+  /// and the plain normals of needles are only rounding. Ranked by plain normals, the nearest facet may come last.
   int least_facet() {
     int best = -1;
     double least = std::numeric_limits<double>::infinity();
@@ -103,7 +105,7 @@ class DepthSearch {
     return best;
   }
 
-  /// Orthogonal to the plane, or to the line, of the points so far.
+  /// Orthogonal to the plane, or to the line, of the present points.
   Vec3 across_all() const {
     Vec3 u, v;
     for (Vec3 p : hull_.points) {
@@ -122,7 +124,7 @@ class DepthSearch {
   const Placed &a_, &b_;
   ExpandingHull hull_;
   std::vector<char> final_;
-  std::vector<double> offset_;  ///< per facet: of its plane, along its outward unit normal
+  std::vector<double> offset_;  ///< per facet: offset of its plane along the outward unit normal
   double extent_ = 0;
   Penetration best_{std::numeric_limits<double>::infinity(), {}};
 };
@@ -147,7 +149,7 @@ Penetration penetration(const Placed& a, const Placed& b) {
   if (!cores.origin_inside && cores.gap > 0) return {radius - cores.distance, cores.normal, cores.distance - cores.gap};
   if (of_boxes) return *of_boxes;
   Penetration result = DepthSearch(a, b).run();
-  // Of cores that have nothing in common after all, the way along a facet's normal may be the wrong one.
+  // Where the cores have no common point after all, the normal of a facet may be wrong.
   if (!(result.depth > 0) && radius > 0) result.open = std::numeric_limits<double>::infinity();
   result.depth += radius;
   return result;

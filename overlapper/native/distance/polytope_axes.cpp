@@ -11,15 +11,15 @@
 namespace overlapper {
 namespace {
 
-/// A direction and how far the other solid reaches against it.
+/// A direction, and the lowest vertex of the other solid along it.
 struct Lowest {
   Vec3 direction;  ///< unit
-  int vertex;      ///< lowest along it
-  double height;   ///< of that vertex
+  int vertex;      ///< lowest along the direction
+  double height;   ///< height of that vertex
 };
 
-/// The ways along the normals of one solid's facets into the other. One that the first few vertices already show to be
-/// longer than the best one known ends at the lowest of these.
+/// The ways out along the facet normals of one solid. If the first few vertices already show that a way is longer than
+/// the best known one, its search ends at the lowest of these vertices.
 void lowest_along_normals(const Solid& faces, const Solid& other, double best, std::vector<Lowest>& ways) {
   ways.resize(faces.stride);
   for (int f = 0; f < faces.facets; f += 4) {
@@ -50,12 +50,12 @@ void lowest_along_normals(const Solid& faces, const Solid& other, double best, s
   }
 }
 
-/// The least translation that parts two solids in the same coordinates.
+/// The least translation that separates two solids in the same coordinates.
 class PartingSearch {
  public:
   PartingSearch(const Solid& a, const Solid& b, double rounding) : a_(a), b_(b), rounding_(rounding) {}
 
-  /// False if they may be apart, or if doubles cannot tell.
+  /// False if the solids may be separated, or if doubles cannot decide.
   bool run() {
     thread_local std::vector<Lowest> of_a, of_b;
     lowest_along_normals(a_, b_, best_.depth, of_a);
@@ -77,17 +77,17 @@ class PartingSearch {
     if (depth < best_.depth) best_ = {depth, Vec3{} - direction};
   }
 
-  /// Looks for shorter ways out between two directions in which a reaches farthest with an edge.
+  /// Searches for shorter ways out between two directions along which the support of a is the same edge.
   bool search_arc(const Edge& edge, const Lowest& left, const Lowest& right, int turns) {
     if (left.vertex == right.vertex) return true;
     const Vec3 from = a_.vertex(edge.from), low_left = b_.vertex(left.vertex), low_right = b_.vertex(right.vertex);
     const Vec3 step = low_right - low_left;
     const double rise = dot(left.direction, step), fall = -dot(right.direction, step);
-    // Of two ways, one was found among all vertices that the other was, so that either vertex may bound the whole arc,
-    // but not each be the lower one at the far end.
+    // The vertex of one end is also lowest at the other end. One vertex then bounds the whole arc.
     if (!(rise > 0 && fall > 0)) return true;
-    // Both vertices of b are equally low here, so that the difference reaches at least so far; between here and either
-    // end, where the vertex there bounds it, it reaches at least as far as at the nearer of the two.
+    // Both vertices of b are equally low in this direction, which gives a lower bound of the support of the difference.
+    // Between this direction and either end, the vertex of that end bounds the support: it is at least the lesser of
+    // the two supports.
     const Vec3 crossing = left.direction + rise / (rise + fall) * (right.direction - left.direction);
     if (dot(crossing, from - low_left) - rounding_ >= best_.depth * std::sqrt(norm2(crossing))) return true;
     if (turns == 0) return false;
@@ -101,12 +101,12 @@ class PartingSearch {
     return search_arc(edge, left, across, turns - 1) && search_arc(edge, across, right, turns - 1);
   }
 
-  /// The unit vector of the arc of an edge that is orthogonal also to a segment between two vertices of b.
+  /// The unit vector that is orthogonal to the edge and to the segment between two vertices of b.
   Vec3 orthogonal(const Edge& edge, int left, int right) const {
     const Vec3 along = a_.vertex(edge.to) - a_.vertex(edge.from), step = b_.vertex(right) - b_.vertex(left);
     const Vec3 product = cross(along, step);
     if (16 * norm2(product) > norm2(along) * norm2(step)) return unit(product);
-    // The product of two nearly parallel edges would tilt along them in doubles.
+    // In doubles, rounding would tilt the product of two nearly parallel edges along these edges.
     return unit(rounded(cross(wide_difference(a_.vertex(edge.to), a_.vertex(edge.from)),
                               wide_difference(b_.vertex(right), b_.vertex(left)))));
   }
@@ -127,7 +127,7 @@ class PartingSearch {
   }
 
   const Solid &a_, &b_;
-  double rounding_;  ///< m: of heights, and what they are off where facets are not flat
+  double rounding_;  ///< m: error of heights, by rounding and by facets that are not quite flat
   Penetration best_{std::numeric_limits<double>::infinity(), {}};
 };
 

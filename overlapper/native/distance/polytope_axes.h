@@ -7,11 +7,11 @@
 
 namespace overlapper {
 
-/// The penetration() of two boxes or hulls of few facets that overlap beyond doubt; none for other pairs, and where
-/// rounding has merged facets that are not flat. The least way out is orthogonal to a facet of the difference: to a
-/// facet of either body, or to an edge of each. Edges are not tried pair by pair. Along the arc between the normals of
-/// the two facets at an edge of `a`, the support of a is that edge, and the support of b is bounded by the vertices of
-/// b known so far; where two such bounds cross, and only if they cross below the best way out known, b is asked again.
+/// The penetration() of two boxes or hulls of few facets, if they certainly overlap. No value for other pairs, nor
+/// where rounding has merged facets that are not coplanar. The least way out is orthogonal to a facet of either body or
+/// to an edge of each body. Pairs of edges are not tried one by one. Along the arc between the normals of the two
+/// facets at an edge of `a`, the support of a is this edge. The known vertices of b bound the support of b. The search
+/// asks b again only where two such bounds cross below the best way out.
 std::optional<Penetration> polytope_penetration(const Placed& a, const Placed& b);
 
 }  // namespace overlapper

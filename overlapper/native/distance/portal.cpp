@@ -37,7 +37,7 @@ class Refinement {
     return {a_.data().vertices[i], pose_ * b_.data().vertices[j]};
   }
 
-  /// True if the search ends because all of A - B lies on the far side of a plane, or too near to tell.
+  /// True if the search ends because all of A - B lies on the far side of a plane, or too near to decide.
   bool separates(const DifferencePoint& farthest, Vec3 direction) {
     const double reached = dot(farthest.difference(), direction);
     if (reached > 0) return false;
@@ -45,7 +45,7 @@ class Refinement {
     return true;
   }
 
-  /// Three support points around the ray; false if the answer has been found on the way, or none will be.
+  /// Finds three support points around the ray. False if the search ends here, with an answer or without.
   bool surround_ray() {
     const Vec3 inner = inner_.difference();
     corner_[0] = support(-inner);
@@ -75,7 +75,7 @@ class Refinement {
     return false;
   }
 
-  /// The part of the portal, seen with a new corner, through which the ray leaves.
+  /// Replaces one corner of the portal by the new corner, so that the ray still leaves through the portal.
   void narrow(const DifferencePoint& farther) {
     const Vec3 across = cross(farther.difference(), inner_.difference());
     if (dot(corner_[0].difference(), across) > 0) {
@@ -85,7 +85,7 @@ class Refinement {
     }
   }
 
-  /// The origin as a combination of the inner point and the corners: shares of volume.
+  /// The origin as a combination of the inner point and the corners; the weights are fractions of volume.
   void stop_inside(Vec3 outward) {
     const Vec3 o = inner_.difference(), p = corner_[0].difference(), q = corner_[1].difference(),
                r = corner_[2].difference();
@@ -113,7 +113,7 @@ Portal find_portal(const Mesh& a, const Mesh& b, const Pose& pose, double doubt)
   const Vec3 centre_a = a.data().centroid, centre_b = pose * b.data().centroid;
   const Vec3 between = centre_b - centre_a;
   const double apart2 = norm2(between), near = std::max(a.graph().inradius, b.graph().inradius) / 2;
-  // A centroid deep inside the other body will do.
+  // A centroid deep inside the other body is a common point.
   if (apart2 < near * near) {
     const Vec3 point = a.graph().inradius > b.graph().inradius ? centre_b : centre_a;
     return {Portal::Answer::kCommon, point, apart2 > 0 ? between : Vec3{1, 0, 0}};

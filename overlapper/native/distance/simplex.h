@@ -9,7 +9,7 @@
 
 namespace overlapper {
 
-/// A point of the Minkowski difference A - B with the points of A and of B that make it.
+/// A point of the Minkowski difference A - B, with its points of A and of B.
 template <class Vector>
 struct DifferencePointOf {
   Vector on_a, on_b;
@@ -27,7 +27,7 @@ struct SimplexOf {
   std::array<Point, 4> corner;
   std::array<Scalar, 4> weight{};
   int size = 0;
-  Vector nearest;  ///< that point: from the plane or line of the corners, so that it has a direction even when tiny
+  Vector nearest;  ///< that point, from the plane or line of the corners: it has a direction even when tiny
 
   /// The same combination of the points of A; a common point of both if `nearest` is the origin.
   Vector witness_a() const { return combined(&Point::on_a); }
@@ -42,40 +42,40 @@ struct SimplexOf {
 };
 using Simplex = SimplexOf<Vec3>;
 
-/// What GJK knows when it stops.
+/// The result of GJK.
 template <class Vector>
 struct SeparationOf {
   SimplexOf<Vector> simplex;
   bool origin_inside = false;  ///< the simplex contains the origin
   double distance = 0;         ///< length of simplex.nearest, 0 if the origin is inside; an upper bound
-  /// A lower bound: the support planes along `normal` are so far apart; negative if none separates.
+  /// A lower bound of the distance: the gap between the supporting planes along `normal`; negative if none separates.
   double gap = -std::numeric_limits<double>::infinity();
   Vector normal;  ///< unit, from b to a; {0, 0, 0} if the origin is inside
 };
 using Separation = SeparationOf<Vec3>;
 
-// What differs between doubles and double-doubles.
+// Differences between doubles and double-doubles.
 
-/// The square orders points as their distance does and takes no root.
+/// The squared distance orders points like the distance, without a square root.
 inline double rank(Vec3 nearest) { return norm2(nearest); }
-/// The square of what double-doubles tell from nothing may underflow. A point that is nearer by a share of 1e-16 has a
-/// direction that is off by the root of that, and more digits count.
+/// The square of a tiny distance may underflow in double-double. A relative excess of 1e-16 in the distance turns the
+/// direction by its square root, 1e-8, so the order must use more digits.
 inline DoubleDouble rank(const WideVector& nearest) { return norm(nearest); }
 
-/// Whether GJK may take a step that leads nearer by nothing but rounding, onto more corners. Of four that are in one
-/// plane but for rounding, the nearest point may be on the diagonal that is no edge: the way from there to a third is
-/// shorter by the square of rounding only, but the normal of the three tells that the fourth is nearer.
+/// Whether GJK may take a step to more corners that is shorter only by rounding. If four corners are coplanar but for
+/// rounding, the nearest point may be on the diagonal of their quadrilateral. The step to a third corner then gains
+/// only the square of rounding, but the normal of these three corners leads to the fourth.
 template <class Vector>
 inline constexpr bool kTurnsOnTheSpot = !std::is_same_v<Vector, Vec3>;
 
-/// A needle's normal is found with about twice as many digits as its corners have.
+/// Gives the normal of a needle about twice as many digits as its corners have.
 inline Vec3 plane_normal(Vec3 a, Vec3 b, Vec3 c) { return accurate_normal(a, b, c); }
-/// Double-doubles have digits to spare, and are scaled to keep their products in range.
+/// Double-doubles have digits to spare; scaling keeps their products in range.
 inline WideVector plane_normal(const WideVector& a, const WideVector& b, const WideVector& c) {
   return unit(cross(b - a, c - a));
 }
 
-/// The point nearest to the origin of the plane through p with that plane_normal().
+/// The point nearest to the origin on the plane through p with that plane_normal().
 inline Vec3 foot(Vec3 normal, Vec3 p) { return dot(normal, p) / norm2(normal) * normal; }
 inline WideVector foot(const WideVector& normal, const WideVector& p) { return dot(normal, p) * normal; }
 
@@ -94,7 +94,7 @@ inline bool weigh(Vec3 a, Vec3 b, Vec3 c, Vec3 d, std::array<double, 4>& weight)
   for (double& w : weight) w /= sum;
   return true;
 }
-/// True if all shares have one sign in double-double; corners there are not doubles, and have no exact predicates.
+/// True if all weights have one sign in double-double. These corners are not doubles, so exact predicates do not apply.
 inline bool weigh(const WideVector& a, const WideVector& b, const WideVector& c, const WideVector& d,
                   std::array<DoubleDouble, 4>& weight) {
   const DoubleDouble wa = -dot(b, cross(c, d)), wb = dot(a, cross(c, d)), wc = -dot(a, cross(b, d)),
@@ -105,8 +105,8 @@ inline bool weigh(const WideVector& a, const WideVector& b, const WideVector& c,
   return std::ranges::none_of(weight, [](DoubleDouble w) { return w.head < 0; });
 }
 
-/// Exact signs are better proof that the origin is inside than a face, edge or corner that rounding has put it on.
-/// Where signs are not exact, the fewest corners are.
+/// Exact signs prove better that the origin is inside than a face, edge or corner onto which rounding has put it.
+/// Without exact signs, the fewest corners are the better proof.
 template <class Vector>
 inline constexpr bool kInsideIsExact = std::is_same_v<Vector, Vec3>;
 
@@ -131,15 +131,15 @@ bool weigh(const Vector& a, const Vector& b, const Vector& c, SimplexOf<Vector>&
   if (!(rounded(wa) > 0 && rounded(wb) > 0 && rounded(wc) > 0 && rounded(dot(n, n)) > 0)) return false;
   const auto sum = wa + wb + wc;
   s.weight = {wa / sum, wb / sum, wc / sum};
-  // The normal of a needle is known to more digits than a sum of its far corners, of which nearly all cancels.
+  // The normal of a needle has more digits than a sum of its far corners, which nearly cancels.
   const auto aa = dot(a, a), bb = dot(b, b), cc = dot(c, c);
   s.nearest = foot(n, !(aa > bb) && !(aa > cc) ? a : !(bb > cc) ? b : c);
   return true;
 }
 
-/// Keeps the corners that support the point nearest to the origin. All sub-simplices are tried and the nearest valid
-/// one wins, which needs no case analysis of Voronoi regions that rounding could contradict. Returns the rank() of
-/// that point: 0 if the origin is inside.
+/// Keeps the corners that support the point nearest to the origin. Tries all sub-simplices and takes the nearest valid
+/// one. This needs no case analysis of Voronoi regions, which rounding could contradict. Returns the rank() of the
+/// nearest point: 0 if the origin is inside.
 template <class Vector>
 auto reduce(SimplexOf<Vector>& s) {
   SimplexOf<Vector> best;
@@ -170,7 +170,7 @@ auto reduce(SimplexOf<Vector>& s) {
   return least;
 }
 
-/// Whether the point nearest to the origin of the line or plane of all corners is between them; then `s` has it.
+/// True if the nearest point of the line or plane of all corners is between the corners; `s` then holds it.
 template <class Vector>
 bool reaches_with_all(SimplexOf<Vector>& s) {
   const auto corner = [&](int i) { return s.corner[i].difference(); };
@@ -186,9 +186,9 @@ bool contains(const SimplexOf<Vector>& s, const Vector& difference) {
 }
 
 /// GJK with witness points (Gilbert, Johnson, Keerthi 1988), from any `first` point of A - B. `support` finds a
-/// farthest point of A - B along a unit vector. `settled(length, gap, best)` says whether the distance is known well
-/// enough: it lies between `length` and `gap`, which this round has found, or `best`, which any round has (the duality
-/// gap of Frank and Wolfe).
+/// farthest point of A - B along a unit vector. `settled(length, gap, best)` decides whether the distance is known well
+/// enough. The distance is at most `length`, and at least `gap` of this round and `best` of all rounds (the duality gap
+/// of Frank and Wolfe).
 template <class Vector, class Support, class Settled>
 SeparationOf<Vector> separate(const DifferencePointOf<Vector>& first, const Support& support, const Settled& settled) {
   SeparationOf<Vector> result;
@@ -198,8 +198,8 @@ SeparationOf<Vector> separate(const DifferencePointOf<Vector>& first, const Supp
   simplex.size = 1;
   simplex.nearest = first.difference();
   auto least = rank(simplex.nearest);
-  // Polytopes end by themselves, as each round finds a new vertex; a cylinder's rim converges, and no bit improves
-  // after some dozens of rounds.
+  // Polytopes end by themselves, as each round finds a new vertex. A cylinder's rim converges: no bit improves after
+  // some dozens of rounds.
   constexpr int kMaxRounds = 256;
   for (int round = 0; round < kMaxRounds; ++round) {
     const auto length = norm(simplex.nearest);

@@ -26,13 +26,13 @@ WideGap wide_gap(const WideBody& a, const WideBody& b, double rounding) {
   };
   WideVector towards = b.position() - a.position();
   if (!(norm(towards).head > 0)) towards = wide({1, 0, 0});
-  // The gap of this round: a bound that an earlier one has found says nothing about the present nearest point, which
-  // the witness points are made from.
+  // The gap of this round. The bound of an earlier round says nothing about the present nearest point, which gives the
+  // witness points.
   const auto settled = [&](double length, double gap, double) { return length - gap <= rounding; };
   const SeparationOf<WideVector> cores = separate(support(towards), support, settled);
 
   const double radius_a = core_radius(a.shape), radius_b = core_radius(b.shape);
-  // The difference of the radii and a distance of nearly their sum is taken before it is rounded.
+  // The distance may be nearly the sum of the radii: subtract before rounding.
   const DoubleDouble radii = two_sum(radius_a, radius_b);
   const DoubleDouble apart = cores.origin_inside ? DoubleDouble{} : norm(cores.simplex.nearest);
   const WideVector& normal = cores.normal;
@@ -42,8 +42,8 @@ WideGap wide_gap(const WideBody& a, const WideBody& b, double rounding) {
   result.most = (norm(cores.simplex.witness_a() - cores.simplex.witness_b()) - radii).head;
   result.certified = cores_apart ? (dot(support(-normal).difference(), normal) - radii).head : -radii.head;
   if (cores_apart) result.normal = rounded(normal);
-  // Along the line of the witness points of the cores, those of the bodies are as far apart as the bodies are: on a
-  // rim, the direction that proves the most is off by half of the digits.
+  // Along the line of the cores' witness points, the distance of the bodies' witness points is the distance of the
+  // bodies. On a rim, the direction that proves the largest gap is known to half of the digits only.
   const WideVector along = cores_apart ? unit(cores.simplex.nearest) : normal;
   result.witness_a = cores.simplex.witness_a() - DoubleDouble{radius_a} * along;
   result.witness_b = cores.simplex.witness_b() + DoubleDouble{radius_b} * along;

@@ -18,18 +18,18 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Two directions of a smaller sine than this have their product taken in double-double.
+/// If the sine between two directions is smaller than this, their product is taken in double-double.
 constexpr double kNearlyParallel = 0x1p-3;
 
-/// Of the sine between an arc's middle and a direction that is along it or against it: sums of unit vectors, times
-/// sines that may be as small as what is lost.
+/// Error of the sine between an arc's middle and a direction along it or against it. The sine comes from sums of unit
+/// vectors times sines that may be as small as the error.
 constexpr double kDoubtful = 0x1p-40;
 
-/// A unit vector across two: of nearly parallel ones the product is mostly what double-doubles lose, and then taken to
-/// be across the first.
+/// A unit vector across two directions. For nearly parallel directions the product is mostly rounding error; the vector
+/// then counts as across the first only.
 struct Across {
   WideVector direction;
-  double sine, lost;  ///< between the two; of the direction
+  double sine, lost;  ///< between the two directions; error of `direction`
 };
 Across across(const WideVector& u, const WideVector& v) {
   const WideVector product = cross(u, v);
@@ -38,14 +38,14 @@ Across across(const WideVector& u, const WideVector& v) {
   return {unit(about - dot(u, about) * u), sine, std::min(kLostWide / sine, kLostWide + sine)};
 }
 
-/// What is known of the ways along which A - B, of the cores, is left: directions point out of it.
+/// The lengths of the ways out of A - B, of the cores. Directions point out of A - B.
 class Ways {
  public:
   Ways(const WideBody& a, const WideBody& b) : a_(a), b_(b), lost_(0x1p-94 * (a.reach() + b.reach())) {}
 
   DoubleDouble shortest() const { return shortest_; }
   const WideVector& direction() const { return direction_; }
-  /// m: of the way along a direction, by double-doubles.
+  /// m: error of the way along a direction, in double-double.
   double lost() const { return lost_; }
 
   /// The way along a unit direction.
@@ -62,9 +62,9 @@ class Ways {
   WideVector direction_;
 };
 
-/// A normal of the difference's that may be the least way out.
+/// A normal of the difference that may be the least way out.
 struct Candidate {
-  double least;  ///< m: the way along it is no shorter
+  double least;  ///< m: lower bound of the way along it
   enum Kind { kFacetOfA, kFacetOfB, kRidges } kind;
   int of_a, of_b;
   double sign;  ///< of the product of two ridges
@@ -76,12 +76,12 @@ class PolytopeSearch {
       : ways(a, b), a_(a, about), b_(b, about) {}
 
   Ways ways;
-  double lower = kInfinity;  ///< m: no way is shorter, if the cores have a common point
+  double lower = kInfinity;  ///< m: lower bound of all ways, if the cores have a common point
 
-  /// False if there are too many ridges to compare each with each, or too many ways along which all corners are asked.
+  /// False if there are too many pairs of ridges to compare, or too many ways to measure with all corners.
   bool run(Vec3 outward) {
     ways.measure(unit(wide(outward)));
-    // Where the bodies part, a point of each is on the other, or as near as the way out is long.
+    // On the least way out, a point of each body is on the other body, or no farther from it than the way is long.
     const double farthest_a = a_.most_reach(outward), farthest_b = b_.most_reach(-outward);
     const double room = up(way() * (1 + 0x1p-40)) + ways.lost();
     a_.cut(outward, -farthest_b - room);
@@ -97,7 +97,7 @@ class PolytopeSearch {
     std::ranges::sort(candidates_, {}, &Candidate::least);
     for (const Candidate& candidate : candidates_) {
       cancellation_point();
-      // The rest are longer.
+      // Candidates are sorted: all others are longer.
       if (candidate.least > way()) break;
       lower = std::min(lower, measured(candidate));
     }
@@ -105,7 +105,7 @@ class PolytopeSearch {
     return true;
   }
 
-  /// True if the difference has an inside, so that its least way out is along the normal of a facet.
+  /// True if the difference has an interior. Its least way out is then along the normal of a facet.
   bool solid() const { return !a_.facets.empty() || !b_.facets.empty(); }
 
  private:
@@ -127,10 +127,10 @@ class PolytopeSearch {
                                           : std::max(least, least_of_strip(of_a, of_b, u, direction, ridges.lost));
   }
 
-  /// The same for the facet of two ridges, of which nearly parallel ones make a strip: where its direction is off, it
-  /// is turned about the ridge of a, and what lies on the strip moves by no more than its distance from there. The
-  /// point of the surface that is nearest to the origin is where a facet's normal from there meets the facet: a strip
-  /// beside which that passes is not the least way out.
+  /// A lower bound of the way along the exact normal of the facet of two ridges. Nearly parallel ridges make a strip.
+  /// The error of the strip's direction turns it about the ridge of a, and moves a point of the strip by at most that
+  /// angle times the point's distance from the ridge. The nearest point of the surface is the foot of the origin on its
+  /// facet. If the foot is beside a strip, the strip is not the least way out.
   double least_of_strip(const NearRidge& of_a, const NearRidge& of_b, const WideVector& along_a,
                         const WideVector& direction, double lost) const {
     const WideVector across = cross(along_a, direction);
@@ -157,7 +157,7 @@ class PolytopeSearch {
     if (candidate.least <= way()) candidates_.push_back(candidate);
   }
 
-  /// False if no point of the ridge is as near to the other body as the way out is long.
+  /// False if every point of the ridge is farther from the other body than the way out is long.
   bool near(const NearRidge& ridge, const NearPolytope& other) const {
     return norm(ridge.near.at) - ridge.near.lost <= way() + other.radius;
   }
@@ -177,7 +177,8 @@ class PolytopeSearch {
     }
   }
 
-  /// Two ridges make a facet where the arcs between the normals of the facets beside each, one of them reversed, cross.
+  /// Two ridges make a facet if two arcs cross: the arc between the facet normals beside one ridge, and the reversed
+  /// arc of the other.
   void consider_ridges(int i, int j, const std::vector<double>& rises) {
     const NearRidge &of_a = a_.ridges[i], &of_b = b_.ridges[j];
     Vec3 arc_a, arc_b;
@@ -194,7 +195,7 @@ class PolytopeSearch {
     if (sine < kNearlyParallel) {
       product = rounded(cross(a_.along(of_a), b_.along(of_b)));
       sine = norm(product);
-      // Parallel ridges make no facet that is not one of a body's, too.
+      // A facet of parallel ridges is also parallel to a facet of one body.
       if (sine < kLostWide) return;
     }
     product = product / sine;
@@ -206,8 +207,8 @@ class PolytopeSearch {
     }
   }
 
-  /// False if the arc from `left` to `right`, which are so far to one side of a plane, does not cross it; `at` is then
-  /// about where it does.
+  /// False if the arc from `left` to `right` does not cross a plane. `left_side` and `right_side` are the signed
+  /// distances of its ends from the plane. `at` is then about the crossing.
   static bool crossed(Vec3 left, double left_side, Vec3 right, double right_side, Vec3& at) {
     if (std::min(left_side, right_side) > kLost || std::max(left_side, right_side) < -kLost) return false;
     if (std::min(std::abs(left_side), std::abs(right_side)) > kLost)
@@ -220,7 +221,7 @@ class PolytopeSearch {
   double corners_asked_ = 0;
 };
 
-/// A cylinder, whose axis and rims are known in double-double.
+/// A cylinder with its axis and rims in double-double.
 struct Rims {
   WideVector centre, axis;
   double radius, half;
@@ -231,11 +232,12 @@ struct Rims {
   }
 };
 
-/// The point of an ellipse about the origin, with semi-axes 1 along y and `k` < 1 along x, that is nearest to (x, y),
-/// on its side of positive x: its eccentric angle, if the distance has a local minimum there.
+/// The nearest point to (x, y) on an ellipse about the origin with semi-axes 1 along y and `k` < 1 along x, on its side
+/// of positive x. Returns its eccentric angle, if the distance has a local minimum there.
 ///
-/// With `s` = 1 - k², the slope of half the square of the distance is cos φ (k x tan φ - y + s sin φ). For x >= 0 the
-/// bracket grows all the way, else where cos³ φ > k |x| / s; a local minimum is where it grows through zero.
+/// With `s` = 1 - k², the slope of half the squared distance is cos φ (k x tan φ - y + s sin φ). For x >= 0 the bracket
+/// increases everywhere. For x < 0 it increases where cos³ φ > k |x| / s. A local minimum is where the bracket
+/// increases through zero.
 std::optional<double> nearest_on_ellipse(double k, double s, double x, double y) {
   const double slope = k * x;
   double end = std::numbers::pi / 2;
@@ -260,18 +262,19 @@ std::optional<double> nearest_on_ellipse(double k, double s, double x, double y)
   return angle;
 }
 
-/// The ways out of a cylinder and a polytope, or of two cylinders but for those where two rims meet.
+/// The ways out of a cylinder and a polytope, or of two cylinders except where two rims meet.
 ///
-/// A support function has a local minimum on the sphere only where both radii of curvature are as long as the way
-/// out, or where it has a kink; a rim is straight across itself. So the least way is along the axis, along the normal
-/// of a facet, across the axis and a ridge, from the axis through a corner, or through a point of a rim at which a
-/// ridge leaves it: there the rim, seen along the ridge, is an ellipse, and the point the nearest one of it.
+/// A support function has a local minimum on the sphere only where both radii of curvature are as long as the way out,
+/// or where it has a kink. A rim is straight across itself. The least way is therefore one of these: along the axis;
+/// along the normal of a facet; across the axis and a ridge; from the axis through a corner; or through a point of a
+/// rim at which a ridge leaves it. In the last case the rim, seen along the ridge, is an ellipse, and the point is the
+/// nearest one of the ellipse.
 class RimSearch {
  public:
   RimSearch(const WideBody& a, const WideBody& b) : ways(a, b), a_(a), b_(b) {}
 
   Ways ways;
-  double lower = kInfinity;  ///< m: of the ways looked at
+  double lower = kInfinity;  ///< m: least of the measured ways
 
   void run(Vec3 outward, const WideVector& about) {
     ways.measure(unit(wide(outward)));
@@ -316,13 +319,14 @@ class RimSearch {
   void along_axis(const Rims& rims, double sign) { look(sign * rims.axis, 0), look(-sign * rims.axis, 0); }
 
   static WideVector from_axis(const Rims& rims, const WideVector& arm) {
-    // Of an arm along the axis nothing is left but what double-doubles lose, and any direction will do.
+    // For an arm along the axis, only rounding error is left, and any direction is good.
     const auto leveled = [&](const WideVector& v) { return unit(v - dot(rims.axis, v) * rims.axis); };
     const WideVector level = leveled(leveled(arm));
     return norm(level).head > 0 ? level : leveled(wide(any_orthogonal(rounded(rims.axis))));
   }
 
-  /// Across the axis and a ridge, and in the plane across the ridge; `arm` leads from the ridge to the centre.
+  /// Ways across the axis and a ridge, and ways in the plane across the ridge. `arm` leads from the ridge to the
+  /// centre.
   void beside(const Rims& rims, const WideVector& ridge, const WideVector& arm, double sign) {
     const auto [level, sine, lost] = across(rims.axis, ridge);
     if (sine < kLostWide) return;
@@ -336,13 +340,13 @@ class RimSearch {
       const auto angle = nearest_on_ellipse(k, sine * sine, from_cap / r, y / r);
       if (!angle) continue;
       const WideVector direction = side * std::cos(*angle) * upward + k * std::sin(*angle) * level;
-      // At a local minimum, the way is by no more too long than its slope there, which rounding leaves, times the
-      // angle.
+      // At a local minimum the excess length of the way is at most its slope, which is rounding, times the angle.
       look(sign * unit(direction), lost, 0x1p-46 * (std::abs(from_cap) + std::abs(y) + r));
     }
   }
 
-  /// Measures the way along a direction that is off by `lost`, and too long by `too_long`.
+  /// Measures the way along a direction with the error `lost`; the way is at most `too_long` longer than the local
+  /// minimum.
   void look(const WideVector& direction, double lost, double too_long = 0) {
     const double way = ways.measure(direction);
     lower = std::min(lower, way - ways.lost() - lost * (a_.reach() + b_.reach()) - too_long);
@@ -351,11 +355,11 @@ class RimSearch {
   const WideBody &a_, &b_;
 };
 
-/// The ways out of an ellipsoid and a polytope, or a cylinder.
+/// The ways out of an ellipsoid and a polytope, or an ellipsoid and a cylinder.
 ///
-/// They are where the support function has a local minimum or a kink: along the normal of a facet; across a ridge,
-/// where the ellipsoid is seen as an ellipse, of which the ridge's point has nearest ones; or from a corner to a
-/// nearest point of the surface. A point inside of an ellipsoid has two of these at most.
+/// The support function has its local minima and kinks there. The way is along the normal of a facet, across a ridge,
+/// or from a corner to a nearest point of the surface. Across a ridge the ellipsoid is seen as an ellipse, with the
+/// nearest points to the ridge. A point inside an ellipsoid has at most two such points.
 class EllipsoidSearch {
  public:
   /// Directions point out of the ellipsoid `a`; `sign` turns them out of A - B.
@@ -368,7 +372,7 @@ class EllipsoidSearch {
         axes_{a.turned({{1}, {}, {}}), a.turned({{}, {1}, {}}), a.turned({{}, {}, {1}})},
         reach_(a.reach() + b.reach()) {}
 
-  double lower = kInfinity;  ///< m: of the ways looked at
+  double lower = kInfinity;  ///< m: least of the measured ways
 
   void of_polytope(NearPolytope& polytope) {
     for (const NearFacet& facet : polytope.facets) look(-polytope.normal(facet), polytope.lost(facet) * reach_);
@@ -388,15 +392,14 @@ class EllipsoidSearch {
   Vec3 seen(const WideVector& v) const { return {dot(axes_[0], v).head, dot(axes_[1], v).head, dot(axes_[2], v).head}; }
   WideVector placed(Vec3 v) const { return v.x * axes_[0] + v.y * axes_[1] + v.z * axes_[2]; }
 
-  /// m: at a local minimum, the way is by no more too long than its slope there, which rounding leaves, times the
-  /// angle.
+  /// m: at a local minimum the excess length of the way is at most its slope, which is rounding, times the angle.
   double beside_least(Vec3 place) const { return 0x1p-46 * (norm(place) + longest_); }
 
-  /// Across a ridge through that point.
+  /// Ways across a ridge through `point`.
   void beside(const WideVector& ridge, const WideVector& point) {
     const Vec3 along = seen(ridge), place = seen(point - centre_);
     const Vec3 u = any_orthogonal(along), v = cross(along, u);
-    // The principal axes of what is seen along the ridge.
+    // The principal axes of the ellipse that is seen along the ridge.
     const Vec3 p = scaled(shape_.half_axes, u), q = scaled(shape_.half_axes, v);
     const double angle = std::atan2(2 * dot(p, q), dot(p - q, p + q)) / 2;
     const Vec3 major = std::cos(angle) * u + std::sin(angle) * v, minor = cross(along, major);
@@ -423,8 +426,8 @@ class EllipsoidSearch {
   double reach_;
 };
 
-/// The way out where two curved surfaces meet, from a direction near it: a local minimum of the support function, by
-/// Newton's method.
+/// The way out where two curved surfaces meet: a local minimum of the support function, by Newton's method from a
+/// direction near it.
 Vec3 between_curved(const Placed& a, const Placed& b, Vec3 outward) {
   for (int round = 0; round < 20; ++round) {
     const Vec3 farthest = a.core_support(outward) - b.core_support(-outward);
@@ -455,21 +458,20 @@ Vec3 between_curved(const Placed& a, const Placed& b, Vec3 outward) {
   return outward;
 }
 
-/// True if no way that is shorter than `way` leads through a point where the rims of two nearly parallel cylinders
-/// meet.
+/// True if every way through a point where the rims of two nearly parallel cylinders meet is at least as long as `way`.
 ///
-/// A local minimum there, of length y, has both radii of curvature as long. With ε the sine between the axes and ρ_i
-/// that between the direction and one of them, the smaller radius is no longer than r ε² / ρ³, so that y ρ³ <= r ε²:
-/// the direction is near an axis. But there A - B reaches out to a disc across it, at the height of a cap less by how
-/// much the other tilts, whose rim surrounds the origin by `room`: the way along a direction at the angle η from the
-/// axis is no shorter than height cos η + room sin η.
+/// At a local minimum of length y, both radii of curvature are at least y. Let ε be the sine between the axes, and ρ_i
+/// the sine between the direction and axis i. The smaller radius is at most r ε² / ρ³, so y ρ³ <= r ε²: the direction
+/// is near an axis. There A - B reaches to a disc across this axis. The height of the disc is the height of a cap, less
+/// the tilt of the other cap. Its rim surrounds the origin at the distance `room`. The way along a direction at the
+/// angle η from the axis is therefore at least height cos η + room sin η.
 bool rims_meet_farther_out(const Rims& a, const Rims& b, double way) {
   const Vec3 z = rounded(a.axis), apart = rounded(a.centre - b.centre);
   const double sine = norm(rounded(cross(a.axis, b.axis))), cosine = std::abs(dot(a.axis, b.axis).head);
   const double most = std::max(a.radius, b.radius), along = dot(apart, z);
   if (!(way > 0)) return false;
   if (sine < kLostWide) return true;
-  // A way of less than half is excluded by whoever asks.
+  // The caller excludes ways shorter than half of `way`.
   const double tilted = std::cbrt(2 * most * sine * sine / way) * (1 + 0x1p-40);
   if (!(tilted < 1)) return false;
   const double lost = 0x1p-40 * (norm(apart) + a.half + b.half + a.radius + b.radius);
@@ -503,14 +505,14 @@ WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 
   const double lost = 0x1p-94 * (wide_a.reach() + wide_b.reach());
   const WideGap gap = wide_gap(wide_a, wide_b, lost / 4);
   if (norm2(gap.normal) > 0) {
-    // GJK may not have ended on what is curved, and the hint be better.
+    // GJK may not have converged on a curved surface; the hint may then be better.
     Ways ways(wide_a, wide_b);
     const bool curved = bounded(a.shape) && bounded(b.shape) && (has_curved_core(a.shape) || has_curved_core(b.shape));
     if (curved) ways.measure(unit(wide(outward)));
     const double certified = curved ? std::max(gap.certified, -(ways.shortest() + radii).head) : gap.certified;
     return {-gap.distance, down(-std::max(gap.distance, gap.most) - lost), up(-certified + lost), gap.normal};
   }
-  // Cores without an inside, or without a common point, are left at once by moving one of them to the other.
+  // Cores without an interior, or without a common point, separate at once if one of them moves to the other.
   const double touching = -(std::max(gap.distance, gap.most) + radii.head) - lost;
   if (stretched(a.shape) || stretched(b.shape)) {
     Ways ways(wide_a, wide_b);

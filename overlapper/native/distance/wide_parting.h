@@ -4,21 +4,21 @@
 
 namespace overlapper {
 
-/// The least translation that parts two bodies, in double-double, and bounds of it that hold whatever rounding did;
-/// negative for bodies apart, whose distance is then its size.
+/// The least translation that separates two bodies, in double-double, with bounds that hold despite rounding. Negative
+/// for separated bodies; its size is then the distance.
 struct WideParting {
   double depth = 0, lower = 0, upper = 0;  ///< m
   Vec3 normal;                             ///< unit, from b to a
 };
 
-/// `hint` is a way out, as good as it is known, from b to a; coordinates count from `reference`. At most one of the two
-/// may be a half-space.
+/// The least translation of a and b. `hint` is the best known way out, from b to a. Coordinates count from `reference`.
+/// At most one body may be a half-space.
 ///
-/// The facets of the difference of two polytopes are parallel to a facet of either or to an edge of each, so the
-/// normals of these hold the least way out. About a point near the contact, every number is as exact as it is near:
-/// there doubles tell of nearly all normals, with bounds, that the way along them is longer, and double-doubles measure
-/// the rest. Cylinders and ellipsoids have their own normals; what two of these leave
-/// open is enclosed by EPA.
+/// A facet of the difference of two polytopes is parallel to a facet of either polytope or to an edge of each. The
+/// normals of these facets include the least way out. Coordinates are relative to a point near the contact, where
+/// rounding errors are small. Doubles with error bounds prove for nearly all normals that the way is longer.
+/// Double-doubles measure the rest. Cylinders and ellipsoids have normals of their own; EPA bounds the ways that two of
+/// these leave open.
 WideParting wide_parting(const Placed& a, const Placed& b, Vec3 reference, Vec3 hint);
 
 }  // namespace overlapper
