@@ -21,14 +21,14 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Rows that are laid out and filled before Ctrl-C is looked for: to lay out all of some millions takes seconds.
+/// Rows are made in stretches, with a look for Ctrl-C after each: memory for some millions of rows takes seconds.
 constexpr size_t kStretch = 1 << 17;
 
-/// What a pair leaves behind for its next call.
+/// Results of a pair, kept for its next call.
 struct Known {
   IndexPair pair;
-  std::array<std::uint64_t, 2> version;  ///< of the poses of the two
-  Vec3 axis;  ///< unit, from b to a: the bodies were apart along it; {0, 0, 0} if they were not
+  std::array<std::uint64_t, 2> version;  ///< of the two bodies' poses
+  Vec3 axis;                             ///< unit, from b to a: separating axis; {0, 0, 0} if not separated
 };
 
 Overlaps::Row row_of(Overlap overlap) {
@@ -57,21 +57,21 @@ Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method 
   return row_of(Overlap(a, b, tolerance, method));
 }
 
-/// A shape where it is now, and what does not change as it moves.
+/// A shape at its present pose, with its constants.
 struct Body {
   Placed placed;
-  double radius;              ///< m: of the shape
-  std::uint64_t version = 0;  ///< counts the poses it has had
+  double radius;              ///< m
+  std::uint64_t version = 0;  ///< number of poses so far
 
-  /// How far it reaches along a unit direction of the world, from its own origin.
+  /// The support along a unit direction of the world, relative to the body's origin.
   double reach_along(Vec3 direction) const {
     const Vec3 local = apply_transposed(placed.pose.rotation, direction);
     return dot(local, ask(placed.shape, [&](const auto& s) { return s.support(local); }));
   }
 };
 
-/// True if the two are farther apart than any rounding, along the axis known or along one found now. Whoever asks again
-/// without an axis then finds one, too: the margin is four times that at which Overlap says so.
+/// True if the bodies are separated by more than rounding, along the known axis or a new one. The margin is four times
+/// that of Overlap. A later call without an axis therefore finds one, too.
 bool apart(const Body& a, const Body& b, Vec3& axis) {
   const bool open_a = !bounded(a.placed.shape), open_b = !bounded(b.placed.shape);
   if (open_a && open_b) return false;
@@ -95,7 +95,7 @@ bool apart(const Body& a, const Body& b, Vec3& axis) {
   return norm2(axis) > 0 && gap() > margin;
 }
 
-/// False where clipping is sooner done than an axis looked for, which there may not be.
+/// False if clipping is faster than the search for an axis, which may not exist.
 bool axis_soon_found(const Body& a, const Body& b) {
   const auto polytope = [](const Shape& shape) { return !smooth(shape) && bounded(shape); };
   return !polytope(a.placed.shape) || !polytope(b.placed.shape);
@@ -139,7 +139,7 @@ const Overlaps::Patches& Overlaps::patches() const {
     found.centre.reserve(size());
     found.moments.reserve(size());
     found.distance.reserve(size());
-    // What Overlap::patch() says, without an Overlap where it takes the same way.
+    // Equals Overlap::patch(), without an Overlap where the way is the same.
     const auto patch_of_row = [&](size_t row) {
       if (status[row] != static_cast<std::int8_t>(Status::kOverlapping)) return PatchSums({}, {}).patch();
       const Way by = static_cast<Way>(way[row]);
@@ -182,25 +182,25 @@ Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
 
 // --------------------------------------------------------------------------------------------------------------- Batch
 
-/// All that a call leaves behind for the next one.
+/// The state that a call leaves for the next one.
 struct Batch::Memory {
   std::vector<Body> bodies;
-  std::shared_ptr<const std::vector<PoseNumbers>> poses;  ///< of the bodies; shared with the answers
-  std::vector<Enclosure> enclosures;                      ///< parallel to them, of where they were when last sought
-  std::vector<std::uint64_t> enclosed;                    ///< parallel to them: the versions of which these are
+  std::shared_ptr<const std::vector<PoseNumbers>> poses;  ///< of the bodies; shared with the results
+  std::vector<Enclosure> enclosures;                      ///< parallel to `poses`, from the last search
+  std::vector<std::uint64_t> enclosed;                    ///< parallel to `poses`: the versions of `enclosures`
   BoxTree tree;
   std::vector<IndexPair> candidates;
-  std::vector<Known> known, next_known;        ///< of the last call with pairs, and of the one under way
-  std::vector<Overlaps::Row> rows, next_rows;  ///< parallel to these
-  std::vector<char> done;                      ///< of the call under way
-  std::atomic<size_t> asked{0};                ///< in the call under way: planes
-  bool sorted = false;                         ///< `known` is, by pair
+  std::vector<Known> known, next_known;        ///< of the last call with pairs, and of the present one
+  std::vector<Overlaps::Row> rows, next_rows;  ///< parallel to `known` and `next_known`
+  std::vector<char> done;                      ///< per pair of the present call
+  std::atomic<size_t> asked{0};                ///< planes, in the present call
+  bool sorted = false;                         ///< true if `known` is sorted by pair
   double tolerance = 0;
   Method method = Method::kAuto;
 
-  std::vector<int> before;   ///< of the call under way, per pair: its row in the last call, or -1
-  bool both_sorted = false;  ///< the pairs of the last call, and of that under way
-  size_t walked = 0;         ///< of the last call's pairs, if so
+  std::vector<int> before;   ///< per pair of the present call: its row in the last call, or -1
+  bool both_sorted = false;  ///< true if the pairs of the last and of the present call are sorted
+  size_t walked = 0;         ///< number of the last call's pairs passed, if `both_sorted`
 
   explicit Memory(const std::vector<Shape>& shapes) {
     for (const Shape& shape : shapes) bodies.push_back({make_placed(shape, {}, {}), radius(shape), 0});
@@ -216,7 +216,7 @@ struct Batch::Memory {
   void keep(double of_tolerance, Method of_method);
 };
 
-/// Poses that are the same to the last bit leave the body as it is.
+/// A body keeps its state if its pose is bit-identical.
 void Batch::Memory::place(std::span<const double> positions, std::span<const double> orientations) {
   const auto before_this = std::exchange(poses, nullptr);
   auto now = std::make_shared<std::vector<PoseNumbers>>(bodies.size());
@@ -235,7 +235,7 @@ void Batch::Memory::place(std::span<const double> positions, std::span<const dou
   poses = std::move(now);
 }
 
-/// The pairs whose boxes meet. Whoever names pairs needs no boxes, which take longer than to move the bodies.
+/// The pairs whose boxes meet. Calls with named pairs skip this: boxes take longer than moving the bodies.
 void Batch::Memory::find_pairs(std::vector<IndexPair>& pairs) {
   for (size_t i = 0; i < bodies.size(); ++i)
     if (std::exchange(enclosed[i], bodies[i].version) != bodies[i].version) enclosures[i] = enclosure(bodies[i].placed);
@@ -251,8 +251,8 @@ void Batch::Memory::begin(std::span<const IndexPair> pairs) {
   before.reserve(pairs.size()), done.reserve(pairs.size());
 }
 
-/// Lays out rows for more pairs, and finds these in the last call: by a walk along both lists where they are sorted,
-/// else at the same place.
+/// Lays out rows for more pairs, and finds these pairs in the last call. If both lists are sorted it walks along both,
+/// else it looks at the same index.
 void Batch::Memory::recall(std::span<const IndexPair> pairs) {
   for (const IndexPair& pair : pairs) {
     while (both_sorted && walked < known.size() && known[walked].pair < pair) ++walked;
@@ -277,7 +277,7 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
     }
   }
   const Body &a = bodies[pair.pair[0]], &b = bodies[pair.pair[1]];
-  // An axis says nothing to the article's method, which has its own way of telling.
+  // The article's method decides by itself and uses no axis.
   const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].measures.status == Status::kOverlapping;
   const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);
   const size_t planes_before = planes_asked;
@@ -296,7 +296,7 @@ void Batch::Memory::keep(double of_tolerance, Method of_method) {
   sorted = std::is_sorted(known.begin(), known.end(), [](const Known& a, const Known& b) { return a.pair < b.pair; });
 }
 
-/// The batch's memory, or, while another thread has that, one of its own.
+/// The batch's memory, or a new one while another thread uses the batch's.
 class Batch::Borrowed {
  public:
   explicit Borrowed(Batch& batch) : batch_(batch), first_(!batch.in_use_.test_and_set()) {

@@ -28,11 +28,11 @@ struct Overlaps {
     Measures measures;
     double depth = 0;
     Vec3 normal;                      ///< {0, 0, 0} if separated
-    std::shared_ptr<Overlap> source;  ///< if it took more than measuring at once
+    std::shared_ptr<Overlap> source;  ///< set if the measures needed an Overlap
     IndexPair pair{};
   };
 
-  // What each column says stands in kColumns.
+  // kColumns documents each column.
   std::vector<IndexPair> pairs;
   std::vector<std::int8_t> status, way;
   std::vector<char> widened;
@@ -41,17 +41,17 @@ struct Overlaps {
   std::vector<Vec3> centroid, normal;
   std::vector<BodyGradients> gradient;
 
-  /// The pair that a row was taken from, while the batch that has it remembers; none where that is quickly made again.
+  /// The Overlap of a row, while the batch keeps it; empty if it is cheap to make again.
   std::vector<std::weak_ptr<Overlap>> source;
 
-  size_t examined = 0;      ///< pairs that were looked at, with or without a row
-  size_t planes_asked = 0;  ///< of their shapes, those of pairs that have not moved left out
+  size_t examined = 0;      ///< pairs examined, with or without a row
+  size_t planes_asked = 0;  ///< number of planes of their shapes that were evaluated, without pairs that have not moved
   double tolerance = 0;
   Method method = Method::kAuto;
   std::shared_ptr<const std::vector<Shape>> shapes;
   std::shared_ptr<const std::vector<PoseNumbers>> poses;
 
-  /// Of each row, a Patch.
+  /// A Patch for each row.
   struct Patches {
     std::vector<Vec3> centre;
     std::vector<Mat3> moments;
@@ -61,10 +61,10 @@ struct Overlaps {
   size_t size() const { return pairs.size(); }
   void append(const Row& row);
   void reserve(size_t rows);
-  /// The pair of that row with all that can be asked of it.
+  /// The Overlap of that row, for all other quantities.
   std::shared_ptr<Overlap> overlap(size_t row) const;
   Overlaps select(std::span<const std::int64_t> rows) const;
-  /// Found when first asked for, pair by pair.
+  /// Computed on first use, pair by pair.
   const Patches& patches() const;
 
  private:
@@ -73,7 +73,7 @@ struct Overlaps {
   std::shared_ptr<Once<Patches>> patches_ = std::make_shared<Once<Patches>>();
 };
 
-/// A column of Overlaps: its name in Python, its values, the value of a row, and what Python says of it.
+/// A column of Overlaps: its name in Python, its vector, the value of a row, and its docstring in Python.
 template <class T>
 struct Column {
   const char* name;
@@ -85,7 +85,7 @@ struct Column {
 Vec3 centroid_or_nan(const Measures& measures);
 BodyGradients gradients(const Measures& measures);
 
-/// The columns that Python has, in its order. A new column is a line here, and the vector that it names.
+/// The columns in Python, in order. A new column needs a line here and its vector.
 inline constexpr std::tuple kColumns{
     Column<IndexPair>{"pairs", &Overlaps::pairs, [](const Overlaps::Row& row) { return row.pair; },
                       "(p, 2) indices of the shapes a and b of each row."},
@@ -120,8 +120,8 @@ inline constexpr std::tuple kColumns{
                  [](const Overlaps::Row& row) { return static_cast<char>(overlapper::widened(row.measures.way)); },
                  "(p,) True where the volume was computed again in wider arithmetic."}};
 
-/// The pairs of shapes that move: what was found in the last call is kept, and serves where it proves the same answer.
-/// May be called from several threads at once; one of them has the memory, the others go without.
+/// The pairs of moving shapes. Results of the last call are reused where they prove the same answer. Several threads
+/// may call it at once: one uses the memory, the others work without it.
 class Batch {
  public:
   explicit Batch(std::vector<Shape> shapes);
@@ -129,12 +129,12 @@ class Batch {
 
   const std::vector<Shape>& shapes() const { return *shapes_; }
 
-  /// The pairs i < j whose boxes meet, sorted. Both throw std::invalid_argument that names a pose that is none.
+  /// The pairs i < j whose boxes meet, sorted. Both functions throw std::invalid_argument that names an invalid pose.
   std::vector<IndexPair> candidate_pairs(std::span<const double> positions, std::span<const double> orientations);
 
-  /// A row for each of `pairs`, or without them for each whose boxes meet, that overlaps or touches; for the others,
-  /// too, if the `separated` are wanted. The bits depend neither on `threads` nor on earlier calls. Once the answer is
-  /// not wanted any more, `finished` becomes false and only pairs that were done have rows.
+  /// A row for each pair that overlaps or touches, and with `separated` also for the other pairs. The pairs are
+  /// `pairs`, or else all pairs whose boxes meet. The bits depend neither on `threads` nor on earlier calls. If the
+  /// caller cancels, `finished` becomes false, and only finished pairs have rows.
   Overlaps overlaps(std::span<const double> positions, std::span<const double> orientations,
                     std::optional<std::span<const IndexPair>> pairs, bool separated, double tolerance, Method method,
                     int threads, bool& finished);

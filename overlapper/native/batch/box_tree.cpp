@@ -9,7 +9,7 @@
 namespace overlapper {
 namespace {
 
-/// A half-space meets a box where the box's lowest corner is in it; its own box says nothing.
+/// A half-space meets a box if it contains the box's lowest corner. A half-space's own box is infinite.
 bool meet(const Plane& plane, const Bounds& box) {
   const Vec3 n = plane.normal;
   const Vec3 lowest{n.x > 0 ? box.lower.x : box.upper.x, n.y > 0 ? box.lower.y : box.upper.y,
@@ -19,17 +19,17 @@ bool meet(const Plane& plane, const Bounds& box) {
 }
 
 bool meet(const Bounds& a, const Bounds& b) {
-  // All sides are compared: which fails first cannot be predicted.
+  // Compares all sides: a branch at the first failure would be unpredictable.
   return (a.lower.x <= b.upper.x) & (b.lower.x <= a.upper.x) & (a.lower.y <= b.upper.y) & (b.lower.y <= a.upper.y) &
          (a.lower.z <= b.upper.z) & (b.lower.z <= a.upper.z);
 }
 
-/// The middle, as a sum of halves, which cannot overflow.
+/// The middle as a sum of halves, which cannot overflow.
 Vec3 middle(const Bounds& box) { return box.lower / 2 + box.upper / 2; }
 
 double extent(const Bounds& box) { return max_component(box.upper - box.lower); }
 
-/// How large a box is, in steps of eight times.
+/// The size of a box, in steps of a factor of eight.
 int size_class(const Bounds& box) { return std::ilogb(extent(box)) / 3; }
 
 }  // namespace
@@ -55,7 +55,7 @@ void BoxTree::build(std::span<const Enclosure> bodies) {
   }
 }
 
-/// Halves the bodies, and these again. The tree is as deep as the logarithm of their number, however they lie.
+/// Halves the bodies recursively. The depth of the tree is the logarithm of their number, wherever they are.
 void BoxTree::split(std::span<const Enclosure> bodies, int begin, int end) {
   const int node = static_cast<int>(nodes_.size());
   nodes_.push_back({{}, begin, end, -1});
@@ -75,8 +75,7 @@ void BoxTree::split(std::span<const Enclosure> bodies, int begin, int end) {
   split(bodies, half, end);
 }
 
-/// Lays the boxes of the nodes around those of their bodies: last nodes first, as halves follow what they are halves
-/// of.
+/// Fits the box of each node to its bodies, last node first: a node's halves follow the node.
 void BoxTree::fit(std::span<const Enclosure> bodies) {
   boxes_.resize(order_.size());
   for (size_t k = 0; k < order_.size(); ++k) boxes_[k] = bodies[order_[k]].box;
@@ -127,7 +126,7 @@ void BoxTree::between(int a, int b) {
   }
 }
 
-/// Sorts pairs by the first body, counting how often each is that; then by the second, of which there are few to each.
+/// Sorts pairs by the first body with a counting sort, then by the second, with few pairs for each first body.
 void BoxTree::sort(std::vector<IndexPair>& pairs) {
   std::fill(starts_.begin(), starts_.end(), 0);
   for (IndexPair& pair : found_) {
@@ -137,7 +136,7 @@ void BoxTree::sort(std::vector<IndexPair>& pairs) {
   for (size_t i = 1; i < starts_.size(); ++i) starts_[i] += starts_[i - 1];
   pairs.resize(found_.size());
   for (const IndexPair& pair : found_) pairs[starts_[pair[0]]++] = pair;
-  // Each start has moved on to the next one's.
+  // Each start has moved on to the next start.
   for (size_t i = 0, begin = 0; i + 1 < starts_.size(); begin = starts_[i++])
     std::sort(pairs.begin() + begin, pairs.begin() + starts_[i]);
 }
@@ -159,8 +158,7 @@ void BoxTree::pairs(std::span<const Enclosure> bodies, std::vector<IndexPair>& p
     for (size_t j = 0; j < i; ++j) between(roots_[i], roots_[j]);
   }
   if (when_built_ == 0) when_built_ = looked_at_;
-  else if (looked_at_ > when_built_ + when_built_ / 2)
-    when_built_ = 0;  // the next call builds a tree of what has been moved about
+  else if (looked_at_ > when_built_ + when_built_ / 2) when_built_ = 0;  // the next call builds a new tree
   for (int h : open_)
     for (int i : order_)
       if (meet(bodies[h].plane, bodies[i].box)) found_.push_back({h, i});

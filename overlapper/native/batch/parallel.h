@@ -13,7 +13,7 @@
 
 namespace overlapper {
 
-/// A thread that is waited for where it is forgotten, as by std::jthread, which not every library has.
+/// A thread that joins in its destructor, like std::jthread, which not every library has.
 struct WaitedFor : std::thread {
   using std::thread::thread;
   WaitedFor(WaitedFor&&) = default;
@@ -22,11 +22,10 @@ struct WaitedFor : std::thread {
   }
 };
 
-/// Calls `work(i, thread)` for every i below `count`, on the calling thread and on `threads` - 1 others. They live for
-/// this call only, so that a process forked between calls lacks nothing. `work` returns false if it took long enough to
-/// look at the clock. Once the answer is not wanted any more, no further i is begun, those under way are given up at
-/// their next cancellation point, and the result is false. The exception of the least i is thrown again: blocks are
-/// begun in order, and all that were begun are finished.
+/// Calls `work(i, thread)` for every i below `count`, on the calling thread and on `threads` - 1 others. The threads
+/// live for this call only, so a process may fork between calls. `work` returns false if it took so long that the clock
+/// should be checked. On cancellation no further i begins, running ones stop at their next cancellation point, and the
+/// result is false. The exception of the least i is rethrown: blocks begin in order, and every begun block is finished.
 template <class Work>
 bool for_each_in_parallel(size_t count, int threads, const Work& work) {
   constexpr size_t kBlock = 16;
@@ -64,7 +63,7 @@ bool for_each_in_parallel(size_t count, int threads, const Work& work) {
   for (int t = 1, wanted = working; t <= wanted; ++t) try {
       others.emplace_back(help, t);
     } catch (const std::system_error&) {
-      // No more threads are to be had: those that there are do the work.
+      // No more threads are available: the present ones do the work.
       const std::scoped_lock lock(mutex);
       working -= wanted - t + 1;
       break;

@@ -12,8 +12,7 @@
 namespace overlapper {
 namespace {
 
-/// Closed loops of vertices around every connected part of the surface that belongs to `owner`, counter-clockwise from
-/// outside.
+/// Closed loops of vertices around each connected part of the surface of `owner`, counter-clockwise from outside.
 void walk_around_patches(const Polytope& polytope, std::span<const Region::Facet> facets, const Ridges& ridges,
                          int owner, std::vector<std::vector<int>>& loops) {
   const auto mine = [&](int facet) { return facets[facet].owner == owner; };
@@ -35,7 +34,8 @@ void walk_around_patches(const Polytope& polytope, std::span<const Region::Facet
     while (!std::exchange(walked[ridges.number(from, to)], true)) {
       cancellation_point();
       loop.push_back(from);
-      // At the head, turn through the facets of this owner until the next ridge has another on its far side.
+      // At the head of the ridge, turn through the facets of this owner until the far side of the next ridge has
+      // another owner.
       int next = ridges.after(from, to);
       while (mine(ridges.left_of(next, to))) next = ridges.after(next, to);
       from = to;
@@ -45,15 +45,14 @@ void walk_around_patches(const Polytope& polytope, std::span<const Region::Facet
   }
 }
 
-/// Number of the group of each vertex: vertices joined by ridges that rounding alone may have made.
+/// The number of each vertex's group: ridges that rounding alone may have made join the vertices of a group.
 std::vector<int> merge_vertices(const Region& region, int& groups) {
   const Polytope& p = region.polytope;
   std::vector<double> rounding(p.vertices.size(), 0);
   for (int f = 0; f < p.facets(); ++f) {
-    // The plane's rounding in the frame's coordinates, in which its distance from the origin is one over its dual's
-    // length.
+    // The plane's rounding in the frame's coordinates. There the plane's distance from the origin is 1 / |dual|.
     const double moved = region.facets[f].rounding / region.facets[f].slack / norm(p.dual[f]);
-    // Planes that meet at a small angle move their common vertex by a multiple of that.
+    // Planes that meet at a small angle move their common vertex by a multiple of their rounding.
     for (int v : p.facet(f)) rounding[v] = std::max(rounding[v], std::min(1e-3, 512 * moved));
   }
   std::vector<int> parent(p.vertices.size());
@@ -77,8 +76,8 @@ std::vector<int> merge_vertices(const Region& region, int& groups) {
   return group;
 }
 
-/// The vertex of each group that lies nearest to the planes of all its facets: planes that meet at a small angle place
-/// some of them badly.
+/// The vertex of each group that lies nearest to the planes of all its facets. Planes that meet at a small angle place
+/// some vertices badly.
 std::vector<int> representatives(const Polytope& p, std::span<const int> group, int groups) {
   std::vector<std::vector<int>> members(groups), facets_of(groups);
   for (int v = 0; v < static_cast<int>(group.size()); ++v) members[group[v]].push_back(v);
@@ -105,7 +104,7 @@ std::vector<int> representatives(const Polytope& p, std::span<const int> group, 
   return chosen;
 }
 
-/// The ring with each run of one group written once; empty if fewer than three remain.
+/// The ring with one vertex for each run of a group; empty if fewer than three remain.
 std::vector<int> contracted(std::span<const int> ring, std::span<const int> group) {
   std::vector<int> result;
   for (int v : ring)

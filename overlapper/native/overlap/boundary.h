@@ -8,15 +8,15 @@
 
 namespace overlapper {
 
-/// The boundary of a common set, as it is drawn: its polytope without the ridges and facets that rounding left of
-/// several planes through one point.
+/// The boundary of a common set for drawing: its polytope, without the ridges and facets that rounding made of several
+/// planes through one point.
 struct Boundary {
   std::vector<Vec3> vertices;
   std::vector<int> ring, ring_start;
   std::vector<Plane> planes;
   std::vector<int> owner;
   std::vector<std::vector<Vec3>> patch;
-  double merged = 0;  ///< m: how far any vertex of the polytope is from the one that stands for it
+  double merged = 0;  ///< m: largest distance of a vertex of the polytope from the vertex in its place
 
   std::span<const int> facet(int f) const {
     return std::span(ring).subspan(ring_start[f], ring_start[f + 1] - ring_start[f]);
@@ -25,7 +25,7 @@ struct Boundary {
 /// The patch of a pair, from the ridges where the owner changes.
 Patch patch_of(const Region& region, Vec3 centroid);
 
-/// The boundary of the common set of that many bodies.
+/// The boundary of the common set of `bodies` bodies.
 Boundary boundary_of(const Region& region, int bodies);
 
 }  // namespace overlapper

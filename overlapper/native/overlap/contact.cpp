@@ -17,12 +17,12 @@ namespace {
 
 double sum(Vec3 v) { return v.x + v.y + v.z; }
 
-/// No less than radius(), sooner.
+/// At least radius(), but faster.
 double extent(const Shape& shape) {
   return ask(shape, [](const auto& s) { return s.loose_radius(); });
 }
 
-/// What doubles may lose of a depth or distance, of bodies in coordinates about one of them.
+/// Rounding error of a depth or distance in doubles, in coordinates about one of the two bodies.
 double rounding_between(const Placed& a, const Placed& b) {
   const double between = extent(a.shape) + extent(b.shape) + sum(abs(a.pose.translation - b.pose.translation));
   return rounding(reach(a, reach(b, between)));
@@ -39,7 +39,7 @@ Distance wide_distance(const Arrangement& at) {
   return {gap.distance, gap.certified, gap.normal, rounded(gap.witness_a), rounded(gap.witness_b)};
 }
 
-/// A plane half-way between the supports along the normal; a half-space reaches to its witness point.
+/// The plane half-way between the supports along the normal; a half-space counts up to its witness point.
 Plane half_way(const Placed& a, const Placed& b, Vec3 normal, const Distance& d, Vec3 reference) {
   const double level_a = dot(normal, bounded(a.shape) ? a.support(-normal) : d.witness_a);
   const double level_b = dot(normal, bounded(b.shape) ? b.support(normal) : d.witness_b);
@@ -74,7 +74,7 @@ Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool 
   Contact contact;
   if (status == Status::kOverlapping) {
     Penetration p = penetration(a, b);
-    // Cores that all but meet leave the direction open, and with it the way, by more than rounding.
+    // If the cores nearly touch, the direction and the length of the way out are uncertain by more than rounding.
     const bool open = in_doubt(p.depth, a, b) || p.open > rounding_between(a, b);
     if (doubtful || has_curved_core(a, b) || open) p = parting(a, b, at.reference, p.normal);
     contact.depth = p.depth;
@@ -83,8 +83,8 @@ Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool 
     Distance d = distance(a, b);
     if (in_doubt(d.gap, a, b) && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(at);
     contact.normal = d.normal;
-    // Where the bodies touch, which method "paper" may call apart, the line between the witness points may be all
-    // rounding; the way out is not.
+    // If the bodies touch, which method "paper" may report as separated, the line between the witness points may be
+    // only rounding. The way out is not.
     if ((status == Status::kTouching || as_in_paper) && !(d.gap > 0))
       contact.normal = parting(a, b, at.reference, penetration(a, b).normal).normal;
     contact.distance = status == Status::kSeparated ? std::max(0.0, d.distance) : 0;
@@ -102,13 +102,13 @@ Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool 
 
 namespace {
 
-/// Greatest of how far a number may be off that is known to lie between two others.
+/// The larger of the two possible errors of a number that lies between two bounds.
 double off(double stated, double lower, double upper) {
   const double most = std::max(stated - lower, upper - stated);
   return most > 0 ? up(most) : 0;
 }
 
-/// m: no farther a point is outside of a body.
+/// m: upper bound of the distance of a point outside a body from the body.
 double outside(const Placed& body, Vec3 point) {
   const WideBody wide_body(body, wide(point));
   const WideBody at_point({Sphere(0), point, {}, {{}, point}}, wide(point));

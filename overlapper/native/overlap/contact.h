@@ -7,37 +7,39 @@
 
 namespace overlapper {
 
-/// How a pair touches, or how far it is apart.
+/// Depth or distance of a pair, with its normal.
 struct Contact {
   double distance = 0;  ///< m; 0 unless separated
   double depth = 0;     ///< m; 0 unless overlapping
   Vec3 normal;          ///< unit, from b to a
   Vec3 witness_a, witness_b;
-  Plane separating;  ///< a where dot(normal, x) >= offset, b on the other side; meaningless if overlapping
+  Plane separating;  ///< dot(normal, x) >= offset for a, <= for b; meaningless if overlapping
 };
 
-/// The contact of a pair that overlaps beyond the doubt of its signs.
+/// The contact of a pair that certainly overlaps.
 Penetration penetration_in_order(const Placed& a, const Placed& b);
 
-/// The contact of a pair of which more is in doubt; `doubtful` if doubles could not even tell the status. Method
-/// "paper" may call apart what is not.
+/// The contact of any other pair; `doubtful` if doubles could not decide the status. Method "paper" may report a pair
+/// as separated that is not.
 Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool doubtful);
 
-/// True if doubles leave more of a depth or distance, of bodies in coordinates about one of them, in doubt than kClear.
+/// True if the rounding error of a depth or distance, in coordinates about one of the two bodies, is above kClear.
 bool in_doubt(double length, const Placed& a, const Placed& b);
 
-/// True of a cylinder or an ellipsoid and another bounded body: EPA approaches a curved surface, and knows its
+/// True for a bounded pair with a cylinder or an ellipsoid. EPA only approaches a curved surface, and finds its
 /// direction to half of the digits.
 bool has_curved_core(const Placed& a, const Placed& b);
 
-/// How far the figures of a contact may be off, in m.
+/// Error bounds of the numbers of a contact, in m.
 struct ContactErrors {
   double depth = 0, distance = 0;
-  /// Neither witness is farther outside of its body, nor are the two farther apart than the bodies: both together.
+  /// Bounds both the distance of each witness outside its body, and the excess of the witnesses' distance over the
+  /// bodies' distance.
   double witnesses = 0;
 };
 
-/// Bounds from double-doubles, whatever way the contact came; `a` and `b` are the bodies as given.
+/// Bounds by double-double arithmetic, independent of the way that found the contact. `a` and `b` are the bodies as
+/// given.
 ContactErrors errors_of(const Contact& contact, const Placed& a, const Placed& b, Status status);
 
 }  // namespace overlapper

@@ -10,9 +10,9 @@ namespace {
 
 Vec3 point_of(const DualTree::Entry& each) { return each.point; }
 
-/// The middle between the ends of points along an axis, if none but the ends' surroundings hold any, and each its
-/// share: the facets of a double cone have duals on two circles that may be far closer together than they are wide, so
-/// that what is farthest apart lies on both.
+/// The middle of the points along an axis, if all points lie near the two ends, and each end has a share of the points.
+/// Example: the duals of a double cone's facets lie on two circles. The circles may be much closer together than they
+/// are wide, and the two farthest points then each lie on both.
 std::optional<double> between_halves(std::span<const DualTree::Entry> entries, Vec3 from, Vec3 axis) {
   constexpr size_t kLeastShare = 16;
   double lower = 0, upper = 0;
@@ -42,7 +42,7 @@ int DualTree::grow(int begin, int end) {
   const int at = static_cast<int>(nodes_.size());
   const std::span<Entry> own = std::span(entries_).subspan(begin, end - begin);
   const std::array<Vec3, 3> axes = fitted_axes(own, point_of);
-  // About one of the points, so that rounding is as small as the box.
+  // Relative to one of the points, so that the rounding error is relative to the box.
   const Vec3 from = own[0].point;
   Node node{from, {}, begin, end};
   for (int k = 0; k < 3; ++k) {
@@ -56,7 +56,7 @@ int DualTree::grow(int begin, int end) {
   }
   nodes_.push_back(node);
   if (end - begin <= kLeaf) return at;
-  std::optional<std::pair<Vec3, double>> parted;  // along that axis, there
+  std::optional<std::pair<Vec3, double>> parted;  // axis, and the middle along that axis
   for (const Vec3 axis : principal_axes(own, point_of))
     if (const auto place = between_halves(own, from, axis)) parted = {axis, *place};
   int middle = (end - begin) / 2;

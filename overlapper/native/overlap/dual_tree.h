@@ -12,12 +12,12 @@
 
 namespace overlapper {
 
-/// Points of dual space in boxes within boxes, so that the few planes that pass by a polygon are found without looking
-/// at all. Boxes lie as their points do: the duals of planes through one point are in one plane, and a box along other
-/// axes would seem to reach beyond it.
+/// A tree of boxes around points of dual space: finds the few planes near a polygon without a look at all planes. Each
+/// box has the axes of its points. The duals of planes through one point are coplanar, and a box along other axes would
+/// be too large.
 class DualTree {
  public:
-  /// A dual point, and what it is called.
+  /// A dual point and its number.
   struct Entry {
     Vec3 point;
     int number;
@@ -25,9 +25,9 @@ class DualTree {
 
   explicit DualTree(std::vector<Entry> entries);
 
-  /// Calls `visit(number, corners)` for the dual points that reach some corners of the polygon, by their numbers in
-  /// order: dot(point, corner) >= level. What reaches farther towards the polygon's middle comes first. Ends, and is
-  /// false, once `visit` is.
+  /// Calls `visit(number, corners)` for each dual point with dot(point, corner) >= level for some corners of the
+  /// polygon. `corners` are the numbers of these corners in order. The point that reaches farthest towards the
+  /// polygon's middle comes first. Ends, and returns false, once `visit` returns false.
   template <class Visit>
   bool reaching(std::span<const Vec3> polygon, double level, Visit visit) const {
     if (nodes_.empty()) return true;
@@ -42,15 +42,15 @@ class DualTree {
 
   struct Node {
     Vec3 centre;
-    Vec3 half[3];  ///< from the centre to the middles of sides
+    Vec3 half[3];  ///< from the centre to the middles of the sides
     int begin, end;
-    int second = -1;  ///< the other child, after the one that follows; -1 of a leaf
+    int second = -1;  ///< the other child; the first child follows directly; -1 for a leaf
   };
   struct Query {
     std::span<const Vec3> polygon;
     double level;
     Vec3 middle;
-    std::vector<int> reached;  ///< by the box that is looked at, after those that the boxes around it reach
+    std::vector<int> reached;  ///< corners reached by the present box, after those of the boxes around it
   };
 
   static double most(const Node& node, Vec3 d) {
@@ -58,7 +58,7 @@ class DualTree {
            std::abs(dot(node.half[2], d));
   }
 
-  /// The corners from `before` on are those that the box around this one reaches.
+  /// The box around this one reaches the corners from `before` on.
   template <class Visit>
   bool look(int at, Query& query, size_t before, Visit& visit) const {
     cancellation_point();
@@ -89,7 +89,7 @@ class DualTree {
   int grow(int begin, int end);
 
   std::vector<Node> nodes_;
-  std::vector<Entry> entries_;  ///< those of a box side by side
+  std::vector<Entry> entries_;  ///< the entries of a box are contiguous
 };
 
 }  // namespace overlapper

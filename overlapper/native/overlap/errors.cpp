@@ -18,13 +18,13 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Sums of products of coordinates, relative to the sum of their sizes: the same as for a region's volume.
+/// Error of a sum of products of coordinates, relative to the sum of their sizes; the same as for a region's volume.
 constexpr double kSums = 256 * DBL_EPSILON;
 
-/// The sine between two planes below which one is asked how far it runs along the other.
+/// Two planes with a smaller sine between them are nearly flush: the length of their common strip is then measured.
 constexpr double kNearlyFlush = 0x1p-4;
 
-/// A plane seen from the origin of a region's frame.
+/// A plane relative to the origin of a region's frame.
 struct Seen {
   Vec3 dual;    ///< in the frame
   Vec3 normal;  ///< unit, in the world
@@ -34,14 +34,14 @@ struct Seen {
   double slack_at(Vec3 y) const { return slack * (1 - dot(dual, y)); }
 };
 
-/// Those of all corners of a polygon.
+/// The numbers of all corners of a polygon.
 std::vector<int> numbers(const std::vector<Vec3>& polygon) {
   std::vector<int> all(polygon.size());
   std::iota(all.begin(), all.end(), 0);
   return all;
 }
 
-/// The planes of other bodies that pass by a facet, found in trees.
+/// Finds the planes of other bodies that pass near a facet, in trees.
 class OthersNear {
  public:
   OthersNear(std::vector<Seen> planes, std::span<const Seen> facets, int bodies)
@@ -52,7 +52,8 @@ class OthersNear {
     for (size_t i = 0; i < planes_.size(); ++i) {
       const Seen& plane = planes_[i];
       most_moved_ = std::max(most_moved_, plane.moved);
-      // Moved inwards as far as it may be off: slack_at(y) <= distance where the dual point of that reaches y.
+      // The plane moved inwards by its error: slack_at(y) <= distance where the dual point of the moved plane reaches
+      // y.
       const double left = 1 - (facet_moved + plane.moved) / plane.slack;
       if (!(plane.slack > 0 && left >= 0.5)) {
         everywhere_.push_back(static_cast<int>(i));
@@ -67,8 +68,8 @@ class OthersNear {
 
   double most_moved() const { return most_moved_; }
 
-  /// Calls `visit(plane, corners)` for the planes, but those of `owner`, that may be as near to some corners of the
-  /// polygon as both may have moved, until `visit` is false.
+  /// Calls `visit(plane, corners)` for each plane of another body than `owner` that is near some corners of the
+  /// polygon: no farther than both planes may have moved. Ends once `visit` returns false.
   template <class Visit>
   void visit(int owner, const std::vector<Vec3>& polygon, Visit visit) const {
     const std::vector<int> all = everywhere_.empty() ? std::vector<int>() : numbers(polygon);
@@ -90,8 +91,8 @@ class OthersNear {
   }
 
  private:
-  /// The planes of the first half of some bodies and those of the second, so that those of all bodies but one are in as
-  /// many trees as bodies can be halved.
+  /// One tree for the planes of the first half of some bodies, and one for the second half. By repeated halving, the
+  /// planes of all bodies but one then lie in log2(bodies) trees.
   struct Halves {
     DualTree first, second;
     int within_first, within_second;
@@ -113,16 +114,17 @@ class OthersNear {
 
   std::vector<Seen> planes_;
   std::vector<Halves> halves_;
-  std::vector<int> everywhere_;  ///< planes that may be off by so much that no polygon is far from them
+  std::vector<int> everywhere_;  ///< planes with so large an error that they are near every polygon
   int bodies_;
   double most_moved_ = 0, largest_ = 0;
 };
 
-/// How far the surface of a polytope may be from that between its planes, as a fraction of the way from the origin.
+/// The distance of a polytope's surface from the surface between its planes, as a fraction of the distance from the
+/// origin.
 ///
-/// Corners lie on their planes, and inside the planes next to those, but for so much; then the closed surface that they
-/// span lies between the polytope so much smaller and so much larger. Where planes nearly coincide, a corner may be
-/// anywhere along their line, and the surface is none the worse for it.
+/// Each corner lies on its own planes and inside the neighbouring planes, up to this fraction. The closed surface of
+/// the corners then lies between the polytope shrunk and grown by this fraction. Where planes nearly coincide, a corner
+/// may be anywhere along their line without harm to the surface.
 double misfit(const Polytope& p) {
   const Ridges ridges(p);
   const auto off = [&](int facet, int vertex) { return dot(p.dual[facet], p.vertices[vertex]) - 1; };
@@ -139,7 +141,7 @@ double misfit(const Polytope& p) {
   return worst + 2 * DBL_EPSILON * product;
 }
 
-/// The polytope of a region in metres about the origin of its frame, with what is known of its planes.
+/// The polytope of a region in metres about the origin of its frame, with the error bounds of its planes.
 class Sandwich {
  public:
   Sandwich(const Region& region, std::span<const Placed> bodies)
@@ -160,17 +162,17 @@ class Sandwich {
   double outer() const { return 1 + moved_; }
   double inner() const { return std::max(0.0, 1 - moved_ - pulled_); }
 
-  /// m: how far the farthest corner is from there.
+  /// m: the distance of the farthest corner from `about`.
   double radius(Vec3 about) const {
     double farthest = 0;
     for (Vec3 corner : corners_) farthest = std::max(farthest, norm2(corner - about));
     return outer() * std::sqrt(farthest);
   }
 
-  /// m: by the placing of corners, and by the movement of planes.
+  /// m: error by the placing of corners and by the movement of planes.
   double vertices() const { return (misfit(region_.polytope) + outer() - inner()) * radius({}); }
 
-  /// m²: how much of the surface may belong to another body than it is said to.
+  /// m²: the area whose owner is uncertain.
   double doubtful_area() const {
     const std::vector<double> of_facets = polyhedral_ ? doubtful_among_planes() : doubtful_beside_smooth();
     double sum = 0;
@@ -200,8 +202,8 @@ class Sandwich {
     return sum;
   }
 
-  /// m², per facet: where a plane of another body, in the surface or just behind it, may be the outer one. No more is
-  /// looked for once that is all of the facet.
+  /// m², per facet: the area where a plane of another body, in the surface or just behind it, may be the outer plane.
+  /// The search ends once this is the whole facet.
   std::vector<double> doubtful_among_planes() const {
     const OthersNear near(planes_of_bodies(), facets_, static_cast<int>(bodies_.size()));
     std::vector<double> areas;
@@ -212,7 +214,8 @@ class Sandwich {
       double around = 0;
       for (size_t i = 0; i < ring.size(); ++i)
         around += norm(corners_[ring[i]] - corners_[ring[(i + 1) % ring.size()]]);
-      // Along a plane that is not nearly flush, slack grows by kNearlyFlush or more of the way from the facet's border.
+      // Along a plane that is not nearly flush, the slack grows by at least kNearlyFlush times the distance from the
+      // facet's border.
       double doubtful = around * 2 * (facet.moved + near.most_moved()) / kNearlyFlush;
       const double all = area(f);
       const std::vector<Vec3> corners = polygon(f);
@@ -226,13 +229,14 @@ class Sandwich {
     return areas;
   }
 
-  /// Of the cube about the directions, cut into cells as wide as directions that count as nearly flush are apart.
+  /// The cell of a direction in the cube around all directions. Cells are as wide as the difference of directions that
+  /// count as nearly flush.
   static int64_t cell_of(Vec3 direction, Vec3 step) {
     const auto place = [](double x, double by) { return static_cast<int64_t>(std::floor(x / kNearlyFlush) + by) + 64; };
     return (place(direction.x, step.x) * 128 + place(direction.y, step.y)) * 128 + place(direction.z, step.z);
   }
 
-  /// m², per facet: along the seam, or all of it where a smooth body is just behind the middle.
+  /// m², per facet: the area along the seam, or the whole facet if a smooth body is just behind its middle.
   std::vector<double> doubtful_beside_smooth() const {
     const Ridges ridges(region_.polytope);
     std::vector<double> areas;
@@ -254,8 +258,8 @@ class Sandwich {
     return areas;
   }
 
-  /// The corners of a convex polygon where a plane through its edge number `edge` is no farther than that, in order. On
-  /// the way from either end of the edge, the plane is farther and farther off until the way turns back to it.
+  /// The corners of a convex polygon no farther than `distance` from a plane through its edge number `edge`, in order.
+  /// From either end of the edge, the distance from the plane grows until the ring turns back to the edge.
   static std::vector<int> near_edge(const std::vector<Vec3>& polygon, size_t edge, const Seen& plane, double distance) {
     const size_t corners = polygon.size();
     std::vector<int> near;
@@ -270,8 +274,8 @@ class Sandwich {
     return near;
   }
 
-  /// Planes that may pass through the polytope's facets, each of them once: a facet of many corners has a triangle for
-  /// each, in one plane but for rounding.
+  /// The planes that may pass through the polytope's facets, each once. A facet of many corners has several triangles
+  /// in one plane, but for rounding.
   std::vector<Seen> planes_of_bodies() const {
     std::vector<Seen> planes;
     std::unordered_map<int64_t, int> last_in_cell;
@@ -293,8 +297,8 @@ class Sandwich {
     return planes;
   }
 
-  /// m²: of a polygon in the frame, where the plane is no farther than that, as it may be from the corners `near` only;
-  /// these in order.
+  /// m²: the area of a polygon in the frame where the plane is no farther than the given distance. Only the corners
+  /// `near`, in order, may be so near.
   double area_within(const std::vector<Vec3>& polygon, std::span<const int> near, const Seen& plane,
                      double distance) const {
     std::vector<Vec3> kept;
@@ -318,7 +322,7 @@ class Sandwich {
     return area;
   }
 
-  /// True if another, smooth body is as near behind the middle of a facet as the facet may have moved.
+  /// True if a smooth body of another owner is behind the middle of a facet, no farther than the facet may have moved.
   bool beside_smooth(const std::vector<Vec3>& polygon, const Seen& facet) const {
     const Vec3 direction = region_.frame.axes * middle(polygon);
     for (size_t i = 0; i < bodies_.size(); ++i) {
@@ -335,8 +339,8 @@ class Sandwich {
   std::vector<Placed> relative_;  ///< about the region's reference
   std::vector<Vec3> corners_;     ///< m, about the frame's origin
   std::vector<Seen> facets_;
-  double moved_ = 0;   ///< of planes, by rounding, relative to their slack
-  double pulled_ = 0;  ///< of vertices, into smooth shapes
+  double moved_ = 0;   ///< largest movement of a plane by rounding, relative to its slack
+  double pulled_ = 0;  ///< of vertices into smooth shapes, by tangent planes
 };
 
 Stated stated_of(const MeasuresAndInertia& values, size_t bodies) {
@@ -347,7 +351,7 @@ Stated stated_of(const MeasuresAndInertia& values, size_t bodies) {
   return stated;
 }
 
-/// The lengths of the force and of the moment by which two rows of a gradient differ.
+/// The lengths of the differences of force and moment between two rows of a gradient.
 std::array<double, 2> apart(const std::array<double, 6>& a, const std::array<double, 6>& b) {
   return {norm(Vec3{a[0] - b[0], a[1] - b[1], a[2] - b[2]}), norm(Vec3{a[3] - b[3], a[4] - b[4], a[5] - b[5]})};
 }
@@ -393,7 +397,7 @@ StatedWithErrors measured_with_errors(const Region& region, std::span<const Plac
   const double most = m.volume * (1 + between);
   errors.inertia = most * ((between + kSums) * radius * radius + displaced * displaced);
 
-  // Patches grow and shrink with the set; beyond that, what is doubtful changes hands.
+  // Patches grow and shrink with the set. In addition, the area of uncertain owner may belong to either body.
   const double force = sandwich.doubtful_area() + (between + kSums) * m.area;
   for (const Placed& body : bodies)
     errors.gradient.push_back({force, force * (norm(m.centroid - body.position) + radius)});
@@ -432,7 +436,7 @@ Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, 
                     norm(stated.centroid - of_slices.centroid);
   errors.inertia = error_of_integrated_inertia(sliced, spread) + apart(stated.inertia, of_slices.inertia);
   const double owned = relative * m.area + spread.owned;
-  // Moments are found about the position of one of the bodies.
+  // Moments are about the position of one of the bodies.
   double farthest = 0;
   for (const Placed& body : bodies) farthest = std::max(farthest, norm(m.centroid - body.position));
   const double last_bits = 8 * DBL_EPSILON * m.area * (farthest + radius);
@@ -476,7 +480,7 @@ Errors errors_of_anything(double volume, std::span<const Placed> bodies) {
 
 Errors no_more_than_all(Errors errors, std::span<const Placed> bodies) {
   const auto [diameter, surface, middle] = room(bodies);
-  // What is not a number is no bound.
+  // NaN is no bound.
   const auto cap = [](double& error, double most) { error = error <= most ? error : most; };
   cap(errors.area, surface);
   cap(errors.centroid, diameter);

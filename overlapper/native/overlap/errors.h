@@ -11,17 +11,17 @@
 
 namespace overlapper {
 
-/// How far what is stated of a common set may be off, in world coordinates and SI units.
+/// Error bounds of the measures of a common set, in world coordinates and SI units.
 struct Errors {
   double volume = 0;    ///< m³
   double area = 0;      ///< m²
-  double centroid = 0;  ///< m: the true centroid is no farther away
-  double inertia = 0;   ///< m⁵, of each entry
+  double centroid = 0;  ///< m: distance from the true centroid
+  double inertia = 0;   ///< m⁵, for each entry
   double vertices = 0;  ///< m: Hausdorff distance between the common set and the hull of the vertices
-  std::vector<std::array<double, 2>> gradient;  ///< per body: m² of the force, m³ of the moment, each of its length
+  std::vector<std::array<double, 2>> gradient;  ///< per body: m², length of the force's error; m³, of the moment's
 };
 
-/// Measures whose errors are looked for.
+/// Measures to be given error bounds.
 struct Stated {
   double area = 0;
   Vec3 centroid;
@@ -36,50 +36,49 @@ struct StatedWithErrors {
 
 /// The measures of a region, and how far they may be from those of the common set.
 ///
-/// The polytope P has the origin of the region's frame inside, and its plane f, at the slack s_f from there, is moved
-/// by rounding by no more than d_f. So the common set lies between λP and μP, with μ = 1 + max d_f / s_f, and λ = 2 - μ
-/// less what vertices are pulled into smooth shapes. Volume and area of convex sets grow with the set, which bounds
-/// both; the two sets differ by no more than (μ³ - λ³) times the volume, all of it as near to the centroid as the
-/// farthest vertex, which bounds the centroid and the inertia.
+/// The polytope P has the origin of the region's frame inside. Let s_f be the slack of plane f at the origin, and d_f
+/// the bound of its movement by rounding. The common set then lies between λP and μP, with μ = 1 + max d_f / s_f. λ is
+/// 2 - μ, less how far vertices are pulled into smooth shapes. Volume and area of convex sets are monotone under
+/// inclusion, which bounds both. The volumes of the two sets differ by at most (μ³ - λ³) times the volume. All of that
+/// difference is no farther from the centroid than the farthest vertex, which bounds the centroid and the inertia.
 ///
-/// The gradient needs to know which body owns what. Where no plane of another body is as near to a point of a facet as
-/// both planes may have moved, the owner is beyond doubt; the area where one is, a strip along the seam or a whole
-/// facet that two bodies share, may belong to either.
+/// The gradient depends on the owner of each facet. The owner is certain at a point of a facet if no plane of another
+/// body is as near as both planes may have moved. Elsewhere, in a strip along the seam or on a facet that two bodies
+/// share, either body may own the area.
 StatedWithErrors measured_with_errors(const Region& region, std::span<const Placed> bodies);
 
 /// The error of the vertices of a region's boundary.
 double error_of_vertices(const Region& region, const Boundary& boundary, std::span<const Placed> bodies);
 
-/// The errors of what is stated, beside something else whose errors are known: those, and how far the two are apart.
-/// Those of the volume and of the vertices stay.
+/// The errors of `stated`, compared with other measures whose errors are known: the known errors plus the difference of
+/// the two. The errors of the volume and of the vertices are taken over.
 Errors errors_beside(const StatedWithErrors& other, const Stated& stated);
 
-/// The errors of measures by slices, or by a formula, from those of slices. Arguments that are off by rounding are what
-/// the volume is off by, and no measure is of a higher degree in them than four more. Areas, and who owns them, change
-/// with where surfaces are as `spread` tells: where these are tangent, or nearly, by far more than they are moved. What
-/// is owned according to slices and to a formula lies between the same bounds; all else is off by as much more as the
-/// two are apart. Beyond the region, nothing is common.
+/// The errors of measures by slices or by a closed form, from the errors of the slices. The volume's error comes from
+/// rounding of the arguments. No measure has a degree in the arguments more than four higher than the volume. Areas and
+/// their owners depend on where surfaces are, as `spread` tells. Where surfaces are tangent, or nearly, areas change
+/// far more than the surfaces move. Ownership by slices and by a closed form has the same bounds. All other errors grow
+/// by the difference of the two. Nothing outside the region is common.
 Errors errors_of_slices(const MeasuresAndInertia& sliced, const Spread& spread, const Stated& stated,
                         const Region& drawn, std::span<const Placed> bodies);
 
-/// m⁵, of each entry.
+/// m⁵, for each entry.
 ///
-/// Formulas and slices that are off by rounding, and rules that end, are those of a set that differs from the common
-/// set by no more than the volume may be off, or by four times that, as the inertia is of a degree so much higher. Of
-/// that, no part is farther from the centroid than the farthest point of the common set, at R. A convex set is at least
-/// 4 R / 3 wide along the line there, as the centroid of a solid is at least a quarter of the width from either side;
-/// and ∫ x² dV along a line is least, for a width w, of a double cone: w² / 40 of the volume. So V R² is no more than
-/// 45 / 2 of ∫ |x|² dV, which is half of the trace.
+/// Rounding in closed forms and slices, and the error of quadrature, change the common set by at most the error of the
+/// volume. The inertia has a higher degree: there the factor is four. No part of that change is farther from the
+/// centroid than the farthest point of the common set, at R. The centroid of a solid is at least a quarter of the width
+/// from either side, so a convex set is at least w = 4 R / 3 wide along the line to that point. ∫ x² dV along a line is
+/// least for a double cone: w² / 40 of the volume. So V R² is at most 45 / 2 of ∫ |x|² dV, which is half of the trace.
 double error_of_integrated_inertia(const MeasuresAndInertia& values, const Spread& spread);
 
-/// m: how far any of the points of one cloud is from the nearest of the other; infinite where they are too many to be
-/// compared, each with each.
+/// m: the largest distance of a point of either cloud from the nearest point of the other. Infinite if there are too
+/// many points to compare.
 double farthest_apart(std::span<const Vec3> a, std::span<const Vec3> b);
 
-/// The errors of whatever is stated of bodies whose common set is anything up to that volume.
+/// The errors of any statement about bodies whose common set has at most this volume.
 Errors errors_of_anything(double volume, std::span<const Placed> bodies);
 
-/// No error is larger than what the smallest body leaves open: of measures that are true of some part of it.
+/// Limits each error to what the smallest body allows. The measures must be those of some part of that body.
 Errors no_more_than_all(Errors errors, std::span<const Placed> bodies);
 
 }  // namespace overlapper

@@ -48,7 +48,7 @@ void Overlap::start() {
     throw std::invalid_argument("tolerance must be greater than 0 and less than 1");
   if (method_ == Method::kPaper) return start_as_in_paper();
   at_once_ = measure_at_once(bodies());
-  // What is too thin for clipping to measure may be too thin to be more than touching.
+  // A set too thin for clipping may only touch.
   if (at_once_ && at_once_->status == Status::kOverlapping && !at_once_->measured && !traced()) at_once_.reset();
   status_ = at_once_ ? at_once_->status : search().status;
 }
@@ -96,7 +96,7 @@ const Region& Overlap::finest_region() const {
 }
 
 const Region& Overlap::drawn() const {
-  // The finest has every triangle of a hull by itself, where the others have facets.
+  // Only the finest polytope has each triangle of a hull by itself. The others have facets.
   constexpr double kRough = 1e-10;
   const auto rough = [](const Region::Facet& facet) { return !(facet.rounding <= kRough * facet.slack); };
   const bool of_paper = method_ == Method::kPaper;

@@ -19,15 +19,15 @@ namespace overlapper {
 
 enum class Method { kAuto, kPaper };
 
-/// The common set of two or more placed shapes. Only the status is found on construction; each quantity when first
-/// asked for, then kept. Safe to share between threads, none of which waits for another.
+/// The common set of two or more placed shapes. Construction finds only the status. Each quantity is computed on first
+/// use and kept. Threads may share it; no thread waits for another.
 class Overlap {
  public:
-  /// Throws std::invalid_argument if the common set is unbounded. `tolerance` is the fraction of the volume by
-  /// which the polytope of smooth shapes may be off; polyhedra are exact whatever it is.
+  /// Throws std::invalid_argument if the common set is unbounded. `tolerance`: allowed error of the volume for smooth
+  /// shapes, as a fraction of the volume. Polyhedra are exact and ignore it.
   Overlap(std::vector<Placed> bodies, double tolerance, Method method);
   Overlap(const Placed& a, const Placed& b, double tolerance, Method method);
-  Overlap(const Overlap& other);  ///< what either computes from then on, both have
+  Overlap(const Overlap& other);  ///< the two share what either computes from then on
   Overlap(Overlap&& other) noexcept;
 
   std::span<const Placed> bodies() const { return bodies_.empty() ? std::span<const Placed>(two_) : bodies_; }
@@ -35,44 +35,44 @@ class Overlap {
   Method method() const { return method_; }
   Status status() const { return status_; }
   bool pair() const { return bodies_.empty(); }
-  bool measured_at_once() const { return at_once_ && at_once_->measured; }  ///< so that it is quickly had again
+  bool measured_at_once() const { return at_once_ && at_once_->measured; }  ///< cheap to repeat
 
-  /// The way the measures came, or the status of bodies that do not overlap.
+  /// The way that gave the measures, or the status of bodies that do not overlap.
   Way way() const;
 
   /// m³; 0 unless overlapping.
   double volume() const;
 
-  /// The true volume is within volume() ± volume_error(). For a set that only touches, what it may still hold. The
-  /// article gives no bound, and what its method loses may be a whole overlap: for kPaper it is the difference from
-  /// what kAuto finds, plus the error of that.
+  /// m³: the true volume is within volume() ± volume_error(). For a set that only touches: upper bound of its volume.
+  /// The article's method has no error bound and may miss a whole overlap. For kPaper this is the difference from
+  /// kAuto, plus the error of kAuto.
   double volume_error() const;
 
   double area() const;         ///< m², of the surface; 0 unless overlapping
   Vec3 centroid() const;       ///< only for overlapping bodies
-  bool widened() const;        ///< double arithmetic was not enough
-  int facets_touched() const;  ///< how many planes took part in the measures
+  bool widened() const;        ///< true if doubles were not accurate enough
+  int facets_touched() const;  ///< number of planes in the measures
 
-  /// The polytope of the common set; only for overlapping bodies, as are the next three.
+  /// The polytope of the common set. This and the next three are only for overlapping bodies.
   const Region& region() const;
   const Measures& measures() const;
-  /// Inertia tensor about the centroid, unit density; by slices where the measures have closed forms.
+  /// Inertia tensor about the centroid, unit density; by slices if the measures have closed forms.
   Mat3 inertia() const;
   const Boundary& boundary() const;
-  /// Of a pair; without an area unless overlapping.
+  /// Only for a pair; without an area unless overlapping.
   const Patch& patch() const;
 
-  /// The slopes of the volume, per body: d volume / d translation, then / d rotation vector about the body's position;
-  /// zeros unless overlapping.
+  /// The derivatives of the volume, per body: d volume / d translation, then / d rotation vector about the body's
+  /// position. Zeros unless overlapping.
   std::vector<std::array<double, 6>> gradient() const;
 
-  /// How far what is stated may be off; of kPaper, the difference from what kAuto finds, plus the error of that.
+  /// Error bounds of all measures; for kPaper the difference from kAuto, plus the errors of kAuto.
   const Errors& errors() const;
 
-  /// False where the bodies overlap, and the volume may be off by more than the fraction `tolerance`.
+  /// False if the bodies overlap and the error of the volume may exceed the fraction `tolerance`.
   bool converged() const;
 
-  /// The contact of a pair; not for more bodies.
+  /// The contact; only for a pair.
   const Contact& contact() const;
   const ContactErrors& contact_errors() const;
 
@@ -107,7 +107,7 @@ class Overlap {
   OverlappingBodies overlapping_bodies() const;
   MeasuresAndInertia measured_in_full() const;
   const Region& finest_region() const;
-  const Region& drawn() const;  ///< for the boundary: the finest where doubles do not place planes well enough
+  const Region& drawn() const;  ///< for the boundary: the finest if doubles do not place planes well enough
   Stated stated() const;
   const Overlap& judge_of_paper() const;
   Errors errors_of_paper() const;
@@ -117,11 +117,11 @@ class Overlap {
   void start_as_in_paper();
 
   std::array<Placed, 2> two_;
-  std::vector<Placed> bodies_;  ///< if there are more than two
+  std::vector<Placed> bodies_;  ///< set if there are more than two
   double tolerance_;
   Method method_;
   Status status_ = Status::kSeparated;
-  std::optional<Measures> at_once_;  ///< where that decided the status
+  std::optional<Measures> at_once_;  ///< set if they decided the status
   Once<std::shared_ptr<const Lazy>> lazy_;
 };
 

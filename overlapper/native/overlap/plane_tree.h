@@ -7,20 +7,20 @@
 
 namespace overlapper {
 
-/// Planes of a polytope's facets, near which a few vertices lie close together, in boxes of their normals and offsets
-/// within boxes: by how much a vertex misses them is known without looking at all.
+/// A tree of boxes around normals and offsets of facet planes of a polytope. A few vertices lie close together near
+/// these planes. The tree finds a vertex's largest distance from the planes without a look at all planes.
 class PlaneTree {
  public:
-  /// The vertices are no farther than `radius` from `centre`.
+  /// The vertices are at most `radius` from `centre`.
   PlaneTree(const Polytope& polytope, const std::vector<int>& facets, Vec3 centre, double radius);
 
-  /// How far the vertex is from the plane that it misses most, or from another if that is `enough`.
+  /// The vertex's largest distance from a plane; if one distance is at least `enough`, that distance.
   double misfit(Vec3 vertex, double enough);
 
  private:
   static constexpr int kLeaf = 8;
 
-  /// About the centre.
+  /// A plane, relative to the centre.
   struct Seen {
     Vec3 normal;
     double offset;
@@ -29,7 +29,7 @@ class PlaneTree {
   struct Node {
     Seen lower, upper;
     int begin, end;
-    int second = -1;  ///< the other child, after the one that follows; -1 of a leaf
+    int second = -1;  ///< the other child; the first child follows directly; -1 for a leaf
   };
 
   static double most(const Node& node, Vec3 from_centre);
@@ -40,11 +40,11 @@ class PlaneTree {
   Vec3 centre_;
   double radius_, rounding_ = 0;
   std::vector<Node> nodes_;
-  std::vector<Seen> planes_;  ///< those of a box side by side
-  int last_enough_ = -1;      ///< a facet that ruled a vertex out
+  std::vector<Seen> planes_;  ///< the planes of a box are contiguous
+  int last_enough_ = -1;      ///< a facet that excluded the last vertex
 };
 
-/// How far a vertex is from the plane of a facet.
+/// The distance of a vertex from the plane of a facet.
 inline double off_plane(const Polytope& p, int facet, Vec3 vertex) {
   return std::abs(dot(p.dual[facet], vertex) - 1) / norm(p.dual[facet]);
 }
