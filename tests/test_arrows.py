@@ -68,7 +68,7 @@ def test_python_imports_only_downwards_and_each_library_in_one_room():
         ("tables/table.py", "import matplotlib.pyplot", "tables.table -> matplotlib"),
     ],
 )
-def test_an_arrow_that_is_broken_is_named_with_both_ends(file, line, arrow, tmp_path):
+def test_a_broken_import_rule_is_named_with_both_modules(file, line, arrow, tmp_path):
     sources = shutil.ignore_patterns("native", "*.so", "__pycache__")
     shutil.copytree(ROOT / "overlapper", tmp_path / "overlapper", ignore=sources)
     shutil.copy(ROOT / "pyproject.toml", tmp_path)

@@ -179,13 +179,13 @@ def test_a_page_runs_as_it_is_pasted(page, tmp_path):
         ("console\n$ echo '1.50 s, 3 pairs'\n... s, 4 pairs", "printed\n1.50 s, 3 pairs"),
     ],
 )
-def test_a_page_that_does_not_run_is_told(block, why, tmp_path):
+def test_a_page_that_does_not_run_is_reported(block, why, tmp_path):
     (tmp_path / "page.md").write_text(f"```{block}\n```\n")
     done = subprocess.run([sys.executable, __file__, tmp_path / "page.md"], capture_output=True, text=True)
     assert done.returncode == 1 and why in done.stderr
 
 
-def test_what_differs_from_run_to_run_may_be_left_out(tmp_path):
+def test_output_that_differs_between_runs_may_be_left_out(tmp_path):
     (tmp_path / "page.md").write_text("```console\n$ echo '1.50 s, 4 pairs'\n... s, 4 pairs\n$ echo 2\n2\n```\n")
     subprocess.run([sys.executable, __file__, tmp_path / "page.md"], check=True)
 

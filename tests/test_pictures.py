@@ -54,7 +54,7 @@ def run(monkeypatch, *options):
     pictures.main()
 
 
-def test_what_has_changed_is_made_again_and_nothing_else(gallery, monkeypatch, capfd):
+def test_only_changed_pictures_are_made_again(gallery, monkeypatch, capfd):
     assert list(pictures.check()) == ["docs/a.png was never made: make pictures"]
     run(monkeypatch)
     assert capfd.readouterr().out == "python docs/make.py\n" and list(pictures.check()) == []
@@ -73,7 +73,7 @@ def test_what_has_changed_is_made_again_and_nothing_else(gallery, monkeypatch, c
     assert ended.value.code == 1 and "not what docs/make.py made" in capfd.readouterr().out
 
 
-def test_a_source_that_is_not_there_is_named(gallery):
+def test_a_missing_source_is_named(gallery):
     (gallery / "text").unlink()
     with pytest.raises(FileNotFoundError, match=r"^docs/make.py is said to be made from text, which is not there$"):
         list(pictures.check())

@@ -57,7 +57,7 @@ def test_every_entry_is_used_in_an_example_of_its_page(page):
 
 
 @pytest.mark.parametrize("name", CLASSES)
-def test_every_member_has_words(name):
+def test_every_member_has_a_docstring(name):
     """Its own, or, as a field or a constant, in those of its class or of another member."""
     module, _, name = name.rpartition(".")
     found = getattr(import_module(module), name)

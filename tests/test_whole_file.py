@@ -118,7 +118,7 @@ def test_the_nth_call_that_fails_costs_no_earlier_file(tmp_path, name):
     assert failed >= 3
 
 
-def test_what_is_raised_while_a_file_is_written_leaves_all_as_it_was(tmp_path):
+def test_an_exception_while_writing_leaves_all_files_as_they_were(tmp_path):
     (tmp_path / "a.txt").write_text("earlier")
 
     def interrupted():
@@ -131,7 +131,7 @@ def test_what_is_raised_while_a_file_is_written_leaves_all_as_it_was(tmp_path):
     assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == [("a.txt", "earlier")]
 
 
-def test_a_name_that_is_taken_is_not_written_to(tmp_path):
+def test_an_existing_file_is_not_overwritten(tmp_path):
     place = tmp_path / "a.txt"
     unfinished(place).write_text("thesis")
     with beside(place) as path:

@@ -56,7 +56,7 @@ def test_joints_that_mimic_others_follow_them(tmp_path):
     assert positions[..., 2].tolist() == [[0, 0, 0.5, 1.75], [0, 0.25, 0, 0.25]]
 
 
-def test_what_follows_a_joint_that_stays_is_where_its_offset_says(tmp_path):
+def test_links_behind_a_fixed_joint_keep_their_offset(tmp_path):
     free = '<limit lower="1" upper="-1" effort="1" velocity="1"/>'
     path = urdf(
         tmp_path / "robot.urdf",
@@ -70,7 +70,7 @@ def test_what_follows_a_joint_that_stays_is_where_its_offset_says(tmp_path):
     assert positions[..., 2].tolist() == [[0, 0, 0.5]] * 2
 
 
-def test_what_has_no_end_goes_once_around_and_what_nothing_bounds_stays(tmp_path):
+def test_continuous_joints_turn_once_and_unbounded_joints_stay(tmp_path):
     free = '<limit lower="1" upper="-1" effort="1" velocity="1"/>'
     path = urdf(
         tmp_path / "robot.urdf",
@@ -94,7 +94,7 @@ def test_what_has_no_end_goes_once_around_and_what_nothing_bounds_stays(tmp_path
         (mimic("k", "much"), "the joint 'j' mimics 'k' by what is no number"),
     ],
 )
-def test_what_mimics_nobody_is_told_in_a_sentence(more, sentence, tmp_path):
+def test_a_mimic_joint_without_a_master_is_refused_in_one_sentence(more, sentence, tmp_path):
     path = urdf(
         tmp_path / "robot.urdf",
         *(link(name, ("1 1 1", "0 0 0")) for name in "abc"),
@@ -105,7 +105,7 @@ def test_what_mimics_nobody_is_told_in_a_sentence(more, sentence, tmp_path):
         read_robot(path)
 
 
-def test_what_stands_behind_the_robot_is_passed_over_and_what_is_no_xml_is_told(tmp_path):
+def test_text_after_the_robot_is_ignored_and_invalid_xml_is_refused(tmp_path):
     path = urdf(tmp_path / "robot.urdf", link("a", ("1 1 1", "0 0 0")))
     whole = path.read_text()
     path.write_text(f"{whole}\n</robot> & so on")

@@ -64,7 +64,7 @@ def test_an_arm_runs_into_a_wall_as_often_as_its_angle_says(table):
     assert pair.deepest.contact.depth == pytest.approx(0.2, rel=0.01)
 
 
-def test_links_are_adjacent_that_a_joint_ties_or_a_link_without_a_shape(table):
+def test_links_are_adjacent_if_a_joint_or_a_link_without_a_shape_connects_them(table):
     found = by_names(audit(table, 2 * BLOCK))
     adjacent = {names for names, each in found.items() if each.pair.adjacent}
     assert adjacent == {("post", "disc"), ("disc", "arm"), ("post", "wall"), ("post", "plate")}
@@ -79,7 +79,7 @@ def test_links_are_adjacent_that_a_joint_ties_or_a_link_without_a_shape(table):
     assert found["post", "disc"].asked == 3 + 512 and found["post", "arm"].asked == 2 * BLOCK
 
 
-def test_what_overlaps_no_deeper_than_asked_does_not(table):
+def test_overlaps_below_the_depth_limit_are_not_counted(table):
     assert by_names(audit(table, 100, least_depth=0.039))["arm", "plate"].status == "always"
     assert by_names(audit(table, 100, least_depth=0.041))["arm", "plate"].status == "never"
 
@@ -94,7 +94,7 @@ def test_processes_do_not_change_a_bit(table, monkeypatch):
             assert a.largest.contact.volume == b.largest.contact.volume
 
 
-def test_a_cluster_says_the_same(table, monkeypatch):
+def test_a_cluster_finds_the_same_audit(table, monkeypatch):
     pytest.importorskip("ray")
     monkeypatch.setattr(auditing, "FEW", 0)
     with closing(Cluster()) as cluster:
@@ -103,7 +103,7 @@ def test_a_cluster_says_the_same(table, monkeypatch):
     assert [(each.names, each.met) for each in far.pairs] == [(each.names, each.met) for each in here.pairs]
 
 
-def test_a_block_that_fails_is_told(table, monkeypatch):
+def test_a_failed_block_is_reported(table, monkeypatch):
     class Broken:
         workers = 1
 
@@ -158,7 +158,7 @@ def test_intervals_are_those_of_wilson():
     assert comb(10, 0) * (1 - wilson(0, 10)[2]) ** 10 < 0.05
 
 
-def test_an_examiner_says_the_same_again(table):
+def test_an_examiner_gives_the_same_answers_twice(table):
     examiner = Examiner(table, Sampling(table, BLOCK, 0))
     first, second, again = examiner(1), examiner(1), prepared(examiner.setup)(1)
     for tally in (second, again):

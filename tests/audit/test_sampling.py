@@ -23,14 +23,14 @@ def test_first_comes_rest_and_then_all_corners(tmp_path):
     assert set(np.unique(sampling.block(0)[1:])) == {-1, 2}
 
 
-def test_of_many_joints_each_is_at_its_limits_alone_and_then_some_corners(tmp_path):
+def test_with_many_joints_each_joint_visits_its_limits_alone_before_some_corners(tmp_path):
     sampling = Sampling(chain(tmp_path, ALL_CORNERS + 1), 1000, seed=0)
     alone, corners = sampling.block(0)[1 : 1 + 2 * 9], sampling.block(0)[1 + 2 * 9 :]
     assert ((alone != 0).sum(axis=1) == 1).all() and sorted(set(alone[alone != 0])) == [-1, 2]
     assert corners.shape == (SOME_CORNERS, 9) and set(np.unique(corners)) == {-1, 2}
 
 
-def test_of_few_configurations_the_first_are_looked_at(tmp_path):
+def test_with_few_configurations_the_first_ones_are_sampled(tmp_path):
     sampling = Sampling(chain(tmp_path, 3), 4, seed=0)
     assert [len(block) for block in sampling.blocks] == [4] and sampling.block(0).shape == (4, 3)
 
@@ -55,7 +55,7 @@ def test_a_joint_whose_limits_exclude_0_rests_halfway():
     assert rest["ankle_1"] == pytest.approx(np.radians(65)) and rest["hip_1"] == 0
 
 
-def test_spherical_joints_turn_to_everywhere():
+def test_spherical_joints_reach_every_orientation():
     robot = read_robot(DATA / "humanoid" / "humanoid.urdf")
     spherical = [degree for degree in robot.degrees if degree.range == "spherical"]
     assert len(spherical) == 8
@@ -72,6 +72,6 @@ def test_spherical_joints_turn_to_everywhere():
     ("count", "seed", "sentence"),
     [(0, 0, "configurations must be 1 or more, not 0"), (1, -1, "seed must be 0 or more, not -1")],
 )
-def test_what_is_no_sample_is_refused(count, seed, sentence, tmp_path):
+def test_invalid_sample_arguments_are_refused(count, seed, sentence, tmp_path):
     with pytest.raises(ValueError, match=sentence):
         Sampling(chain(tmp_path, 1), count, seed)

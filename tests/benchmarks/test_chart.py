@@ -27,7 +27,7 @@ def test_the_sum_over_parts_is_the_exact_volume():
     assert truth.common_volume(a, b) == exact.common(exact.hull(a), exact.hull(b)).volume
 
 
-def test_triangles_of_qhull_are_not_taken_unless_they_are_those_of_a_convex_surface():
+def test_qhull_triangles_are_used_only_if_they_form_a_convex_surface():
     cloud = [exact.point(p) for p in families.CORNERS]
     triangles = {ring: exact.plane_through(*ring) for ring in truth.exact.first_simplex(cloud[:3] + cloud[4:5])}
     assert not truth.is_convex(triangles, cloud)
@@ -68,7 +68,7 @@ def test_points_are_counted_inside_of_every_kind_of_shape():
 
 
 @pytest.mark.parametrize("family", ["ball and box", "two capsules", "ellipsoid and hull", "meshes with margins"])
-def test_tessellations_come_near_from_below_with_segments(family):
+def test_tessellations_converge_from_below_with_segments(family):
     pair = workloads.pairs_of(family)[0]
     volumes = [overlap(*(bodies.points(body, n) for body in pair.bodies)).volume for n in (8, 32)]
     assert volumes[0] < volumes[1] < pair.volume
@@ -83,7 +83,7 @@ def test_strobl_s_package_gets_the_corners_in_its_own_order():
         assert peers.strobl(pair.bodies, None)() == pytest.approx(float(pair.volume), rel=1e-12)
 
 
-def test_estimates_come_near_with_samples_and_pitch():
+def test_estimates_converge_with_samples_and_pitch():
     pair = workloads.pairs_of("box deep")[0]
     for name, setting in (("Monte Carlo", 100_000), ("voxels", 32)):
         found = peers.PEERS["volume"][name].prepare(pair.bodies, setting)()
@@ -123,7 +123,7 @@ def test_threads_of_a_peer_s_own_are_timed_by_the_clock_in_a_process_that_has_al
     assert page.clocks(found)["processors"] == "2"
 
 
-def test_what_one_processor_costs_is_told_of_large_meshes():
+def test_large_meshes_are_also_timed_on_one_processor():
     rows = [
         turns.Row("i5120 deep", 1, "manifold3d", "prebuilt", "volume", us="9000"),
         turns.Row("i5120 deep", 1, "manifold3d, by the clock", "prebuilt", "volume", us="6000"),

@@ -34,7 +34,7 @@ def test_a_recording_is_made_saved_and_shown(capsys, monkeypatch):
     assert re.match(r"  shown, at 1280 x 800: \d+ ms a frame on the page's thread, \d+ ms to draw it", lines[2])
 
 
-def test_a_sweep_is_told_by_its_parts(capsys):
+def test_a_sweep_is_timed_part_by_part(capsys):
     lines = said(capsys, "sweep", 1, "--tasks=4", "--grasps=0").splitlines()
     figures = {line[:20].strip(): float(line[20:27]) for line in lines}
     assert set(figures) == {"a run", "more in the worker", "in the parent", "there and back", "overhead per task"}
@@ -89,7 +89,7 @@ def test_pairs_that_are_answered_differently_are_judged_by_proof():
     assert audit.judged([one, far], False) == "no by ours alone, which by proof share nothing (2e-01 m apart)"
 
 
-def test_hard_cases_are_put_to_the_rules(capsys, tmp_path):
+def test_hard_cases_are_checked_by_the_rules(capsys, tmp_path):
     words = said(capsys, "stress", "--count=3", "--family=general", "--workers=1", f"--out={tmp_path / 'rows.csv'}")
     assert re.search(r"all +3 +\d+ +\d+ .* 0 *\n", words)
     assert len((tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines()) == 4

@@ -25,17 +25,17 @@ def test_the_exponent_is_that_of_the_last_sizes():
     assert growth.growth(CONE, taking(lambda _, n: 1.0 * n), 8000).exponent == 0  # of one size nothing is known
 
 
-def test_no_more_is_asked_of_what_takes_long():
+def test_slow_cases_are_not_made_larger():
     assert list(growth.growth(CONE, taking(lambda _, n: n * 2e-3), 10**9).times) == [1000, 2000]
 
 
-def test_what_does_not_end_is_reported_and_what_is_flat_is_not():
+def test_endless_cases_are_reported_and_flat_growth_is_not():
     late = growth.growth(CONE, lambda _, n: "hang" if n > 2000 else (1e-3, n), 8000)
     assert late.too_steep and late.line().endswith("hang at 4000 points")
     assert not growth.growth(CONE, lambda *_: "raises ValueError", 8000).too_steep
 
 
-def test_the_search_keeps_what_is_worse():
+def test_the_search_keeps_the_worse_input():
     ask = taking(lambda given, n: 1e-4 * n * (n / 1000 if given.noise else 1))
     start = [growth.growth(CONE, ask, 8000)]
     better = list(searched(start, 50, 0, ask, 8000))
@@ -43,7 +43,7 @@ def test_the_search_keeps_what_is_worse():
     assert list(searched([], 50, 0, ask, 8000)) == []
 
 
-def test_each_thing_about_an_input_is_changed():
+def test_every_property_of_an_input_is_mutated():
     rng = np.random.default_rng(0)
     others = [changed(CONE, rng) for _ in range(100)]
     for name in ("away", "turn", "stretch", "noise", "seed"):

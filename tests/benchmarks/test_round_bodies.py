@@ -55,6 +55,6 @@ def test_a_ball_over_an_edge_is_measured_as_by_slices_along_it():
     assert overlap(ball, cube).volume == pytest.approx(expected, rel=1e-13)
 
 
-def test_bold_is_what_keeps_its_aim():
+def test_figures_that_keep_their_aim_are_bold():
     assert round_page.times(1.5, 1.5) == "**1.5**" and round_page.times(1.51, 1.5) == "1.5"
     assert round_page.aim_of("fifty capsule humanoids", {"stepSimulation": 30.0}) == 15

@@ -202,7 +202,7 @@ def test_coal_grows_the_core_of_a_rounded_hull(monkeypatch):
     assert radii == [0.125]
 
 
-def test_an_answer_of_coal_that_more_iterations_change_is_none(monkeypatch):
+def test_a_coal_answer_that_changes_with_more_iterations_counts_as_no_answer(monkeypatch):
     coal_that_answers(monkeypatch, lambda request: 1 / request.gjk_max_iterations)
     assert coal(*DEEP.bodies) == "out of iterations"
     coal_that_answers(monkeypatch, lambda request: -np.finfo(float).max / request.gjk_max_iterations)
@@ -248,7 +248,7 @@ def test_contacts_of_round_bodies_are_as_deep_as_they_are_said_to_be():
         assert abs(Fraction(found.volume) - volume) <= volume / 10**12
 
 
-def test_a_depth_that_nobody_knows_is_none():
+def test_an_unknown_depth_is_none():
     (contact,) = (each for each in contacts.contacts(1) if each.kind == "cylinder's rim on a face")
     beside = contacts.Contact("", 0, contact.a, Placed(Cylinder(0.5, 1.0), contact.a.bounds[1]))
     with pytest.raises(ValueError, match="meets an edge"):
@@ -259,16 +259,16 @@ def test_a_depth_that_nobody_knows_is_none():
     ("answer", "words"),
     [(-1.0, "1.0e-03"), (-1.5, "5.0e-01"), (0.0, "apart"), (1.0, "apart"), (float("nan"), "no answer"), ("-", "-")],
 )
-def test_what_is_told_of_a_contact(answer, words):
+def test_a_contact_is_described_by_its_figures(answer, words):
     assert contacts.told((Fraction(-1), Fraction(1, 1000)), answer) == words
 
 
-def test_a_cell_of_the_page_has_the_largest_error_and_what_is_no_answer():
+def test_a_cell_of_the_page_shows_the_largest_error_and_missing_answers():
     assert stability_page.all_said(["1.0e-03", "2.0e-01", "apart", "apart", "hang", "-"]) == "2e-01, 2 apart, 1 hang"
     assert stability_page.all_said(["-", "-"]) == ""
 
 
-def test_round_contacts_are_put_to_all_who_are_installed(tmp_path):
+def test_all_installed_libraries_are_asked_about_round_contacts(tmp_path):
     path = tmp_path / "stability_round.csv"
     assert command.main(["contacts", "--cases=1", f"--out={tmp_path}"]) == 0
     notes, rows = results.read(path)

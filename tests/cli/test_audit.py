@@ -38,7 +38,7 @@ def run(*arguments):
     return done.returncode, done.stdout, done.stderr
 
 
-def test_a_robot_is_told_as_json_table_srdf_and_page(robot, tmp_path):
+def test_an_audit_is_written_as_json_table_srdf_and_page(robot, tmp_path):
     code, said, complaints = run(
         robot, "--json", "--out", "pairs.csv", "--srdf", "made/table.srdf", "--html", "worst.html", "--seed", 4
     )
@@ -78,7 +78,7 @@ def test_a_robot_is_told_as_json_table_srdf_and_page(robot, tmp_path):
     assert pairs["wall", "plate"]["page"] == f"worst.html#t={frames.index('wall and plate')}"
 
 
-def test_what_is_expected_is_no_finding_and_people_get_a_table(robot):
+def test_expected_overlaps_are_no_findings_and_the_default_output_is_a_table(robot):
     code, said, complaints = run(robot, *FIXED)
     assert (code, complaints) == (0, "")
     assert "Links that overlap and are not adjacent" in said and "sometimes" in said
@@ -88,7 +88,7 @@ def test_what_is_expected_is_no_finding_and_people_get_a_table(robot):
     )
 
 
-def test_an_srdf_file_that_passes_over_an_overlap_is_told(robot, tmp_path):
+def test_an_srdf_file_that_disables_an_overlapping_pair_is_reported(robot, tmp_path):
     pairs = [("arm", "wall", "Never"), ("plate", "arm", "Always"), ("wall", "plate", "Always"), ("arm", "roof", "User")]
     text = "".join(f'<disable_collisions link1="{a}" link2="{b}" reason="{why}"/>' for a, b, why in pairs)
     (tmp_path / "table.srdf").write_text(f'<robot name="made">{text}</robot>')
@@ -116,7 +116,7 @@ def test_an_srdf_file_that_passes_over_an_overlap_is_told(robot, tmp_path):
         ({"robot": "one.urdf"}, "one.urdf has no two links with shapes that could overlap"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_done_is_told_in_a_sentence(options, sentence, robot, tmp_path):
+def test_invalid_requests_are_refused_in_one_sentence(options, sentence, robot, tmp_path):
     (tmp_path / "table.urdf.txt").write_text("no XML")
     (tmp_path / "sdf.srdf").write_text("<sdf/>")
     (tmp_path / "half").write_text('<robot><disable_collisions link1="arm"/></robot>')
@@ -128,7 +128,7 @@ def test_what_cannot_be_done_is_told_in_a_sentence(options, sentence, robot, tmp
     assert str(refused.value).replace(f"{tmp_path}/", "").replace(str(tmp_path), ".") == sentence
 
 
-def test_without_pybullet_it_is_said_what_is_needed(robot, monkeypatch):
+def test_without_pybullet_the_error_names_what_to_install(robot, monkeypatch):
     monkeypatch.setitem(sys.modules, "pybullet", None)
     for ask in (command, shapes):
         with pytest.raises(Refused, match=r"^overlapper.simulation needs pybullet: pip install pybullet"):
@@ -160,7 +160,7 @@ def test_where_nothing_overlaps_a_page_shows_the_robot_at_rest(tmp_path):
     assert Film.of(tmp_path / "page.html").heading["names"] == ["at rest; no links overlap"]
 
 
-def test_what_is_not_moved_and_not_modelled_is_told(tmp_path):
+def test_unmoved_joints_and_unmodelled_shapes_are_reported(tmp_path):
     corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
     (tmp_path / "flat.obj").write_text(f"o flat\n{corners}f 1 2 3\nf 2 3 4\n")
     flat = link("flat").replace(

@@ -54,7 +54,7 @@ def run(*arguments):
     return done.returncode, done.stdout
 
 
-def test_every_asset_of_a_folder_is_told(folder):
+def test_every_asset_of_a_folder_is_reported(folder):
     code, said = run(folder, "--units", "mm", "--json")
     found = {asset["name"]: asset for asset in json.loads(said)["assets"]}
     assert code == 1
@@ -93,14 +93,14 @@ def test_concave_meshes_may_be_left_out_and_shallow_overlaps_passed_over(folder)
     assert table.sound
 
 
-def test_what_stops_one_asset_stops_no_other(folder, monkeypatch):
+def test_an_error_in_one_asset_does_not_stop_the_others(folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "pybullet", None)
     table = read_asset(folder, folder / "robots" / "table.urdf", "mm", 0.0, Modelling())
     assert table.failure.startswith("overlapper.simulation needs pybullet: pip install pybullet")
     assert read_asset(folder, folder / "cube.stl", "mm", 0.0, Modelling()).sound
 
 
-def test_what_is_for_robots_and_a_folder_of_nothing_are_refused(folder, tmp_path):
+def test_options_for_robots_and_an_empty_folder_are_refused(folder, tmp_path):
     with pytest.raises(Refused, match=r"^--srdf is for a robot, and .*assets is a folder$"):
         command(folder, srdf=tmp_path / "out.srdf")
     (tmp_path / "empty").mkdir()

@@ -117,7 +117,7 @@ def test_a_matrix_and_a_list_are_for_people():
     assert done.stdout.endswith("Of 3 pairs of 3 bodies, 1 clashes.\n")
 
 
-def test_of_many_pairs_the_largest_are_listed_without_a_matrix(tmp_path):
+def test_many_pairs_are_listed_by_size_without_a_matrix(tmp_path):
     for k in range(13):
         write_mesh(f"cube_{k:02}.stl", Hull(CUBE + [0, 0, 0.5 * k]))
     done = clashes(*tmp_path.glob("cube_*.stl"))
@@ -126,7 +126,7 @@ def test_of_many_pairs_the_largest_are_listed_without_a_matrix(tmp_path):
     assert len(re.findall(r"^cube_", done.stdout, re.MULTILINE)) == 20
 
 
-def test_lengths_are_in_the_units_that_are_said():
+def test_lengths_have_the_requested_units():
     _, in_mm = facts("one.stl", "two.obj")
     _, in_inches = facts("one.stl", "two.obj", "--units", "in")
     assert in_mm["pairs"][0]["volume_m3"] == pytest.approx(125e-9)
@@ -143,7 +143,7 @@ def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path):
     assert Film.of(tmp_path / "page.html").heading["pairs"] == [["left.cube.stl", "right.cube.stl"]]
 
 
-def test_in_a_folder_other_files_are_passed_over(tmp_path):
+def test_other_files_of_a_folder_are_ignored(tmp_path):
     (tmp_path / "parts").mkdir()
     for name in ("a.stl", "b.STL", ".hidden.stl"):
         write_mesh(tmp_path / "parts" / name.lower(), Hull(CUBE))
@@ -196,7 +196,7 @@ def test_an_overlap_less_deep_than_asked_and_one_that_is_expected_are_no_clash()
 # Concave meshes
 
 
-def test_what_is_in_the_corner_of_a_concave_mesh_is_apart(coacd_is):
+def test_a_body_in_the_corner_of_a_concave_mesh_is_separated(coacd_is):
     coacd_is(NO_COACD)
     code, found = facts("bent.obj", "in_corner.stl")
     assert (code, found["pairs"], found["remarks"]) == (0, [], [])
@@ -212,7 +212,7 @@ def test_a_concave_mesh_that_clashes_with_nothing_is_drawn_as_it_is(tmp_path, co
     assert len(numbers(geometry["data"]["attributes"]["position"])) == 2 * 18  # and no diagonal of a face
 
 
-def test_what_parts_add_to_a_mesh_is_told_and_not_in_the_volume(coacd_is):
+def test_volume_added_by_convex_parts_is_reported_and_not_counted(coacd_is):
     coacd_is(SAW.replace("<= 10], None], ", "<= 10], None], [v, None], "))  # and the hull
     code, found = facts("bent.obj", "in_arm.stl")
     (pair,) = found["pairs"]
@@ -223,7 +223,7 @@ def test_what_parts_add_to_a_mesh_is_told_and_not_in_the_volume(coacd_is):
     assert re.search(r"^bent.obj +clash +62\.5 .* 3, \+16\.7%$", clashes("bent.obj", "in_arm.stl").stdout, re.MULTILINE)
 
 
-def test_without_parts_the_hull_stands_for_where_and_the_volume_is_right(coacd_is):
+def test_without_parts_the_hull_gives_the_place_and_the_volume_is_exact(coacd_is):
     coacd_is(NO_COACD)
     done = clashes("bent.obj", "in_arm.stl")
     assert done.returncode == 1
@@ -258,7 +258,7 @@ def test_an_open_mesh_is_not_measured_unless_it_is_enclosed(coacd_is):
     assert re.search(r"^ in_arm.stl +itself$", marked, re.MULTILINE)
 
 
-def test_an_open_mesh_that_nothing_comes_near_is_no_matter():
+def test_an_open_mesh_far_from_all_others_is_ignored():
     assert clashes("open.obj", "far.ply").returncode == 0
 
 
@@ -280,7 +280,7 @@ def test_meshes_of_too_many_triangles_are_measured_by_their_parts(monkeypatch):
     assert pair.volume == pytest.approx(2.5 * 5 * 5 * 1e-9, rel=0.01)
 
 
-def test_parts_that_a_transform_makes_flat_are_none():
+def test_parts_flattened_by_a_transform_are_left_out():
     ((_, part),), _ = scene.read([Path("one.stl")], "mm")
     hull = Hull(part.placed(part.triangles.reshape(-1, 3)))
     body = scene.MeshBody("one.stl", part, None, (hull,), "hull", hull.volume, None)
@@ -371,7 +371,7 @@ def test_a_step_file_that_crashes_its_reader_is_named_and_the_others_measured(tm
     assert "Of 1 pair of 2 bodies, 1 clashes." in done.stdout
 
 
-def test_what_a_format_needs_is_told_by_name(tmp_path, monkeypatch):
+def test_the_library_that_a_format_needs_is_named(tmp_path, monkeypatch):
     (tmp_path / "hidden").mkdir()
     hide = "import importlib.util as u\nfind = u.find_spec\n"
     hide += "u.find_spec = lambda name, *a: None if name in ('cascadio', 'networkx') else find(name, *a)\n"
@@ -431,19 +431,19 @@ def test_files_that_cannot_be_read_are_named_and_the_others_measured(tmp_path):
         ),
     ],
 )
-def test_what_the_user_can_mend_is_one_sentence(tmp_path, arguments, sentence):
+def test_user_errors_are_one_sentence(tmp_path, arguments, sentence):
     (tmp_path / "empty").mkdir()
     done = clashes(*arguments)
     assert (done.returncode, done.stdout, done.stderr) == (2, "", f"overlapper: {sentence}\n")
 
 
-def test_of_a_file_that_cannot_be_read_and_nothing_else_both_sentences_are_said():
+def test_a_single_unreadable_file_gives_both_sentences():
     done = clashes("none.stl", "one.stl")
     said = "overlapper: none.stl: No such file or directory\noverlapper: at least two bodies are needed, not 1\n"
     assert (done.returncode, done.stderr) == (2, said)
 
 
-def test_ctrl_c_ends_it_in_a_sentence(coacd_is):
+def test_ctrl_c_ends_the_command_in_one_sentence(coacd_is):
     coacd_is("import time; time.sleep(60)")
     command = [
         sys.executable,

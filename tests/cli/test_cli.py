@@ -86,7 +86,7 @@ def refusal(*arguments):
     ("option", "choices"),
     [("--contact", "'bullet', 'volumetric'"), ("--surface", "'nominal', 'margin'"), ("--method", "'auto', 'paper'")],
 )
-def test_a_choice_that_is_none_is_answered_with_those_that_there_are(option, choices):
+def test_an_invalid_choice_is_refused_with_the_valid_ones(option, choices):
     assert refusal("run", "franka_lift", option, "some") == (
         f"overlapper: Invalid value for '{option}': 'some' is not one of {choices}.\n"
     )
@@ -96,7 +96,7 @@ def test_the_version_is_that_of_the_package():
     assert re.fullmatch(r"overlapper \d+\.\d+\.\d+\n", overlapper("--version").stdout)
 
 
-def test_help_shows_examples_and_is_what_a_bare_command_says():
+def test_help_shows_examples_and_a_bare_command_prints_help():
     assert "overlapper run franka_grasp" in overlapper().stdout
     assert "overlapper watch --html mine.html my_script.py" in overlapper().stdout
     assert "--html my_scene.html" in overlapper("run", "--help").stdout
@@ -107,13 +107,13 @@ def test_scenes_are_listed_with_what_happens_in_them():
     assert re.search(r"^box_pile +Two hundred boxes", overlapper("scenes").stdout, re.MULTILINE)
 
 
-def test_a_scene_that_is_no_python_is_listed_as_such(tmp_path):
+def test_a_scene_with_a_syntax_error_is_listed_as_such(tmp_path):
     (tmp_path / "scenes").mkdir()
     (tmp_path / "scenes" / "half.py").write_text("def build(")
     assert re.search(r"^half +\(not a Python file\)$", overlapper("scenes").stdout, re.MULTILINE)
 
 
-def test_what_is_not_modelled_is_named_below_the_table(tmp_path):
+def test_shapes_that_are_not_modelled_are_named_below_the_table(tmp_path):
     (tmp_path / "bent.py").write_text(BENT)
     done = overlapper("run", "bent.py")
     assert done.returncode == 0
@@ -249,7 +249,7 @@ def test_a_run_prints_a_table_of_pairs_with_units():
     assert done.stderr == "a scene may talk\n"
 
 
-def test_json_is_all_there_is_on_stdout():
+def test_stdout_has_nothing_but_json():
     done = overlapper("run", "two_cubes.py", "--steps", "3", "--json", "--check", "fcl", "--out", "two.csv")
     summary = json.loads(done.stdout)
     (pair,) = summary["pairs"]
@@ -602,7 +602,7 @@ def test_ctrl_c_ends_a_check(two_scenes, workers):
     assert waiting == process.pid or not psutil.pid_exists(waiting)
 
 
-def test_scenes_are_refused_for_which_there_can_be_no_process(two_scenes, monkeypatch):
+def test_scenes_are_refused_if_no_process_can_start(two_scenes, monkeypatch):
     def lacking(*_, **__):
         raise OSError(12, "Cannot allocate memory")
 
@@ -622,7 +622,7 @@ def test_scenes_are_refused_for_which_there_can_be_no_process(two_scenes, monkey
         ),
     ],
 )
-def test_what_cannot_be_checked_is_refused(two_scenes, spoil, words):
+def test_arguments_that_cannot_be_checked_are_refused(two_scenes, spoil, words):
     code, _, complaints = checked(str(spoil(two_scenes)))
     assert code == 2
     assert words in complaints

@@ -57,13 +57,13 @@ def test_a_run_has_forces_in_its_table_and_in_its_files():
     assert told["pairs"][0]["largest_force_n"] == pytest.approx(9.81)
 
 
-def test_a_run_of_contact_points_speaks_of_no_forces():
+def test_a_run_of_contact_points_prints_no_forces():
     done = overlapper("run", "cube.py", "--out", "cube.csv")
     assert "orce" not in done.stdout and "force_z_n" not in Path("cube.csv").read_text()
     assert json.loads(overlapper("run", "cube.py", "--json").stdout)["settings"]["contact"] == "bullet"
 
 
-def test_a_table_is_seen_with_the_contact_that_it_says():
+def test_a_table_is_viewed_with_its_own_contact_model():
     Path("cube.py").write_text(CUBE.replace("- 9.81e-5 * mass", "+ 1e-3"), encoding="utf-8")
     overlapper("run", "cube.py", "--contact", "volumetric", "--out", "cube.csv")
     done = overlapper("view", "cube.csv", "--scene", "cube.py", "--png", "cube.png")
@@ -74,13 +74,13 @@ def test_a_table_is_seen_with_the_contact_that_it_says():
     assert "what is seen is not what cube.csv has, as the simulation has changed" in done.stderr
 
 
-def test_a_scene_is_seen_with_the_contact_asked_for():
+def test_a_scene_is_viewed_with_the_requested_contact_model():
     overlapper("view", "cube.py", "--contact", "volumetric", "--png", "cube.png")
     done = overlapper("view", "cube.csv", "--contact", "volumetric", code=2)
     assert done.stderr == "overlapper: --contact is for scenes, and cube.csv is a table, which says its own\n"
 
 
-def test_a_table_that_says_a_contact_that_is_none_is_refused():
+def test_a_table_with_an_unknown_contact_model_is_refused():
     overlapper("run", "cube.py", "--out", "cube.csv")
     text = Path("cube.csv").read_text()
     Path("cube.csv").write_text(text.replace("# contact: bullet", "# contact: soft"), encoding="utf-8")
@@ -128,7 +128,7 @@ def test_a_sweep_in_which_nothing_presses_has_no_force():
     assert row["largest_force_n"] == 0 and row["hardestA"] is None
 
 
-def test_what_has_no_direction_is_said_once():
+def test_contacts_without_a_direction_are_reported_once():
     Path("within.py").write_text(WITHIN, encoding="utf-8")
     done = overlapper("run", "within.py")
     (line,) = done.stderr.splitlines()

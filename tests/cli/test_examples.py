@@ -49,7 +49,7 @@ def test_two_boxes_share_a_box(run):
     assert "moved     separated, 0.250 mm between them" in text
 
 
-def test_of_many_pairs_all_are_measured_and_their_forces_cancel(run):
+def test_many_pairs_are_all_measured_and_their_forces_cancel(run):
     text = run("many_pairs.py")
     (first, volume), (second, volume_after) = numbers(
         r"moved: ([\d,.]+) pairs share ([\d.]+) m³", text.replace(",", "")
@@ -74,7 +74,7 @@ def test_the_loop_ends_with_every_box_on_the_one_below(run):
     assert "6 bodies, 6 of 6 shapes read" in text
 
 
-def test_both_fingers_of_a_grasp_are_as_deep_as_they_are_closed(run):
+def test_both_fingers_penetrate_as_deep_as_the_gripper_closes(run):
     rows = numbers(r"finger at ([\d.]+) mm: ([\d.]+) mm deep, (\d+) mm³, on (\d+) mm²", run("grasp_depth.py"))
     assert len(rows) == 2
     for position, depth, volume, area in rows:
@@ -114,7 +114,7 @@ def test_the_film_is_one_html_file_with_overlaps(run, tmp_path):
     assert re.search(r'<script[^>]+src="http', page) is None
 
 
-def test_fcl_is_asked_and_survived(run):
+def test_fcl_is_asked_and_its_crash_is_survived(run):
     text = run("ask_fcl.py")
     verdicts = re.findall(r"^(\S.*): (agree|disagree|crashed)$", text, re.MULTILINE)
     assert verdicts == [
@@ -152,7 +152,7 @@ def test_links_of_a_chain_share_less_than_their_hulls(run, tmp_path, monkeypatch
     assert (tmp_path / "chain_links.html").is_file()
 
 
-def test_a_repository_of_ones_own_is_guarded_by_what_its_workflow_runs(tmp_path):
+def test_the_example_workflow_guards_a_repository(tmp_path):
     repository = shutil.copytree(EXAMPLES / "ci", tmp_path / "mine", ignore=shutil.ignore_patterns("out"))
     workflow = (repository / ".github" / "workflows" / "scenes.yml").read_text(encoding="utf-8")
     (command,) = re.findall(r"- run: (pytest .*)", workflow)

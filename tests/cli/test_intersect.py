@@ -39,7 +39,7 @@ def test_a_written_mesh_is_closed_convex_and_read_as_it_was(tmp_path, ending, er
     assert found.volume == pytest.approx(hull.volume, rel=error)
 
 
-def test_what_bodies_share_is_written_with_its_facets_whole(tmp_path):
+def test_the_common_part_is_written_with_whole_facets(tmp_path):
     common = overlap(CUBE, CUBE + [0.5, 0.25, 0])
     write_mesh(tmp_path / "common.obj", common)
     found = read_hull(tmp_path / "common.obj")
@@ -47,7 +47,7 @@ def test_what_bodies_share_is_written_with_its_facets_whole(tmp_path):
     assert len(found.facets) == 6
 
 
-def test_a_mesh_that_is_less_than_its_hull_is_told(tmp_path):
+def test_a_mesh_smaller_than_its_hull_is_reported(tmp_path):
     path = tmp_path / "shape.obj"
     path.write_text(L_SHAPE)
     with pytest.warns(NotConvexWarning, match=r"shape.obj is not convex: it fills 85\.7% of its convex hull"):
@@ -57,7 +57,7 @@ def test_a_mesh_that_is_less_than_its_hull_is_told(tmp_path):
         assert read_hull(path).volume == pytest.approx(3.5)
 
 
-def test_what_is_no_mesh_is_refused(tmp_path):
+def test_files_that_are_no_meshes_are_refused(tmp_path):
     with pytest.raises(FileNotFoundError):
         read_hull(tmp_path / "none.obj")
     flat = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3"
@@ -67,7 +67,7 @@ def test_what_is_no_mesh_is_refused(tmp_path):
             read_hull(tmp_path / name)
 
 
-def test_nothing_is_written_of_nothing(tmp_path):
+def test_without_an_overlap_no_file_is_written(tmp_path):
     with pytest.raises(ValueError, match="polytope is empty"):
         write_mesh(tmp_path / "none.obj", overlap(CUBE, CUBE + 3))
     with pytest.raises(ValueError, match=r"must end in \.obj, \.stl, \.ply, not 'cube\.step'"):
@@ -113,7 +113,7 @@ def test_all_polytopes_of_a_database_and_of_files_meet_in_one():
     assert fewer["polytopes"] == 2 and abs(fewer["volume"] - 0.875) <= fewer["volume_error"]
 
 
-def test_no_overlap_is_an_answer():
+def test_no_overlap_is_an_answer_and_not_an_error():
     done = intersect("one.stl", "far.ply", "--out", "none.obj")
     assert done.returncode == 0
     assert "status    separated" in done.stdout and "distance  2 m" in done.stdout
@@ -144,7 +144,7 @@ def test_with_concave_the_volume_is_that_of_the_meshes_and_not_of_hulls(tmp_path
     assert lines["volume"].startswith("0.375 ± ") and lines.keys() >= {"status", "centroid", "depth", "normal"}
 
 
-def test_an_open_mesh_and_what_is_no_mesh_are_refused_with_concave(tmp_path):
+def test_open_meshes_and_invalid_files_are_refused_with_concave(tmp_path):
     (tmp_path / "open.obj").write_text(without_a_facet(L_SHAPE))
     (tmp_path / "words.stl").write_text("hello")
     for name, reason in (
@@ -156,7 +156,7 @@ def test_an_open_mesh_and_what_is_no_mesh_are_refused_with_concave(tmp_path):
         assert re.match(rf"overlapper: {name} is {reason}", done.stderr)
 
 
-def test_what_stands_in_the_corner_of_a_concave_mesh_shares_nothing_with_it():
+def test_a_body_in_the_corner_of_a_concave_mesh_shares_nothing_with_it():
     write_mesh("in_corner.stl", Hull(CUBE / 2 + [1.25, 1.25, 0]))
     done = intersect("bent.obj", "in_corner.stl", "--concave", "--out", "none.obj")
     assert (done.returncode, done.stderr) == (0, "")
@@ -168,7 +168,7 @@ def test_what_stands_in_the_corner_of_a_concave_mesh_shares_nothing_with_it():
     assert "status    touching" in intersect("left.obj", "right.obj", "--concave").stdout
 
 
-def test_without_coacd_the_hull_stands_for_where_and_it_is_said(tmp_path, monkeypatch):
+def test_without_coacd_the_hull_gives_the_place_and_the_output_says_so(tmp_path, monkeypatch):
     (tmp_path / "fake").mkdir()
     (tmp_path / "fake" / "coacd.py").write_text("raise RuntimeError('no luck')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "fake"))
@@ -221,6 +221,6 @@ def test_a_query_only_reads(tmp_path, query):
         ),
     ],
 )
-def test_what_the_user_can_mend_is_one_sentence(arguments, sentence):
+def test_user_errors_are_one_sentence(arguments, sentence):
     done = intersect(*arguments)
     assert (done.returncode, done.stdout, done.stderr) == (2, "", f"overlapper: {sentence}\n")

@@ -34,7 +34,7 @@ def test_volumes_have_the_largest_unit_that_gives_a_tenth_or_more():
         assert f"   {unit} " in printed(overlaps_table(Summary("pile", pairs={(0, 0, 1, 0): pair(1, volume)})))
 
 
-def test_disagreements_are_told_up_to_ten_and_the_rest_is_counted():
+def test_ten_disagreements_are_listed_and_the_rest_is_counted():
     many = [Disagreement(step, ("a/base", "b/base"), "disagree", "By a hair.") for step in range(1, 13)]
     summary = Summary("pile", verdicts=Counter({"agree": 1_000, "disagree": 12}), disagreements=many)
     lines = remarks(summary)
@@ -44,7 +44,7 @@ def test_disagreements_are_told_up_to_ten_and_the_rest_is_counted():
     assert len(remarks(Summary("pile", verdicts=summary.verdicts, disagreements=many[:10]))) == 11
 
 
-def test_a_concave_mesh_is_told_by_its_parts_what_it_bounds_and_where_they_are_kept():
+def test_a_concave_mesh_is_reported_with_its_parts_volume_and_cache_file():
     meshes = [
         Decomposed(0, -1, "cup/base", range(1), 2e-3, None, None),
         Decomposed(1, 0, "bent/base", range(3), 3.0, 3.1, Path("parts")),
@@ -55,7 +55,7 @@ def test_a_concave_mesh_is_told_by_its_parts_what_it_bounds_and_where_they_are_k
     ]
 
 
-def test_what_is_skipped_and_what_was_looked_at_is_told():
+def test_skipped_shapes_and_examined_pairs_are_reported():
     summary = Summary("pile", report=Report(1, 3, 2, 1, 1, 1, 0, 9, 8), skipped=[Skipped(0, -1, "net", "it is soft")])
     first, *rest = remarks(summary)
     assert first == "1 bodies, 2 of 3 shapes read"
@@ -63,7 +63,7 @@ def test_what_is_skipped_and_what_was_looked_at_is_told():
     assert "1 of them measured again" in str(Report(1, 3, 2, 1, 1, 1, 1, 9, 8))
 
 
-def test_pairs_that_only_margins_hold_apart_are_told():
+def test_pairs_that_only_margins_separate_are_reported():
     summary = Summary("pile", report=Report(1, 3, 2, 1, 1, 0, 0, 9, 8, pairs_within_margins=147))
     assert remarks(summary)[-1].startswith("147 more pairs of links touch only within the margins that Bullet lays")
     assert summary.as_dict()["report"]["pairs_within_margins"] == 147

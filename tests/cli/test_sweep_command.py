@@ -23,7 +23,7 @@ def sweep(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=120)
 
 
-def test_a_sweep_says_what_became_of_it_and_writes_a_page_of_it():
+def test_a_sweep_prints_its_result_and_writes_a_page():
     done = sweep("--grid", "apart=0.1:0.3:3", "--seeds", "2", "--set", "seconds=0", "--out", "runs", "--pages", "1")
     assert (done.returncode, done.stderr) == (0, "a scene may talk\n")  # for its page, here
     assert done.stdout == ("balls: 6 of 6 tasks are done.\nWritten: runs/tasks.parquet\nWritten: runs/summary.html\n")
@@ -45,7 +45,7 @@ def test_a_sweep_says_what_became_of_it_and_writes_a_page_of_it():
     assert Path("runs", name).stat().st_size == pytest.approx(size, rel=1e-3)
 
 
-def test_json_says_what_failed_with_exit_code_1():
+def test_json_lists_failures_with_exit_code_1():
     done = sweep("--grid", "fate=good,raises,dies", "--points", "points.csv", "--out", "runs", "--json")
     assert (done.returncode, done.stderr) == (2, "overlapper: points.csv: No such file or directory\n")
     Path("points.csv").write_text("apart\n0.1\n0.12\n")
@@ -135,20 +135,20 @@ def test_ctrl_c_ends_a_sweep_that_goes_on_later():
         (["--range", "apart=0:1"], "--range says what --sample draws, and there is no --sample"),
     ],
 )
-def test_what_cannot_be_swept_is_refused_in_one_sentence(arguments, sentence):
+def test_invalid_sweeps_are_refused_in_one_sentence(arguments, sentence):
     done = sweep(*arguments, "--out", "runs")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"overlapper: {sentence}") and done.stderr.count("\n") == 1
     assert not Path("runs").exists()
 
 
-def test_a_folder_that_is_none_is_refused():
+def test_a_path_that_is_no_folder_is_refused():
     Path("runs").write_text("a file")
     done = sweep("--out", "runs")
     assert (done.returncode, done.stdout, done.stderr) == (2, "", "overlapper: runs: File exists\n")
 
 
-def test_a_sweep_of_which_nothing_is_done_has_no_page():
+def test_a_sweep_without_finished_tasks_has_no_page():
     done = sweep("--set", "fate=raises", "--out", "runs")
     assert (done.returncode, done.stderr) == (1, "")
     lines = done.stdout.splitlines()

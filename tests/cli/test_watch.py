@@ -86,7 +86,7 @@ def said(done):
 
 
 @pytest.mark.parametrize("way", WAYS_TO_STEP)
-def test_the_table_is_that_of_a_run_however_the_script_steps(way):
+def test_watch_writes_the_table_of_a_run_however_the_script_steps(way):
     script(WAYS_TO_STEP[way])
     Path("scene.py").write_text(SCENE)
     watched = watch("--out", "watched.csv", "script.py")
@@ -149,7 +149,7 @@ def test_times_follow_the_time_step():
     assert [*times] == [(1, 1 / 240), (2, 2 / 240), (3, 2 / 240 + 0.5), (4, 2 / 240 + 1.0)]
 
 
-def test_output_arguments_and_what_a_script_knows_of_itself_are_as_without_us(tmp_path):
+def test_watch_keeps_the_output_arguments_and_globals_of_a_script(tmp_path):
     (tmp_path / "beside.py").write_text("WORD = 'found'")
     script(
         """
@@ -187,7 +187,7 @@ ENDS = {
 
 
 @pytest.mark.parametrize("end", ENDS)
-def test_a_script_ends_as_without_us(end):
+def test_watch_keeps_the_exit_code_of_a_script(end):
     script(f"steps(3)\n{ENDS[end]}")
     watched, plain = watch("--out", "own.csv", "script.py"), alone()
     assert watched.returncode == plain.returncode
@@ -203,7 +203,7 @@ def test_a_script_ends_as_without_us(end):
         assert f"Written: {kept}\n" in watched.stderr
 
 
-def test_a_script_that_is_no_python_is_told_as_without_us():
+def test_watch_shows_the_syntax_error_of_a_script_as_python_does():
     script("def half(", head="")
     watched, plain = watch("script.py"), alone()
     assert watched.returncode == plain.returncode == 1
@@ -211,7 +211,7 @@ def test_a_script_that_is_no_python_is_told_as_without_us():
 
 
 @pytest.mark.parametrize("catches", [False, True])
-def test_ctrl_c_is_the_scripts(catches):
+def test_ctrl_c_goes_to_the_script(catches):
     loop = "while True: p.stepSimulation()"
     caught = f"try:\n    {loop}\nexcept KeyboardInterrupt:\n    print('caught'); p.stepSimulation(); sys.exit(4)"
     script(f"c = p.connect(p.DIRECT); build(c); print('here', flush=True)\n{caught if catches else loop}")
@@ -254,14 +254,14 @@ def test_two_clients_have_a_table_each():
     assert all(Path(name).exists() for name in ("own.html", "own-2.html", "own-3.html"))
 
 
-def test_what_a_process_that_is_forked_off_steps_is_its_own():
+def test_steps_of_a_forked_process_are_not_watched():
     script("import os\nc = steps(3)\nif os.fork() == 0:\n    steps(4)\nelse:\n    os.wait()\n    p.stepSimulation(c)")
     done = watch("--out", "own.csv", "script.py")
     assert done.returncode == 0 and done.stderr.count("Written: own.csv") == 1
     assert {row["step"] for row in read_table(Path("own.csv"))} == {1, 2, 3, 4}
 
 
-def test_a_script_that_never_steps_is_told_so():
+def test_a_script_that_never_steps_gets_a_message():
     script("print('nothing'); sys.exit(3)")
     done = watch("--out", "own.csv", "script.py")
     assert (done.returncode, done.stdout) == (3, "nothing\n")
@@ -274,13 +274,13 @@ def test_a_script_that_never_steps_is_told_so():
     )
 
 
-def test_bodies_that_share_nothing_are_told_so():
+def test_a_script_without_overlaps_gets_a_message():
     script("c = p.connect(p.DIRECT); p.stepSimulation(c)")
     done = watch("script.py")
     assert said(done).startswith("Nothing overlaps in 1 steps of script.py.\n0 bodies, 0 of 0 shapes read\n")
 
 
-def test_a_window_without_a_screen_is_told_and_not_given_unless_asked_for():
+def test_a_window_is_opened_only_on_request_and_a_missing_screen_is_reported():
     script("steps(3, p.connect(p.GUI, options='--mp4=x')); print(p.getConnectionInfo())")
     watched, plain = watch("script.py"), alone()
     assert watched.returncode == plain.returncode == 1
@@ -363,7 +363,7 @@ def test_a_disk_that_is_full_ends_the_watch_and_not_the_script(end, code):
 
 
 @pytest.mark.parametrize("end", ["", "p.disconnect(c); print('on it goes')"])
-def test_a_page_that_cannot_be_written_in_the_end_is_told(end):
+def test_a_page_that_cannot_be_written_at_the_end_is_reported(end):
     script(f"c = steps(3)\n{FULL}\n{end}")
     Path("own.html").write_text("of yesterday")
     done = watch("--html", "own.html", "script.py")

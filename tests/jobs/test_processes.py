@@ -41,7 +41,7 @@ def test_items_are_done_in_order_by_one_process_in_the_folder_of_whoever_asks(tm
     assert all(0 <= each.seconds < 5 for each in outcomes)
 
 
-def test_what_raises_hangs_or_dies_stops_no_other_and_tells_where(hand):
+def test_an_item_that_raises_hangs_or_dies_stops_no_other_and_is_named(hand):
     items = [("give", 1), ("raise", "no\nmore"), ("give", 2), ("hang", 0), ("give", 3), ("hang in C", 0), ("abort", 0)]
     outcomes = [*hand.work([*items, ("exit", 3), ("give", 4)])]
     assert told(outcomes) == [
@@ -54,7 +54,7 @@ def test_what_raises_hangs_or_dies_stops_no_other_and_tells_where(hand):
     assert "ValueError: no\nmore" in failures[0].traceback
 
 
-def test_words_are_of_the_item_that_failed(hand):
+def test_the_error_names_the_failed_item(hand):
     (_, failed) = hand.work([("tell", "long ago"), ("abort", 0)])
     assert "long ago" not in failed.traceback
 
@@ -103,7 +103,7 @@ def test_a_process_ends_with_whoever_asked_it_even_while_it_hangs():
     hand.close()
 
 
-def test_all_are_done_once_by_as_many_processes_as_there_are():
+def test_all_items_are_done_once_by_all_processes():
     engine = Processes(2)
     items = [("raise", k) if k % 7 == 3 else ("give", k) for k in range(200)]
     found = [*engine.outcomes(job(), items)]
@@ -115,7 +115,7 @@ def test_all_are_done_once_by_as_many_processes_as_there_are():
     assert [*engine.outcomes(job(), [])] == []
 
 
-def test_whoever_has_enough_leaves_no_process_behind():
+def test_stopping_early_leaves_no_process_behind():
     before = set(psutil.Process().children())
     outcomes = Processes(2).outcomes(job(), [("give", 1)] + [("sleep", 30)] * 50)
     assert next(outcomes)[0] == 0

@@ -140,7 +140,7 @@ def test_a_process_that_cannot_be_started_leaves_nothing_behind(failing):
         assert started.poll() is not None and started.stdin.closed and started.stdout.closed
 
 
-def test_whoever_needs_a_process_says_in_one_sentence_that_there_is_none(failing, tmp_path):
+def test_commands_that_need_a_process_say_in_one_sentence_that_none_can_start(failing, tmp_path):
     (tmp_path / "box.bullet").write_text("")
     cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
     asked = {

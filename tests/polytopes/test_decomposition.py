@@ -111,7 +111,7 @@ DATA = packed("key", [CORNERS, CORNERS + 1])
 
 
 @given(st.integers(0, len(DATA) - 1), st.integers(1, 255))
-def test_no_byte_of_an_entry_may_change_and_none_be_missing(place, change):
+def test_an_entry_with_a_changed_or_missing_byte_is_rejected(place, change):
     changed = bytearray(DATA)
     changed[place] ^= change
     assert unpacked("key", bytes(changed)) is None
@@ -124,7 +124,7 @@ def test_an_entry_is_what_was_packed():
     assert unpacked("key", packed("key", [])) == []
 
 
-def test_those_who_decompose_at_the_same_time_find_the_same(coacd_is, folder):
+def test_processes_that_decompose_at_the_same_time_find_the_same_parts(coacd_is, folder):
     coacd_is(SAW)
     with concurrent.futures.ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda _: decompose(bent()), range(4)))
@@ -151,7 +151,7 @@ def test_a_folder_that_cannot_be_written_costs_no_answer(coacd_is, monkeypatch, 
         (SAW.replace("return", "return [[v[:3], None]] #"), "no solid part"),
     ],
 )
-def test_however_coacd_ends_there_is_a_reason(coacd_is, source, reason):
+def test_every_end_of_coacd_has_a_reason(coacd_is, source, reason):
     coacd_is(source)
     with pytest.raises(NotDecomposed, match=reason):
         decompose(bent(), time_limit=1 if "sleep" in source else 60)
@@ -238,7 +238,7 @@ def test_a_mesh_drawn_from_both_sides_is_the_same_mesh():
         (np.where(CUBE == 1, np.nan, CUBE), "not finite"),
     ],
 )
-def test_what_bounds_no_volume_is_refused_by_name(triangles, reason):
+def test_surfaces_without_a_volume_are_refused_by_name(triangles, reason):
     with pytest.raises(NotDecomposed, match=reason):
         decompose(triangles)
 

@@ -170,7 +170,7 @@ def test_a_package_that_shows_an_object_too_often_is_refused_soon(tmp_path):
     assert refusal(path).startswith("it shows 125,")
 
 
-def test_what_is_packed_is_refused_or_must_not_be_too_much(tmp_path):
+def test_compressed_files_are_refused_or_limited_in_size(tmp_path):
     for name in ("x.zip", "x.tar.gz", "x.stl.bz2"):
         (tmp_path / name).write_bytes(b"")
         assert refusal(tmp_path / name) == "it is packed, and must be unpacked first"

@@ -39,7 +39,7 @@ def test_carved_bodies_share_what_a_boolean_says(seed):
 
 
 @pytest.mark.parametrize("pair", [("bolt_4.stl", "sleeve.ply"), ("plate_upper.stl", "bolt_1.stl")])
-def test_a_bolt_in_its_hole_shares_nothing_and_one_that_is_bitten_a_sliver(pair):
+def test_a_bolt_in_its_hole_shares_nothing_and_an_oversized_bolt_shares_a_sliver(pair):
     solids = dict(bearing.solids(0.65))
     a, b = (solids[name] for name in pair)
     volume, error = mesh_overlap(triangles(a), triangles(b))
@@ -63,7 +63,7 @@ def test_a_triangle_that_is_hardly_tilted_is_counted_as_error():
     assert abs(volume - 0.5) <= error < 1e-12
 
 
-def test_what_would_take_too_many_pairs_has_no_answer(monkeypatch):
+def test_meshes_with_too_many_pairs_of_triangles_have_no_answer(monkeypatch):
     monkeypatch.setattr(module, "MOST", 3)
     cube = triangles(Manifold.cube([1, 1, 1]))
     assert mesh_overlap(cube, cube) is None

@@ -59,7 +59,7 @@ def test_few_planes_enclose_a_cell_of_bounded_reach(seed):
     assert len(cell.vertices) == 4 and np.linalg.norm(cell.vertices, axis=1).max() <= 10.0
 
 
-def test_what_cannot_be_drawn_is_refused():
+def test_polytopes_that_cannot_be_drawn_at_random_are_refused():
     with pytest.raises(ValueError, match=r"n must be at least 4, .* not 3"):
         random_polytope(3)
     with pytest.raises(ValueError, match="source must be one of cube, ball, sphere, halfspaces, not 'torus'"):
@@ -87,7 +87,7 @@ def points_table(file, rows):
     connection.close()
 
 
-def test_what_is_written_is_read_to_the_last_bit(url):
+def test_polytopes_are_read_back_bit_for_bit(url):
     hulls = {id: random_polytope(12, "ball", rng=id) for id in reversed(range(100))}
     assert write_polytopes(url, hulls.items()) == 100
     found = list(read_polytopes(url))
@@ -118,7 +118,7 @@ def test_polytopes_are_added_to_those_that_are_there(url):
         ((1, TETRAHEDRON), sqlalchemy.exc.IntegrityError, "UNIQUE"),
     ],
 )
-def test_all_is_written_or_nothing(url, second, error, words):
+def test_either_all_polytopes_are_written_or_none(url, second, error, words):
     write_polytopes(url, [(0, TETRAHEDRON)])
     with pytest.raises(error, match=words):
         write_polytopes(url, [(1, TETRAHEDRON), *[(i, TETRAHEDRON) for i in range(10, 3000)], second])

@@ -63,7 +63,7 @@ def execute(url, *statements):
     engine.dispose()
 
 
-def test_what_is_written_is_read_to_the_last_bit(url):
+def test_polytopes_are_read_back_bit_for_bit(url):
     hulls = {id: random_polytope(12, "sphere", rng=id) for id in range(1500)}
     assert write_polytopes(url, hulls.items()) == 1500
     found = dict(read_polytopes(url))
@@ -102,7 +102,7 @@ def test_polytopes_are_streamed(url):
     assert [id for id, _ in islice(read_polytopes(url, endless), 10_000)] == list(range(10_000))
 
 
-def test_what_the_database_refuses_is_an_error_of_sqlalchemy(url):
+def test_a_refusal_of_the_database_is_an_error_of_sqlalchemy(url):
     with pytest.raises(sqlalchemy.exc.ProgrammingError, match='relation "polytopes" does not exist'):
         next(read_polytopes(url))
 

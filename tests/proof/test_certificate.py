@@ -136,7 +136,7 @@ def test_several_polyhedra_are_proved(bodies):
 
 @settings(max_examples=8)
 @given(placed(solids, 3.0), placed(solids, 3.0), placed(solids, 3.0))
-def test_three_bodies_somewhere_are_proved(a, b, c):
+def test_three_bodies_at_random_places_are_proved(a, b, c):
     proved(found((a, b, c)))
 
 
@@ -155,7 +155,7 @@ def test_three_bodies_somewhere_are_proved(a, b, c):
         ),
     ],
 )
-def test_of_several_bodies_with_a_round_one_as_much_is_proved_as_is_stated(bodies):
+def test_several_bodies_with_a_round_one_have_proved_bounds_as_stated(bodies):
     """From the mean of the corners, of which most are on the round body, corners would be pulled too far in."""
     common = found(bodies)
     lower, _ = proved(common)
@@ -208,7 +208,7 @@ def test_touching_round_bodies_are_proved_to_share_no_more_than_is_stated(seed):
         ("special_poses", 5000475),  # of one part so few bits tell nothing at all
     ],
 )
-def test_where_segments_of_slices_end_in_a_root_volumes_are_proved(family, seed):
+def test_volumes_are_proved_where_slice_segments_end_in_a_root(family, seed):
     proved(overlap(*families.make(family, seed).placed))
 
 
@@ -218,7 +218,7 @@ def test_an_ellipsoid_within_a_box_is_proved_to_have_its_volume():
     assert lower < truth < upper < lower * (1 + Fraction(1, 10**14))
 
 
-def test_a_half_space_is_what_its_numbers_say_as_given():
+def test_a_half_space_is_defined_by_its_numbers_as_given():
     """Its normal divided by its length is another one."""
     case = families.make("half_spaces", 10008)
     lower, upper = proved(overlap(*case.placed))
@@ -233,7 +233,7 @@ def test_a_hull_has_the_corners_that_rounding_alone_lifts_off_a_facet():
     assert lower <= case.truth.volume <= upper
 
 
-def test_what_the_paper_method_finds_is_bounded_by_the_certificate():
+def test_the_certificate_bounds_the_answer_of_the_paper_method():
     """That method may lose planes, never invent a common part."""
     bodies = IN_COMMON["cubes"]
     exactly, _ = certificate(overlap(*bodies)).verify()

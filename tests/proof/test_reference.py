@@ -55,7 +55,7 @@ def random_overlaps(kinds, seed, count=6):
 
 
 @pytest.mark.parametrize("kinds", COMBINATIONS, ids="-".join)
-def test_fcl_agrees_or_is_the_one_who_is_wrong(fcl, kinds):
+def test_fcl_agrees_or_is_wrong(fcl, kinds):
     """FCL ends its distance search early beside curved shapes: always too far, by less than 1e-3 m at this size."""
     comparisons = fcl.compare_many(random_overlaps(kinds, seed=len(kinds[0]) * 31 + len(kinds[1])))
     for comparison in comparisons:
@@ -150,7 +150,7 @@ def test_a_script_needs_no_main_guard_and_leaves_no_process(tmp_path):
         os.kill(int(pid), 0)
 
 
-def test_cubes_of_a_tenth_of_a_millimetre_that_fcl_calls_apart_go_to_us(fcl):
+def test_cubes_of_a_tenth_of_a_millimetre_that_fcl_calls_apart_are_decided_for_us(fcl):
     """FCL takes a gain below 1e-6 m for none, whatever the size of the bodies."""
     size, rng = 1e-4, np.random.default_rng(0)
     cube = Placed(Box([size / 2] * 3))
@@ -191,7 +191,7 @@ def test_a_wrong_yes_beside_a_half_space_loses_without_a_distance(fcl):
     assert (comparison.verdict, comparison.nearer, comparison.fcl.signed_distance) == ("disagree", "fcl", None)
 
 
-def test_what_fcl_is_not_asked_is_unsupported(fcl):
+def test_pairs_that_fcl_cannot_answer_are_unsupported(fcl):
     three = overlap(Placed(CUBE), Placed(CUBE, (0.1, 0, 0)), Placed(CUBE, (0.2, 0, 0)))
     planes = Claim(Placed(HalfSpace((0, 0, 1), 0.0)), Placed(HalfSpace((0, 0, -1), -1.0)), 1.0, (0, 0, -1))
     pair = overlap(Placed(CUBE), Placed(CUBE, (0.75, 0, 0)))

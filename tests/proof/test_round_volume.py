@@ -178,7 +178,7 @@ def disagreement(found: Overlap) -> str:
 
 @pytest.mark.parametrize("turns", TURNS)
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-def test_what_is_measured_lies_around_what_is_proved(first, second, turns):
+def test_measured_intervals_contain_the_proved_bounds(first, second, turns):
     rng = np.random.default_rng([11, *map(ord, first + second + turns)])
     wrong = {}
     for _ in range(3):

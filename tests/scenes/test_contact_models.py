@@ -47,19 +47,19 @@ def test_with_volumetric_contact_a_frame_has_forces_of_its_bodies(scene):
     assert frame.kept().forces is frame.forces
 
 
-def test_contact_points_have_no_forces_of_ours(scene):
+def test_contact_points_have_no_volumetric_forces(scene):
     *_, frame = run(scene(), 3)
     assert frame.forces is None
 
 
-def test_a_scene_says_what_its_contact_is_and_a_run_says_otherwise(scene):
+def test_a_run_overrides_the_contact_model_of_a_scene(scene):
     *_, frame = run(scene("CONTACT = 'volumetric'"), 3)
     assert frame.forces is not None
     *_, frame = run(scene("CONTACT = 'volumetric'"), 3, contact="bullet")
     assert frame.forces is None
 
 
-def test_a_contact_that_is_none_is_refused(scene):
+def test_an_unknown_contact_model_is_refused(scene):
     either = "which must be 'bullet', 'volumetric' or a dictionary of dissipation, friction, stiffness, substeps"
     for each in ("'soft'", "{'mass': 1}"):
         with pytest.raises(SceneError, match=rf"cube\.py has CONTACT = {each}, {either}"):
@@ -76,7 +76,7 @@ def test_a_scene_says_how_stiff_its_bodies_are(scene):
     assert frame.forces is None
 
 
-def test_a_contact_that_a_run_does_not_know_is_refused(scene):
+def test_a_run_refuses_an_unknown_contact_model(scene):
     with pytest.raises(ValueError, match="contact must be 'bullet' or 'volumetric', not 'soft'"):
         next(run(scene(), contact="soft"))
 
@@ -169,7 +169,7 @@ def test_an_expected_file_has_forces_with_their_budgets(recorded):
     assert verdict.moves == [] and "where today's simulation puts and pushes them" in verdict.lines()[2]
 
 
-def test_a_force_that_is_another_has_moved(recorded):
+def test_a_changed_force_has_moved(recorded):
     text = recorded.expected.read_text(encoding="utf-8")
     text = re.sub(r"^# rows: .*\n", "", text, flags=re.MULTILINE)
     heavier = re.sub(r"-9\.8[01]\d*", "-9.5", text)
@@ -181,7 +181,7 @@ def test_a_force_that_is_another_has_moved(recorded):
     assert "energy" in {*compare_forces(verdict.expected.rows, [], verdict.expected.budgets).spent}
 
 
-def test_without_a_budget_forces_may_be_anything(recorded):
+def test_without_a_budget_forces_are_not_compared(recorded):
     expected = read_expected(recorded.expected)
     none = [row | {"force_z_n": 1e3, "energy_j": 1.0} for row in expected.rows]
     assert compare_forces(expected.rows, none, {}).moves == []

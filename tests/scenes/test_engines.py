@@ -115,7 +115,7 @@ def test_a_task_of_a_sweep_is_done():
     assert max(sunk(step).volume for step in range(1, 9)) in row.values()
 
 
-def test_bodies_that_come_or_are_nowhere_are_noticed():
+def test_new_bodies_and_bodies_without_a_pose_are_noticed():
     world = World()
     world.add("ball", Sphere(0.1), (0, 0, 0))
     bodies = AnyBodies(world)
@@ -137,7 +137,7 @@ def test_a_simulator_without_forces_says_so():
         next(run(load_scene("sinking.py"), contact="volumetric"))
 
 
-def test_an_engine_that_is_not_there_is_named():
+def test_an_unknown_engine_is_named():
     Path("sinking.py").write_text(SCENE.replace("scripted", "newton"))
     with pytest.raises(SceneError, match=r"ENGINE = 'newton', which must be one of 'bullet'"):
         load_scene("sinking.py")

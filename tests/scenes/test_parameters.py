@@ -85,7 +85,7 @@ def test_a_value_of_another_kind_is_refused_by_name(text, default, words):
     assert str(refused.value) == words
 
 
-def test_a_name_that_is_none_is_refused_with_the_nearest(balls):
+def test_an_unknown_parameter_is_refused_with_the_nearest_name(balls):
     with pytest.raises(SceneError, match=r"^the scene balls has no parameter 'apar'; the nearest is 'apart' \(it has"):
         load_scene(balls, {"apar": "1"})
     with pytest.raises(ValueError, match=r"^the scene plain has no parameters, and so no 'mass'$"):
@@ -132,17 +132,17 @@ def test_an_expected_file_says_the_parameters_that_it_was_recorded_with(balls):
         (["apart=1", "apart=2"], "--set says apart twice"),
     ],
 )
-def test_settings_that_say_nothing_or_one_thing_twice_are_refused(settings, sentence):
+def test_empty_and_repeated_settings_are_refused(settings, sentence):
     with pytest.raises(Refused, match=f"^{sentence}$"):
         given_parameters(settings)
 
 
-def test_a_table_is_seen_with_its_own_parameters():
+def test_a_table_is_viewed_with_its_own_parameters():
     with pytest.raises(ValueError, match=r"^--set is for scenes, and t.csv is a table, which says its own parameters$"):
         play("t.csv", given={"count": "1"})
 
 
-def test_what_cannot_be_set_is_refused_in_one_sentence():
+def test_invalid_settings_are_refused_in_one_sentence():
     done = overlapper("run", "balls.py", "--set", "count=1.5")
     sentence = "overlapper: count must be a whole number of 64 bits, as its default 2 is, not '1.5'\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", sentence)

@@ -94,7 +94,7 @@ def test_a_moved_scene_says_what_moved_and_shows_before_and_after(scenes, pytest
     assert not (pytester.path / "pages" / "slide.moved.html").exists()
 
 
-def test_what_is_expected_is_written_anew_on_demand(scenes):
+def test_expected_files_are_rewritten_on_demand(scenes):
     recorded = scenes("--overlapper-record")
     recorded.assert_outcomes(passed=1)
     recorded.stdout.fnmatch_lines(["slide: written: *slide.csv"])
@@ -137,7 +137,7 @@ def test_only_scenes_are_collected(scenes, pytester):
     collected.stdout.fnmatch_lines(["scenes/slide.py::slide", "test_strings.py::test_it", "", "2 tests collected*"])
 
 
-def test_a_scene_that_is_no_python_is_not_overlooked(scenes):
+def test_a_scene_with_a_syntax_error_is_not_overlooked(scenes):
     scenes.edit("return step", "return step +")
     run = scenes()
     run.assert_outcomes(failed=1)

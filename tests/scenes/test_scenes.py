@@ -42,7 +42,7 @@ def test_measures_stay_within_their_budgets_when_a_scene_is_moved(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_fcl_is_never_nearer_to_the_truth(name):
+def test_fcl_is_never_more_accurate(name):
     (frame,) = run(scene(name), only=[scene(name).steps])
     with Fcl() as fcl:
         opinions = fcl.compare_many(contact.overlap for contact in frame.contacts)
@@ -113,7 +113,7 @@ def test_friction_alone_holds_the_duck_in_the_air_for_ten_seconds():
     assert frame.forces.on(duck)[0] == pytest.approx([0, 0, weight], abs=1e-3 * weight)
 
 
-def test_what_rolls_keeps_its_energy_and_rolls_down_a_slope_as_its_inertia_asks():
+def test_rolling_bodies_keep_their_energy_and_accelerate_down_a_slope_by_their_inertia():
     first, *_, last = (bodies_of(frame) for frame in run(scene("rolling"), contact="volumetric"))
     (there, before), (here, after) = first, last
     level, sloping = [2, 4, 6], [3, 5, 7]

@@ -33,7 +33,7 @@ def pile(client):
     return client
 
 
-def test_the_answers_are_those_of_bodies(pile):
+def test_a_watch_gives_the_answers_of_bodies(pile):
     step = p.stepSimulation
     expected = []
     with overlapper.watch(pile, "own.sqlite", "own.html", every=2, pairs="all", name="a pile") as watch:
@@ -109,7 +109,7 @@ def test_only_an_error_keeps_the_table_from_its_place(pile, error, place):
     assert watch.written == [Path(place)] == list(Path().iterdir())
 
 
-def test_what_cannot_be_measured_raises_in_the_call_that_made_the_step(pile):
+def test_a_missing_body_raises_in_the_call_of_the_step(pile):
     watch = overlapper.watch(pile, pairs=[(0, 7)])
     with pytest.raises(ValueError, match="pairs names body 7, which is not in the simulation"):
         p.stepSimulation(pile)
@@ -164,7 +164,7 @@ def test_an_interruption_in_the_middle_of_reading_costs_no_later_step(pile, monk
     assert [row["step"] for row in read_table(Path("own.csv"))] == [1, 3] and watch.steps == 3
 
 
-def test_the_names_are_offered_by_the_package():
+def test_the_package_exports_the_names():
     assert overlapper.Log is log.Log
     assert overlapper.watch is overlapper.watch
 

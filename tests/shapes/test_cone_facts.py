@@ -47,14 +47,14 @@ def test_every_question_is_answered():
     assert asked - set(dir(facts(CONE))) == set()
 
 
-def test_it_is_written_read_and_named():
+def test_a_cone_is_written_read_and_named():
     assert text_of(CONE) == '["Cone", 0.5, 1.3]'
     assert alike(shape_of(text_of(CONE)), CONE)
     assert not alike(Cone(0.5, 1.31), CONE)
     assert facts(CONE).words() == ("cone", "radius 0.5, length 1.3", 0)
 
 
-def test_it_is_drawn():
+def test_a_cone_is_drawn():
     drawn = tessellation(CONE)
     assert [drawn.vertices.min(axis=0), drawn.vertices.max(axis=0)] == pytest.approx(
         np.array([[-0.5, -0.5, -0.65], [0.5, 0.5, 0.65]])
@@ -64,7 +64,7 @@ def test_it_is_drawn():
     assert np.linalg.norm(drawn.normals, axis=1) == pytest.approx(np.ones(len(drawn.vertices)))
 
 
-def test_its_exact_answers_agree_with_each_other():
+def test_exact_answers_of_a_cone_agree_with_each_other():
     body = RationalBody(placed(CONE, (0.3, -0.2, 0.1), (0.1, 0.2, 0.3, 0.9)))
     axes = body.axes.astype(float)
     centre = body.position - body.axes[:, 2] * Fraction(1, 3)
@@ -93,7 +93,7 @@ def test_a_ball_is_held_where_it_fits():
 
 
 @pytest.mark.parametrize("other", [Sphere(0.4), Box([0.3, 0.4, 0.5])], ids=repr)
-def test_fcl_knows_it_and_agrees_with_the_arbiter(other):
+def test_fcl_supports_cones_and_agrees_with_the_arbiter(other):
     rng = np.random.default_rng(1)
     for _ in range(4):
         pair = placed(CONE), placed(other, rng.uniform(-1.5, 1.5, 3), quaternion(rng))

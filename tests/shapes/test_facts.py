@@ -62,7 +62,7 @@ def test_only_unbounded_shapes_have_balls_without_end(shape):
 
 
 @pytest.mark.parametrize("shape", BOUNDED, ids=name)
-def test_what_is_drawn_is_as_large_as_the_shape(shape):
+def test_the_drawn_mesh_is_as_large_as_the_shape(shape):
     drawn = facts(shape).tessellation()
     size = np.ptp(shape.bounds, axis=0).max()
     assert np.abs([drawn.vertices.min(axis=0), drawn.vertices.max(axis=0)] - shape.bounds).max() < 0.3 * size
@@ -100,7 +100,7 @@ def test_points_are_held_up_to_the_support_and_not_beyond(shape):
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=name)
-def test_the_tightest_plane_parts_a_point_outside_from_the_shape(shape):
+def test_the_tightest_plane_separates_an_outside_point_from_the_shape(shape):
     body = RationalBody(Placed(shape))
     size = np.ptp(shape.bounds, axis=0).max() if body.facts.bounded else 1.0
     points = [point for point in map(exact, 4 * size * directions(20)) if not body.contains(point[None])[0]]

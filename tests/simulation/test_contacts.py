@@ -109,14 +109,14 @@ def test_separated_shapes_whose_boxes_meet_make_no_contact(client):
     assert bodies.report().pairs_examined == 1 and bodies.report().pairs_overlapping == 0
 
 
-def test_shapes_of_one_body_are_no_pair(client):
+def test_shapes_of_one_body_are_not_paired(client):
     p.loadURDF("franka_panda/panda.urdf", physicsClientId=client)
     bodies = Bodies(client)
     assert bodies.overlaps() == []
     assert bodies.report().pairs_possible == bodies.report().pairs_examined == 0
 
 
-def test_static_bodies_are_no_pair_until_one_is_released(client):
+def test_static_bodies_are_not_paired_until_one_is_released(client):
     box(client, mass=0), box(client, mass=0, position=[0.9, 0, 0])
     bodies = Bodies(client)
     assert bodies.overlaps() == []
@@ -255,7 +255,7 @@ def test_contacts_are_pickled_with_their_names(client):
     assert again.names == contacts.names and again.to_pandas().equals(contacts.to_pandas())
 
 
-def test_what_is_found_says_what_it_is(client):
+def test_results_have_a_readable_repr(client):
     bodies = a_cube_in_two_others(client)
     assert repr(bodies) == "Bodies(4 bodies, 4 shapes)"
     assert re.fullmatch(r"Contacts\(\d+, \d of them overlapping\)", repr(bodies.overlaps()))

@@ -28,7 +28,7 @@ def _speed(client, body):
 
 @pytest.mark.parametrize("phase", [0, 0.35, 0.65, 0.95])
 @pytest.mark.parametrize(("mass", "half", "stiffness"), [(0.1, 0.05, 1e7), (0.01, 0.05, 1e7), (1, 0.05, 1e9)])
-def test_what_is_light_or_stiff_bounces_no_faster_than_it_fell(client, mass, half, stiffness, phase):
+def test_light_or_stiff_bodies_bounce_no_faster_than_they_fell(client, mass, half, stiffness, phase):
     _ground(client)
     box = _box(client, [0, 0, half + (1 + phase) / 240], mass, half, velocity=[0, 0, -1])
     with VolumetricContact(Bodies(client), stiffness=stiffness) as contact:
@@ -39,7 +39,7 @@ def test_what_is_light_or_stiff_bounces_no_faster_than_it_fell(client, mass, hal
 
 @pytest.mark.parametrize("phase", [0, 0.25, 0.5, 0.75])
 @pytest.mark.parametrize("speed", [3, 5, 20])
-def test_what_is_so_fast_and_small_that_a_step_would_swallow_it_bounces_no_faster_than_it_fell(client, speed, phase):
+def test_fast_small_bodies_bounce_no_faster_than_they_fell(client, speed, phase):
     _ground(client)
     box = _box(client, [0, 0, 0.005 + (1 + phase) * speed / 240], 1e-3, 0.005, velocity=[0, 0, -speed])
     with VolumetricContact(Bodies(client), stiffness=1e8) as contact:
@@ -65,7 +65,7 @@ def test_an_edge_that_comes_down_to_a_face_gains_no_energy(client, tilt):
     assert highest < 1.02 * 0.01 * G * 0.06
 
 
-def test_what_is_put_down_where_it_touches_stays_there(client):
+def test_a_body_placed_in_contact_stays_there(client):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
     _ground(client)
     box = _box(client, [0, 0, 0.05], mass=0.01)
@@ -77,7 +77,7 @@ def test_what_is_put_down_where_it_touches_stays_there(client):
     assert highest <= 0.05 and np.abs(_speed(client, box)).max() < 1e-9
 
 
-def test_a_pole_that_swings_down_is_seen_to_come(client):
+def test_a_swinging_pole_is_detected_before_it_hits(client):
     """What is fast is the end of a link, of which the joint knows."""
     _ground(client)
     shape = pybullet.createCollisionShape(
@@ -108,7 +108,7 @@ def test_a_pole_that_swings_down_is_seen_to_come(client):
     assert -2.5 < fastest < 0
 
 
-def test_what_nothing_moves_slips_without_an_answer(client):
+def test_bodies_without_mass_slip_without_a_response(client):
     """Two bodies without mass, one of which goes on as it was told: what friction there is ends no slip."""
     ground, box = _ground(client), _box(client, [0, 0, 0.049], mass=0, velocity=[0.1, 0, 0])
     with VolumetricContact(Bodies(client), pairs=[(ground, box)]) as contact:
@@ -120,7 +120,7 @@ def test_what_nothing_moves_slips_without_an_answer(client):
 
 @pytest.mark.filterwarnings("ignore::overlapper.simulation.cautions.SubstepsWarning")
 @pytest.mark.parametrize("seed", range(8))
-def test_what_turns_fast_is_pushed_wherever_its_pressures_are_more_than_none(client, seed):
+def test_fast_turning_bodies_are_pushed_wherever_pressure_is_positive(client, seed):
     """Torques that the patch cannot give take no force away. Without a force, velocities stay as they are."""
     stiffness, tau, pushed = 1e8, 1e-3, 0
     random = np.random.default_rng(seed)
@@ -187,7 +187,7 @@ def test_a_client_is_within_one_contact_at_a_time(client):
         contact.step()
 
 
-def test_what_goes_on_from_a_restored_state_knows_nothing_of_what_came_after_it(client):
+def test_a_restored_state_forgets_everything_that_came_after_it(client):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
     _ground(client)
     box, ways = _box(client, [0, 0, 0.05 - G / 1e5]), []

@@ -176,7 +176,7 @@ def test_energy_goes_from_motion_to_pressures_and_back():
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_friction_of_a_patch_is_coulombs(seed):
+def test_friction_of_a_patch_follows_coulombs_law(seed):
     """Within the ellipsoid of force and torque, and where anything is left of slip and spin, against both."""
     rng = np.random.default_rng(seed)
     with World(step=1e-3) as world:

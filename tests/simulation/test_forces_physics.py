@@ -25,37 +25,37 @@ def test_a_bounce_keeps_the_energy(pose, substeps, most):
     assert experiments.bounce(pose, substeps) < most
 
 
-def test_what_a_bounce_on_a_face_loses_at_the_kink_is_of_second_order():
+def test_the_energy_loss_of_a_bounce_on_a_face_is_of_second_order_in_the_step():
     coarse, fine = (experiments.bounce("face", substeps, phases=7) for substeps in (4, 16))
     assert fine < coarse / 8
 
 
 @pytest.mark.parametrize("drop", [0.5, 1.0])
 @pytest.mark.parametrize("dissipation", [1e-4, 5e-4, 2e-3])
-def test_what_a_bounce_loses_is_told_by_the_dissipation_whatever_the_speed(dissipation, drop):
+def test_dissipation_determines_the_loss_of_a_bounce_at_any_speed(dissipation, drop):
     assert experiments.restitution(dissipation, drop) == pytest.approx(experiments.rebound(dissipation), abs=0.01)
 
 
 @pytest.mark.parametrize("substeps", [1, 4, 20])
-def test_a_box_stops_after_the_way_that_friction_takes(substeps):
+def test_a_sliding_box_stops_at_the_distance_that_friction_predicts(substeps):
     assert experiments.slide(substeps) == pytest.approx(1, abs=1e-4)
 
 
 @pytest.mark.parametrize("substeps", [1, "auto"])
-def test_what_lies_on_an_incline_below_the_angle_of_friction_does_not_creep(substeps):
+def test_a_body_on_an_incline_below_the_friction_angle_does_not_creep(substeps):
     acceleration, way = experiments.incline(0.999, substeps=substeps)
     assert abs(acceleration) < 1e-9 and abs(way) < 1e-9
 
 
 @pytest.mark.parametrize("substeps", [1, "auto"])
-def test_what_lies_on_an_incline_above_the_angle_of_friction_slides_as_it_should(substeps):
+def test_a_body_on_an_incline_above_the_friction_angle_slides_as_predicted(substeps):
     angle = math.atan(1.001 * FRICTION)
     acceleration, way = experiments.incline(1.001, substeps=substeps)
     assert acceleration == pytest.approx(G * (math.sin(angle) - FRICTION * math.cos(angle)), rel=1e-3) and way > 0
 
 
 @pytest.mark.parametrize("substeps", [1, 4])
-def test_a_force_that_sets_in_is_known_a_substep_later_and_then_held(substeps):
+def test_a_new_force_acts_one_substep_later_and_is_then_held(substeps):
     """Until then it moves the box freely: by F h² / m, and what friction takes to stop that."""
     way, speed = experiments.shove(substeps)
     alone = 2 * (STEP / substeps) ** 2
@@ -65,13 +65,13 @@ def test_a_force_that_sets_in_is_known_a_substep_later_and_then_held(substeps):
 @pytest.mark.parametrize("friction", [None, "distributed"])
 @pytest.mark.parametrize("shape", ["box", "disc"])
 @pytest.mark.parametrize("substeps", [1, 4])
-def test_a_spin_ends_when_the_mean_distance_says(shape, substeps, friction):
+def test_a_spin_ends_at_the_time_predicted_by_the_mean_distance(shape, substeps, friction):
     stopped, foretold = experiments.spin(shape, substeps, friction=friction)
     assert abs(stopped - foretold) < STEP / substeps + (1e-3 if friction is None else 1e-2) * foretold
 
 
 @pytest.mark.parametrize("shape", ["box", "disc"])
-def test_slip_and_spin_at_once_are_as_of_a_rigid_base_if_friction_is_distributed(shape):
+def test_combined_slip_and_spin_match_a_rigid_base_if_friction_is_distributed(shape):
     rigid = experiments.rigid_slide_and_spin(shape)
     ours = experiments.slide_and_spin(shape, friction="distributed")
     assert ours.way == pytest.approx(rigid.way, rel=0.005)
@@ -79,21 +79,21 @@ def test_slip_and_spin_at_once_are_as_of_a_rigid_base_if_friction_is_distributed
     assert ours.time == pytest.approx(rigid.time, rel=0.01)
 
 
-def test_slip_and_spin_at_once_fall_short_by_a_twentieth_if_friction_is_not_distributed():
+def test_combined_slip_and_spin_fall_short_by_a_twentieth_if_friction_is_not_distributed():
     rigid, ours = experiments.rigid_slide_and_spin("box"), experiments.slide_and_spin("box")
     assert ours.way / rigid.way == pytest.approx(0.95, abs=0.01)
 
 
 @pytest.mark.parametrize("shape", ["cylinder", "ball"])
 @pytest.mark.parametrize("stiffness", [1e7, 1e9])
-def test_what_rolls_keeps_its_energy_without_dissipation(shape, stiffness):
+def test_rolling_bodies_keep_their_energy_without_dissipation(shape, stiffness):
     v0, _, e0, e1 = experiments.roll(shape, stiffness=stiffness, substeps=4)
     assert v0 > 0.9 and abs(e1 / e0 - 1) < 1e-9
 
 
 @pytest.mark.parametrize(("shape", "factor"), [("cylinder", 2 / 3), ("ball", 5 / 7)])
 @pytest.mark.parametrize("stiffness", [1e7, 1e8])
-def test_dissipation_slows_what_rolls_whatever_the_stiffness(shape, factor, stiffness):
+def test_dissipation_slows_rolling_bodies_at_any_stiffness(shape, factor, stiffness):
     """The front of a patch comes down and its back goes up: by their velocities w x pressures resist with the torque
 
     k tau w int x² dA. Of a cylinder or a ball that has sunk in by little, int x² dA = V r, and it is tau w N r; that

@@ -45,7 +45,7 @@ def resting(world, **options):
         ({"substeps": "many"}, "substeps must be a whole number from 1, or 'auto', not 'many'"),
     ],
 )
-def test_what_is_no_argument_is_said(world, given, said):
+def test_invalid_arguments_are_named(world, given, said):
     with pytest.raises(ValueError, match=f"^{re.escape(said)}$"):
         world.contact(**given)
 
@@ -58,7 +58,7 @@ def test_numbers_of_numpy_are_numbers(world):
 
 
 @pytest.mark.parametrize("pairs", [[("nobody", "box")], "some", [(0, 99)], 7, [1, 2, 3]])
-def test_pairs_that_are_none_are_said_at_once_as_bodies_says_it(world, pairs):
+def test_invalid_pairs_are_refused_at_once_in_the_words_of_bodies(world, pairs):
     resting(world)
     with pytest.raises(ValueError, match=r"^\w+ ") as theirs:
         Bodies(world.client).pairs(pairs)
@@ -74,7 +74,7 @@ def test_pairs_that_are_none_are_said_at_once_as_bodies_says_it(world, pairs):
         ("friction", "slippery", "0 or greater"),
     ],
 )
-def test_a_function_that_returns_no_number_is_told_with_the_pair(world, name, given, least):
+def test_a_function_that_returns_no_number_is_reported_with_the_pair(world, name, given, least):
     cube = resting(world)
     with world.contact(**{name: lambda a, b: given}) as contact:
         said = f"{name} of {(world.plane, -1)} and {(cube, -1)} must be a number {least}, not {given!r}"
@@ -96,7 +96,7 @@ def test_functions_are_asked_once_for_each_pair_of_links_the_lesser_first(world)
     assert sorted(asked) == sorted((name, *pair) for name in laws for pair in pairs)
 
 
-def test_a_function_says_how_hard_each_pair_is(world):
+def test_a_function_gives_the_stiffness_of_each_pair(world):
     soft = resting(world)
     hard = world.box(*[HALF] * 3, position=[1, 0, HALF - 1e-5])
     with world.contact(stiffness=lambda a, b: 1e8 if hard in (a[0], b[0]) else 1e7) as contact:
@@ -105,7 +105,7 @@ def test_a_function_says_how_hard_each_pair_is(world):
     assert HALF - world.position(hard)[2] == pytest.approx(G / 1e6, rel=1e-6)
 
 
-def test_a_step_outside_of_the_with_is_refused(world):
+def test_a_step_outside_of_the_with_block_is_refused(world):
     contact = world.contact()
     said = r"^step\(\) is for within `with contact:`, where Bullet does not respond to these pairs$"
     with pytest.raises(RuntimeError, match=said):
@@ -116,7 +116,7 @@ def test_a_step_outside_of_the_with_is_refused(world):
         contact.step()
 
 
-def test_too_few_substeps_are_told_once_with_how_many_it_takes(world):
+def test_too_few_substeps_are_reported_once_with_the_number_needed(world):
     resting(world)
     said = (
         r"^1 substeps are too few for the stiffness between plane/link0 and box/link0, which swing at up to "
@@ -134,19 +134,19 @@ def test_too_few_substeps_are_told_once_with_how_many_it_takes(world):
         assert contact.substeps == needed
 
 
-def test_more_substeps_than_are_ever_taken_are_told(world):
+def test_more_substeps_than_the_maximum_are_reported(world):
     resting(world)
     with world.contact(stiffness=1e13) as contact, pytest.warns(SubstepsWarning, match="^200 substeps are too few"):
         contact.step()
 
 
-def test_nothing_is_no_matter(client):
+def test_an_empty_simulation_steps(client):
     with VolumetricContact(Bodies(client)) as contact:
         contact.step()
     assert (len(contact), contact.substeps) == (0, 1)
 
 
-def test_it_says_how_it_is(world):
+def test_volumetric_contact_has_a_readable_repr(world):
     resting(world)
     with world.contact(substeps=2) as contact:
         contact.step()
@@ -154,7 +154,7 @@ def test_it_says_how_it_is(world):
     assert repr(contact.last) == "Forces(1 pairs, 9.81 N at most)"
 
 
-def test_what_the_last_step_found_stays(world):
+def test_results_of_the_last_step_stay_available(world):
     cube = resting(world)
     with world.contact() as contact:
         contact.step()
@@ -165,7 +165,7 @@ def test_what_the_last_step_found_stays(world):
     assert np.array_equal(found.force, force) and not np.array_equal(contact.force, force)
 
 
-def test_the_same_comes_out_bit_by_bit_on_every_run():
+def test_every_run_has_the_same_bits():
     def heap():
         with World() as world:
             rng = np.random.default_rng(2)
@@ -187,7 +187,7 @@ def touched(world):
     return len(p.getContactPoints(physicsClientId=world.client))
 
 
-def test_bullet_does_not_respond_within_and_does_after(world):
+def test_bullet_does_not_respond_within_the_block_and_responds_after_it(world):
     resting(world)
     assert touched(world)
     contact = world.contact(substeps=1)
@@ -331,7 +331,7 @@ def test_a_motor_is_as_strong_in_substeps_as_in_a_step(world, mode, by, told, su
 
 
 @pytest.mark.parametrize("substeps", [1, 4])
-def test_a_motor_that_a_recorder_heard_before_is_as_strong_within(client, recorder, substeps):
+def test_a_motor_recorded_before_the_block_is_as_strong_within_it(client, recorder, substeps):
     world = World()
     try:
         with Recorder(world.client) as heard:
@@ -346,7 +346,7 @@ def test_a_motor_that_a_recorder_heard_before_is_as_strong_within(client, record
         p.disconnect(world.client)
 
 
-def test_a_motor_that_was_told_before_is_stronger_by_so_many_substeps(world):
+def test_an_unrecorded_motor_is_stronger_by_the_number_of_substeps(world):
     """As the docstring says: pybullet keeps its impulse, and cannot be asked for what it was told."""
     id = slider(world)
     p.setJointMotorControl2(id, 0, physicsClientId=world.client, **ON_ONE_JOINT["velocity"])
@@ -435,7 +435,7 @@ def test_a_ground_that_is_given_a_velocity_takes_along_what_lies_on_it(world):
 
 
 @pytest.mark.parametrize("substeps", [1, "auto"])
-def test_what_is_set_between_steps_gives_no_kick(world, substeps):
+def test_poses_and_velocities_set_between_steps_give_no_kick(world, substeps):
     """Neither a place nor a velocity is taken for something that acts on the body."""
     cube = resting(world)
     with world.contact(substeps=substeps, friction=0) as contact:

@@ -53,7 +53,7 @@ def rough(columns=7, rows=5, seed=1):
 
 
 @pytest.mark.parametrize("pose", [{}, {"position": [1, -2, 3], "orientation": TILTED}])
-def test_the_ground_ends_where_rays_meet_it(client, recorder, pose):
+def test_the_ground_surface_is_where_rays_hit_it(client, recorder, pose):
     ground = field(client, rough(), scale=[0.3, 0.2, 0.5], **pose)
     everywhere = ball(client, pose.get("position", [0, 0, 0]), radius=2, mass=1)
     bodies = Bodies(client, recorder=recorder)
@@ -88,7 +88,7 @@ def test_a_ball_in_flat_ground_shares_a_cap_with_it(client, recorder):
     assert {contact.shapeA for contact in pair.contacts} <= set(range(2 * 4 * 4))
 
 
-def test_only_the_ground_near_what_may_meet_it_is_modelled(client, recorder):
+def test_only_the_ground_near_moving_bodies_is_modelled(client, recorder):
     ground = field(client, rough(101, 101), scale=[0.1, 0.1, 0.1])
     moving, ghost = ball(client, [-3, -3, 0]), ball(client, [3, -3, 0])
     ball(client, [3, 3, 0], mass=0)
@@ -105,7 +105,7 @@ def test_only_the_ground_near_what_may_meet_it_is_modelled(client, recorder):
     assert kept and before.keys() != after.keys() and all(before[number] is after[number] for number in kept)
 
 
-def test_ground_is_released_behind_what_drove_over_it(client, recorder):
+def test_ground_is_released_behind_a_moving_body(client, recorder):
     ground = field(client, rough(21, 401), scale=[0.1, 0.1, 0.1])
     wheels = [ball(client, [-18, y, 0]) for y in (-0.4, 0.4)]
     bodies = Bodies(client, recorder=recorder)
@@ -125,7 +125,7 @@ def test_ground_is_released_behind_what_drove_over_it(client, recorder):
     assert prisms(bodies, ground) == []
 
 
-def test_ground_is_asked_for_and_arranged_only_once_a_body_has_come_some_way(client, recorder, monkeypatch):
+def test_ground_is_updated_only_after_a_body_has_moved_some_distance(client, recorder, monkeypatch):
     field(client, rough(21, 401), scale=[0.1, 0.1, 0.1])
     wheel = ball(client, [-18, 0, 0], radius=1)
     bodies = Bodies(client, recorder=recorder)

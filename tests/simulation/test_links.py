@@ -64,7 +64,7 @@ def test_bars_that_cross_share_their_middle_once(client):
     assert_allclose(pair.overlap.gradient.sum(axis=0), 0, atol=1e-12)
 
 
-def test_crosses_over_each_other_share_what_their_cubes_share(client):
+def test_overlapping_crosses_share_the_volume_of_their_cubes(client):
     cross(client, [0, 0, 0])
     cross(client, [0.2, 0, 0])
     (pair,) = link_contacts(Bodies(client).overlaps())
@@ -114,7 +114,7 @@ def test_a_concave_mesh_meets_a_box_in_its_solid_and_not_in_its_hull(client, cap
     assert_allclose(pair.centroid, [0.1 - 0.1 * 5 / 6, 0.2 + 0.1 * 5 / 6, 0.35], atol=1e-4)
 
 
-def test_bullet_and_the_parts_agree_where_the_mesh_is(client):
+def test_bullet_and_the_convex_parts_agree_on_the_place_of_a_mesh(client):
     """The part of the L's hull that is empty, and its two arms, probed by a ball."""
     bent(client)
     ball = body(client, p.GEOM_SPHERE, radius=0.1)
@@ -127,7 +127,7 @@ def test_bullet_and_the_parts_agree_where_the_mesh_is(client):
         assert bool(points) == inside
 
 
-def test_shapes_after_a_concave_mesh_are_counted_on(client, tmp_path):
+def test_shape_numbers_continue_after_a_concave_mesh(client, tmp_path):
     corners = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS)
     faces = "".join("f {} {} {}\n".format(*(corner + 1 for corner in face)) for face in FACES)
     (tmp_path / "bent.obj").write_text(corners + faces)
@@ -182,6 +182,6 @@ def test_a_failure_of_coacd_is_named_and_not_repeated(client, monkeypatch, tmp_p
         ({"concave_threshold": 0}, "threshold of concavity"),
     ],
 )
-def test_choices_that_there_are_not_are_named(client, options, reason):
+def test_invalid_choices_are_named(client, options, reason):
     with pytest.raises(ValueError, match=reason):
         Bodies(client, **options)

@@ -41,7 +41,7 @@ def test_the_mean_force_is_what_changes_the_momentum_in_a_step(client, substeps)
 
 
 @pytest.mark.usefixtures("plane")
-def test_what_is_seen_is_of_the_bodies_where_they_are(client):
+def test_forces_are_read_at_the_current_poses(client):
     cubes = [box(client, 0.01 * k, 0, 0.051 + 0.101 * k) for k in range(3)]
     with VolumetricContact(Bodies(client), stiffness=1e8) as contact:
         for _ in range(1000):
@@ -53,7 +53,7 @@ def test_what_is_seen_is_of_the_bodies_where_they_are(client):
 
 
 @pytest.mark.usefixtures("plane")
-def test_what_has_come_in_the_last_substep_has_no_force_yet_but_a_normal(client):
+def test_a_contact_new_in_the_last_substep_has_a_normal_and_no_force(client):
     cube = box(client, 0, 0, 0.05 + 1e-4)
     pybullet.resetBaseVelocity(cube, [0, 0, -0.1], physicsClientId=client)
     with VolumetricContact(Bodies(client), substeps=1) as contact:
@@ -64,7 +64,7 @@ def test_what_has_come_in_the_last_substep_has_no_force_yet_but_a_normal(client)
 
 
 @pytest.mark.usefixtures("plane")
-def test_the_mean_of_what_has_no_direction_is_along_the_last_normal(client):
+def test_a_mean_force_without_direction_is_along_the_last_normal(client):
     rod = box(client, 0, 0, 0.04)
     plate = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[1, 1, 1], physicsClientId=client)
     outer = pybullet.createMultiBody(0, plate, -1, [0, 0, 0.5], physicsClientId=client)
@@ -77,7 +77,7 @@ def test_the_mean_of_what_has_no_direction_is_along_the_last_normal(client):
 
 @pytest.mark.usefixtures("plane")
 @pytest.mark.parametrize("substeps", ["auto", 4])
-def test_steps_go_on_to_the_last_bit_as_if_nobody_had_looked(client, substeps):
+def test_reading_forces_changes_no_bit_of_later_steps(client, substeps):
     ends = []
     cube = box(client, 0, 0, 0)
     for look in (False, True):
@@ -106,6 +106,6 @@ def test_a_body_that_loses_its_place_is_left_out_and_the_others_go_on(client):
     assert contact.on(stays)[0][2] == pytest.approx(G)
 
 
-def test_a_contact_in_which_nothing_presses_is_there_all_the_same(client):
+def test_a_contact_without_pressure_is_listed(client):
     contact = VolumetricContact(Bodies(client))
     assert contact and len(contact) == 0

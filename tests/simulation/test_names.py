@@ -35,11 +35,11 @@ def bases(client, **how) -> list[str]:
         ("x\x1b[31m", None, r"x\x1b[31m"),
     ],
 )
-def test_the_name_is_that_which_says_most(own, file, name):
+def test_the_most_specific_name_is_used(own, file, name):
     assert body_name(own, file, True, (), None) == name
 
 
-def test_of_a_file_of_many_bodies_their_own_names_say_more():
+def test_bodies_of_one_file_are_called_by_their_own_names():
     assert body_name("shelf", "warehouse.sdf", False, (), None) == "shelf"
     assert body_name("a/b/part0.obj", "warehouse.sdf", False, (), None) == "warehouse"
 
@@ -74,7 +74,7 @@ def test_without_a_recorder_meshes_and_shapes_say_what_a_body_is(client):
     assert bases(client) == ["duck", "box", "hull", "body 3"]
 
 
-def test_a_name_that_is_given_is_the_name_everywhere(client):
+def test_a_given_name_is_used_everywhere(client):
     crates = [box(client, position=[0.9 * x, 0, 0]) for x in range(3)]
     names = {crates[0]: "crate", np.int64(crates[1]): "crate", 99: "of nobody yet"}
     bodies = Bodies(client, names=names)
@@ -86,7 +86,7 @@ def test_a_name_that_is_given_is_the_name_everywhere(client):
 
 
 @pytest.mark.parametrize("names", [{"duck": 3}, {3: ""}, {3: None}, ["duck"], "duck"])
-def test_names_that_are_none_are_refused(client, names):
+def test_invalid_names_are_refused(client, names):
     with pytest.raises(
         ValueError, match=r"^names must have names by the numbers of bodies, such as \{3: 'duck'\}, not"
     ):

@@ -217,7 +217,7 @@ def test_branches_of_a_robot_meet_even_where_no_link_meets_its_ancestors(client,
     assert found == {((robot, a), (robot, b)) for a in (0, 1) for b in (2, 3)}
 
 
-def test_what_was_noted_of_a_body_goes_as_pybullet_forgets_it(client, recorder, tmp_path):
+def test_records_of_a_body_are_dropped_when_pybullet_removes_it(client, recorder, tmp_path):
     first, second = box(client), box(client, 1, [0.5, 0, 0])
     p.setCollisionFilterPair(first, second, -1, -1, 0, physicsClientId=client)
     robot = chain(client, tmp_path, flags=SELF, basePosition=[9, 0, 0])
@@ -278,7 +278,7 @@ def test_all_pairs_of_different_bodies_are_those_of_geometry(client):
     assert len(found.overlaps(pairs="all")) == found.report().pairs_possible == 3
 
 
-def test_a_list_of_bodies_links_and_shapes_is_taken_at_its_word(client, tmp_path):
+def test_an_explicit_list_of_pairs_overrides_the_rules(client, tmp_path):
     table, robot, cube = box(client, 0), chain(client, tmp_path), box(client, 0, [0.2, 0, 0])
     bodies = Bodies(client)
 
@@ -351,7 +351,7 @@ def test_only_pairs_whose_boxes_meet_are_candidates(client):
     assert pairs.tolist() == [[0, 1]] and pairs.dtype == np.int32
 
 
-def test_many_pair_filters_are_looked_at_in_one_go(client, recorder):
+def test_many_pair_filters_are_checked_in_one_pass(client, recorder):
     cubes = [box(client, position=[0.9 * x, 0, 0]) for x in range(40)]
     bodies = Bodies(client, recorder=recorder)
 
@@ -468,7 +468,7 @@ def test_pairs_are_asked_for_by_name_and_one_pair_without_a_list(client, tmp_pat
 
 
 @pytest.mark.parametrize("pairs", [5, None, ["plane"], (0,), (0, 1.5), [("a", "b", "c")], [0, 1, 2], [5, (0, 1)]])
-def test_what_is_no_list_of_pairs_is_refused(client, pairs):
+def test_an_invalid_list_of_pairs_is_refused(client, pairs):
     box(client)
     with pytest.raises(ValueError, match=r"^pairs must be 'simulated', 'all' or a list of pairs, not "):
         Bodies(client).overlaps(pairs=pairs)

@@ -146,7 +146,7 @@ def test_unions_apart_share_nothing():
     assert not found.gradient.any()
 
 
-def test_what_only_touches_adds_its_error():
+def test_touching_parts_add_their_error():
     a, b = [Placed(Box([1, 1, 1]))], [Placed(Box([1, 1, 1]), [2, 0, 0])]
     found = union_overlap(a, b)
     assert not found

@@ -28,7 +28,7 @@ def test_a_tilted_cube_comes_to_rest_as_deep_as_its_weight_asks(client, stiffnes
 
 @pytest.mark.parametrize("stiffness", [1e7, 1e8, 1e9])
 @pytest.mark.parametrize("drop", [0.01, 0.1, 0.5])
-def test_what_falls_rises_again_about_as_high(client, stiffness, drop):
+def test_a_falling_body_bounces_back_to_about_the_same_height(client, stiffness, drop):
     """Steps are short before what comes is there: in a long one it would come in deeper than its speed can take it."""
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)

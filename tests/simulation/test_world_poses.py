@@ -10,7 +10,7 @@ from overlapper.quaternion import composed, rotated
 AT_REST = ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])
 
 
-def test_poses_are_those_of_the_frame_then_of_what_is_fixed_to_it():
+def test_world_poses_apply_the_frame_after_the_fixed_pose():
     rng = np.random.default_rng(4)
     frames = [(tuple(rng.normal(size=3)), tuple(rng.normal(size=4)), "ignored") for _ in range(5)]
     which, local = rng.integers(5, size=9), rng.normal(size=(9, 3))
@@ -36,7 +36,7 @@ def test_poses_are_those_of_the_frame_then_of_what_is_fixed_to_it():
         ([AT_REST], [0, 0], ValueError, r"positions must have the shape \(k, 3\)"),
     ],
 )
-def test_what_is_no_frame_is_named(frames, which, error, message):
+def test_an_invalid_frame_is_named(frames, which, error, message):
     with pytest.raises(error, match=message):
         _core.world_poses(frames, np.array(which), [AT_REST[0]], [AT_REST[1]])
 
@@ -47,7 +47,7 @@ def test_a_thing_fixed_by_the_zero_quaternion_is_refused():
 
 
 @pytest.mark.parametrize("length", [1e-320, 1e-200, 0.1, 3.0, 1e200, 1e308])
-def test_quaternions_of_any_length_turn_by_the_same(length):
+def test_quaternions_of_any_length_give_the_same_rotation(length):
     """A rounding apart, and more where the length has lost its digits."""
     turn = np.array([0.5, -0.5, 0.5, 0.5])
     position, orientation = _core.world_poses([([1, 2, 3], turn * length)], np.array([0]), [[1, 2, 3]], [turn])

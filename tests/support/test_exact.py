@@ -231,7 +231,7 @@ def test_depth_is_the_least_extent_over_all_directions():
         assert np.all(depth <= (q @ u.T).max(0) - (p @ u.T).min(0) + 1e-12)
 
 
-def test_volume_by_facets_is_that_by_tetrahedra():
+def test_volume_by_facets_equals_volume_by_tetrahedra():
     """A solid is made of pyramids, too: one over each facet, with the tip in the origin."""
     for a, b in zip(random_hulls(51, 10), random_hulls(52, 10), strict=True):
         for body in (a, exact.common(a, b)):

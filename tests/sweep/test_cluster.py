@@ -107,7 +107,7 @@ def test_shares_that_are_lost_are_sent_once_more(ray):
     assert all(isinstance(outcome, Done) for _, outcome in found)
 
 
-def test_a_cluster_that_loses_all_it_is_given_is_refused(ray):
+def test_a_cluster_that_loses_every_task_is_refused(ray):
     ray.lost = 10 * LOSSES
     with (
         closing(Cluster(workers=2)) as cluster,
@@ -123,7 +123,7 @@ def test_a_job_that_cannot_be_prepared_is_refused(ray):
         [*cluster.outcomes(Job("jobs", "doing", "never"), [("give", 1)])]
 
 
-def test_a_cluster_that_is_not_there_is_refused(ray):
+def test_a_missing_cluster_is_refused(ray):
     with pytest.raises(NotStarted, match=r"^there is no Ray cluster at nowhere:1: nobody is there$"):
         Cluster("nowhere:1")
 

@@ -87,7 +87,7 @@ def test_forces_are_compared_as_vectors_and_their_rounding_is_that_of_the_surfac
     assert compared("other", recorded).counted() == {"mean_force_m2": 8}
 
 
-def test_what_is_not_a_number_differs_from_numbers_and_not_from_itself(recorded, other):
+def test_nan_differs_from_numbers_and_not_from_nan(recorded, other):
     other(largest_depth_m=lambda row: math.nan if row["seed"] else row["largest_depth_m"])
     comparison = compared("other", recorded)
     assert comparison.counted() == {"largest_depth_m": 4}
@@ -104,7 +104,7 @@ def test_budgets_are_those_of_the_expected_file(recorded, other):
     assert compared("other", recorded).moved == []
 
 
-def test_the_worst_is_told_first_with_its_parameters(recorded, other):
+def test_the_largest_change_is_reported_first_with_its_parameters(recorded, other):
     other(largest_volume_m3=lambda row: row["largest_volume_m3"] * (1 + 1e-3 * row["apart"]))
     first, *worst, more = compared("other", recorded).lines(2)
     assert first == "8 of 8 tasks have moved since other: largest_volume_m3 in 8."
@@ -179,7 +179,7 @@ def without(column):
     ],
 )
 @pytest.mark.usefixtures("other")
-def test_what_is_no_sweep_is_refused(spoil, sentence):
+def test_a_folder_without_a_sweep_is_refused(spoil, sentence):
     spoil()
     with pytest.raises(ValueError, match=rf"^--check other: {sentence}"):
         Recorded(Path("other"), NOWHERE, sweep_of(GRIDS))

@@ -25,7 +25,7 @@ SPACE = Space("grasp", {"mass": 1.0, "count": 3, "seed": 0, "kind": "box", "soft
         ("soft=yes,false", [True, False]),
     ],
 )
-def test_a_grid_is_values_or_so_many_from_one_number_to_another(text, values):
+def test_a_grid_is_a_list_of_values_or_a_count_between_two_numbers(text, values):
     name = text.partition("=")[0]
     found = [point[name] for point in SPACE.grid(text)]
     assert found == pytest.approx(values) if name == "mass" else found == values
@@ -48,7 +48,7 @@ def test_a_grid_is_values_or_so_many_from_one_number_to_another(text, values):
         ("soft=0:1:2", "soft must be true or false, as its default False is, not '0:1:2'"),
     ],
 )
-def test_a_grid_that_is_none_is_refused_in_a_sentence(text, sentence):
+def test_an_invalid_grid_is_refused_in_one_sentence(text, sentence):
     with pytest.raises(ValueError, match=r"^.*$") as refused:
         SPACE.grid(text)
     assert str(refused.value).startswith(sentence)
@@ -70,7 +70,7 @@ def test_a_parameter_is_on_one_axis_only():
         Space("grasp", SPACE.defaults, {"mass"}).crossed([SPACE.grid("mass=1,2")])
 
 
-def test_more_tasks_than_anybody_means_are_refused(monkeypatch):
+def test_too_many_tasks_are_refused(monkeypatch):
     monkeypatch.setattr(points, "MOST", 5)
     with pytest.raises(ValueError, match=r"^that would be 6 tasks, more than 5$"):
         SPACE.crossed([SPACE.grid("mass=1,2"), SPACE.seeds(3)])
@@ -102,7 +102,7 @@ def test_a_sample_is_a_latin_hypercube_of_its_ranges_and_the_same_again():
         (["mass=2:1"], "--range mass=2:1 must go from a number to a larger one, not from 2 to 1"),
     ],
 )
-def test_a_range_that_is_none_is_refused_in_a_sentence(ranges, sentence):
+def test_an_invalid_range_is_refused_in_one_sentence(ranges, sentence):
     with pytest.raises(ValueError, match=r"^--") as refused:
         SPACE.samples(3, ranges, 0)
     assert str(refused.value) == sentence
@@ -125,7 +125,7 @@ def test_a_table_has_a_column_for_each_parameter(tmp_path):
         ("colour\n1\n", "the scene grasp has no parameter 'colour'"),
     ],
 )
-def test_a_table_that_is_none_is_refused_in_a_sentence(tmp_path, text, sentence):
+def test_an_invalid_table_is_refused_in_one_sentence(tmp_path, text, sentence):
     table = tmp_path / "points.csv"
     table.write_text(text)
     with pytest.raises(ValueError, match=r"^.*$") as refused:

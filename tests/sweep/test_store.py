@@ -58,7 +58,7 @@ def test_a_task_is_done_when_all_its_parts_are_there(tmp_path, monkeypatch):
     assert files(tmp_path) == ["steps.parquet/a.parquet"]
 
 
-def test_what_a_kill_left_is_put_in_order(tmp_path):
+def test_leftovers_of_a_killed_sweep_are_cleaned_up(tmp_path):
     with Store(tmp_path, IDENTITY) as store:
         store.keep("a", {TASKS: whole(b"1")})
     (tmp_path / "failures.parquet").mkdir()
@@ -97,7 +97,7 @@ def test_two_sweeps_do_not_work_in_one_folder(tmp_path):
         ({"overlapper": "2"}, "is of overlapper 1, not 2: give another --out"),
     ],
 )
-def test_a_folder_is_of_one_sweep(tmp_path, other, words):
+def test_a_folder_belongs_to_one_sweep(tmp_path, other, words):
     Store(tmp_path, IDENTITY).close()
     with pytest.raises(ValueError, match=r"^the sweep in ") as refused:
         Store(tmp_path, IDENTITY | other)
@@ -113,13 +113,13 @@ def test_a_scene_file_that_has_changed_is_another_sweep(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["half", "7", '["a"]'])
-def test_a_folder_that_does_not_say_what_it_is_of_is_refused(tmp_path, text):
+def test_a_folder_without_a_readable_description_is_refused(tmp_path, text):
     (tmp_path / "sweep.json").write_text(text)
     with pytest.raises(ValueError, match=r"sweep.json does not say what is in .*: give another --out$"):
         Store(tmp_path, IDENTITY)
 
 
-def test_a_task_is_called_by_all_that_its_answer_depends_on(tmp_path):
+def test_the_name_of_a_task_depends_on_all_its_inputs(tmp_path):
     scene = tmp_path / "s.py"
     scene.write_text("STEPS = 1\ndef build(client, *, a=1.0): pass\n")
     study = Study.of(scene, 3)

@@ -22,7 +22,7 @@ def test_values_of_a_grid_are_told_apart_and_those_of_a_sample_are_binned():
     assert sample.edges[0] == 0 and sample.edges[-1] == 1
 
 
-def test_factors_of_ten_and_more_are_seen_by_factors():
+def test_values_in_factors_of_ten_have_logarithmic_axes():
     scale = axis("mass", [0.1, 1.0, 10.0])
     assert scale.log and scale.middles == pytest.approx([0.1, 1, 10])
     assert scale.edges == pytest.approx([10**-1.5, 10**-0.5, 10**0.5, 10**1.5])

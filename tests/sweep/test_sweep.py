@@ -49,7 +49,7 @@ def test_the_bits_are_the_same_however_many_processes_there_are():
     assert parts("by1", "steps") == parts("by2", "steps")
 
 
-def test_steps_are_kept_as_asked():
+def test_steps_are_kept_on_request():
     swept("runs", ["seed=3", "apart=0.1,0.3"], kept=2, steps=5)
     found = rows("runs", "steps")
     assert [(row["step"], row["apart"], row["seed"]) for row in found] == [(2, 0.1, 3), (4, 0.1, 3)]
@@ -57,7 +57,7 @@ def test_steps_are_kept_as_asked():
     assert {row["task"] for row in found} < {row["task"] for row in rows("runs")}
 
 
-def test_each_reader_takes_it_for_one_table():
+def test_each_reader_reads_the_sweep_as_one_table():
     duckdb = pytest.importorskip("duckdb")
     import pandas
     import polars
@@ -116,7 +116,7 @@ def test_a_sweep_that_is_killed_goes_on_with_the_same_bits(undisturbed, again):
 
 
 @pytest.mark.parametrize("again", range(3))
-def test_a_sweep_one_of_whose_processes_is_killed_comes_to_its_end_with_the_same_bits(undisturbed, again):
+def test_a_sweep_finishes_with_the_same_bits_after_one_process_is_killed(undisturbed, again):
     process = settled("runs")
     random.choice(psutil.Process(process.pid).children()).kill()
     assert process.wait() == 0

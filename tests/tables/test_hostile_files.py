@@ -105,14 +105,14 @@ def test_a_mutated_shape_is_read_or_refused_in_one_sentence(data):
         ('["Sphere", 1e999]', "radius"),
     ],
 )
-def test_what_is_no_shape_is_told_in_a_sentence(text, reason):
+def test_an_invalid_shape_is_refused_in_one_sentence(text, reason):
     with pytest.raises(ValueError, match=reason) as refusal:
         shape_of(text)
     assert "\n" not in str(refusal.value) and len(str(refusal.value)) < 300
     assert shape_text.LARGEST < 60_000_000
 
 
-def test_pages_of_a_database_that_meet_again_are_refused(written, tmp_path):
+def test_a_database_with_cyclic_pages_is_refused(written, tmp_path):
     path = tmp_path / "t.sqlite"
     path.write_bytes(written["t.sqlite"])
     with closing(sqlite3.connect(path)) as connection, connection:

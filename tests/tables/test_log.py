@@ -43,7 +43,7 @@ def two_boxes(client):
 
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("per", ["shape", "link"])
-def test_the_table_is_that_of_a_run(client, tmp_path, ending, per):
+def test_a_log_writes_the_table_of_a_run(client, tmp_path, ending, per):
     path = tmp_path / "scene.py"
     path.write_text(SCENE)
     scene = load_scene(path)
@@ -105,7 +105,7 @@ def test_contacts_of_other_bodies_are_refused(two_boxes, client, tmp_path):
         ("no/own.csv", {}, FileNotFoundError, "No such file or directory"),
     ],
 )
-def test_what_cannot_be_written_is_refused_at_once(two_boxes, tmp_path, name, options, kind, words):
+def test_a_path_that_cannot_be_written_is_refused_at_once(two_boxes, tmp_path, name, options, kind, words):
     with pytest.raises(kind, match=re.escape(words)):
         Log(tmp_path / name, two_boxes, **options)
     assert list(tmp_path.iterdir()) == []
@@ -119,7 +119,7 @@ def ended_by(error, log, steps):
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_after_an_error_the_rows_are_beside_their_place(two_boxes, tmp_path, ending):
+def test_after_an_error_the_rows_are_in_a_file_beside_the_table(two_boxes, tmp_path, ending):
     place = tmp_path / f"own.{ending}"
     place.write_text("of yesterday")
     log = Log(place, two_boxes)
@@ -131,7 +131,7 @@ def test_after_an_error_the_rows_are_beside_their_place(two_boxes, tmp_path, end
 
 
 @pytest.mark.parametrize("ends", [KeyboardInterrupt, SystemExit])
-def test_what_ends_the_loop_without_an_error_puts_the_table_in_its_place(two_boxes, tmp_path, ends):
+def test_leaving_the_loop_without_an_error_writes_the_table(two_boxes, tmp_path, ends):
     place = tmp_path / "own.csv"
     for count in (0, 1):
         with pytest.raises(ends):

@@ -171,7 +171,7 @@ def test_two_runs_at_once_and_one_that_was_killed_disturb_nothing(tmp_path, endi
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_of_a_table_without_rows_nothing_is_left(tmp_path, ending):
+def test_a_table_without_rows_leaves_no_file(tmp_path, ending):
     assert TABLES[ending](tmp_path / f"run{ending}", METADATA).leave() is None
     assert list(tmp_path.iterdir()) == []
 
@@ -189,7 +189,7 @@ def test_the_log_of_an_earlier_database_is_not_taken_for_one_of_the_new(tmp_path
     earlier.close()
 
 
-def test_a_link_to_a_table_stays_one(tmp_path):
+def test_a_symbolic_link_to_a_table_stays_a_link(tmp_path):
     (tmp_path / "kept").mkdir()
     (tmp_path / "kept" / "run.csv").write_text("earlier")
     (tmp_path / "kept" / "run.csv").chmod(0o640)
@@ -201,7 +201,7 @@ def test_a_link_to_a_table_stays_one(tmp_path):
 
 
 @pytest.mark.parametrize(("place", "reason"), [("/dev/null", "Invalid argument"), (".", "Is a directory")])
-def test_what_no_file_should_replace_is_not_replaced(place, reason):
+def test_folders_and_devices_are_not_replaced_by_a_table(place, reason):
     with pytest.raises(OSError, match=reason):
         must_be_writable(Path(place))
     with pytest.raises(FileNotFoundError):
@@ -222,7 +222,7 @@ def test_a_table_that_was_cut_is_noticed(tmp_path, ending):
             read_table(path)
 
 
-def test_rows_that_are_gone_from_a_database_are_noticed(tmp_path):
+def test_rows_missing_from_a_database_are_noticed(tmp_path):
     path = tmp_path / "run.sqlite"
     table = TABLES[".sqlite"](path, METADATA)
     table.write(Cubes().rows(1))
@@ -246,7 +246,7 @@ def test_a_long_parquet_table_has_few_and_large_row_groups(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "step,bodyA\n1,two\n", "step\n1,2\n"])
-def test_what_is_no_table_is_refused_by_name(tmp_path, text):
+def test_a_name_that_is_no_table_is_refused(tmp_path, text):
     path: Path = tmp_path / "other.csv"
     path.write_text(text)
     with pytest.raises(ValueError, match=r"other\.csv"):
@@ -332,7 +332,7 @@ def test_bytes_that_are_no_table_are_refused_in_a_sentence(tmp_path, make, sente
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_a_table_that_is_not_there_is_no_file(tmp_path, ending):
+def test_a_missing_table_is_reported_as_no_file(tmp_path, ending):
     for read in (read_table, read_metadata):
         with pytest.raises(FileNotFoundError):
             read(tmp_path / f"none{ending}")

@@ -110,7 +110,7 @@ def test_a_scene_that_ends_before_a_recorded_step_has_no_second_frame(tmp_path):
         ((math.nan, 0.5, math.nan), ("", "", ""), "a: depth_m is 2, recorded as 1"),
     ],
 )
-def test_a_move_is_told_by_the_figures_that_it_has(figures, cells, sentence):
+def test_a_move_is_described_by_its_known_figures(figures, cells, sentence):
     move = Move(3, "a", "depth_m", "1", "2", *figures)
     assert move.cells() == ("3", "a", "depth_m", "1", "2", *cells) and len(cells) + 5 == len(Move.HEADS)
     assert str(move).endswith(sentence)

@@ -119,7 +119,7 @@ def edited(scene_file, old, new):
     return examined(scene, read_expected(scene.expected))
 
 
-def test_what_was_recorded_is_found_again(recorded):
+def test_a_recorded_scene_passes(recorded):
     expected = read_expected(recorded.expected)
     assert [row["step"] for row in expected.rows if row["status"] == "overlapping"] == [1, 3, 4, 6]
     assert [row["bodyA"] for row in expected.rows if row["status"] == "alone"] == [2] * 4
@@ -221,7 +221,7 @@ def test_an_expected_file_without_a_count_is_read_and_one_with_other_line_ends_i
     assert read_expected(recorded.expected).rows == before.rows[:5]
 
 
-def test_other_dynamics_are_told_from_geometry_and_shapes(recorded, scene_file):
+def test_changed_dynamics_are_distinguished_from_changed_geometry_and_shapes(recorded, scene_file):
     verdict = edited(scene_file, "0.9 + 0.01 * i", "0.9 + 0.02 * i")
     assert [bool(moves) for moves in verdict.causes.values()] == [False, False, True]
     assert [(move.step, move.quantity) for move in verdict.dynamics] == [(step, "position_m") for step in (3, 4, 6)]
@@ -233,7 +233,7 @@ def test_other_dynamics_are_told_from_geometry_and_shapes(recorded, scene_file):
     assert [(move.step, move.found) for move in verdict.overlaps if move.quantity == "status"] == [(6, "touching")]
 
 
-def test_another_shape_is_told_from_geometry_and_dynamics(recorded, scene_file):
+def test_a_changed_shape_is_distinguished_from_changed_geometry_and_dynamics(recorded, scene_file):
     verdict = edited(scene_file, "halfExtents=[0.5] * 3", "halfExtents=[0.5, 0.5, 0.4]")
     assert [bool(moves) for moves in verdict.causes.values()] == [False, True, False]
     assert [(move.step, move.recorded) for move in verdict.shapes] == [(1, "Box(half_extents=(0.5, 0.5, 0.5))")] * 3
@@ -248,7 +248,7 @@ def test_bodies_that_came_or_went_are_named(recorded, scene_file):
     assert [(move.who[-8:], move.recorded) for move in more.shapes] == [("(3/-1/0)", "not there")]
 
 
-def test_another_geometry_is_told_from_shapes_and_dynamics(recorded):
+def test_changed_geometry_is_distinguished_from_changed_shapes_and_dynamics(recorded):
     expected = read_expected(recorded.expected)
     expected.rows[0]["volume_m3"] *= 1.01
     verdict = examined(recorded, expected)
@@ -256,7 +256,7 @@ def test_another_geometry_is_told_from_shapes_and_dynamics(recorded):
     assert [(move.step, move.quantity) for move in verdict.geometry] == [(1, "volume_m3")]
 
 
-def test_a_scene_shorter_than_its_recording_is_told(recorded, scene_file):
+def test_a_scene_shorter_than_its_recording_is_reported(recorded, scene_file):
     (move,) = edited(scene_file, "STEPS = 6", "STEPS = 5").moves
     assert str(move) == "step 6, the scene: last step is 5, recorded as 6"
 
@@ -305,7 +305,7 @@ def test_a_shape_comes_back_from_its_text(shape):
     assert text_of(back) == text_of(shape)
 
 
-def test_shapes_are_alike_only_if_nothing_of_them_differs():
+def test_shapes_are_equal_only_if_all_their_numbers_are_equal():
     hull = np.random.default_rng(3).normal(size=(40, 3))
     others = [
         Box([0.1, 0.2, 0.3001]),
@@ -338,7 +338,7 @@ def test_a_pair_that_is_missing_is_a_failure():
     ]
 
 
-def test_a_pair_out_of_nothing_is_a_failure():
+def test_a_new_pair_is_a_failure():
     assert failures([pair(1)], [pair(1), pair(1, bodyB=3)]) == [
         "step 1, 0/-1/0 and 3/-1/0: status is overlapping, recorded as not there"
     ]
@@ -361,7 +361,7 @@ def test_a_measure_that_is_not_a_number_is_a_failure():
     assert failures([pair()], [pair(volume_m3=math.nan)]) != []
 
 
-def test_what_is_not_a_number_differs_from_numbers_and_not_from_itself():
+def test_nan_differs_from_numbers_and_not_from_nan():
     nowhere = pair(volume_m3=math.nan, positionA_x_m=math.nan, orientationB_w=math.nan, depth_m=math.inf)
     assert failures([nowhere], [nowhere]) == []
     assert compare_poses([nowhere], [dict(nowhere)], BUDGETS | DRIFT).moves == []

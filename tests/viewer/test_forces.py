@@ -114,11 +114,11 @@ def test_a_scale_has_round_numbers(scale, told, top):
     assert (str(scale), scale.pressure) == (told, top)
 
 
-def test_forces_are_told_in_the_unit_of_their_size():
+def test_forces_are_shown_in_a_suitable_unit():
     assert [force_text(each) for each in (9.81, 0.0123, 4567.0)] == ["9.81 N", "12.3 mN", "4.57 kN"]
 
 
-def test_friction_is_what_of_a_force_is_across_the_pressures():
+def test_friction_is_the_force_component_perpendicular_to_the_pressures():
     press = Press(np.array([1.0, 2.0, 3.0]), 0.0, 0.0, 0.0, np.array([0.0, 0.0, 1.0]), 1.0)
     assert_allclose(press.friction, [1, 2, 0])
     assert presses(None) == {}
@@ -164,7 +164,7 @@ def test_a_recording_without_forces_says_nothing_of_them(client, tmp_path):
     assert len(film.arrays["presses"]) == len(film.arrays["planes"]) == 0
 
 
-def test_scales_are_of_what_is_usual_and_not_of_one_impact(client, tmp_path):
+def test_scales_follow_usual_forces_and_not_one_impact(client, tmp_path):
     rest, impact = pressed_cube(client), pressed_cube(client, depth=0.02)
     recording = Recording()
     for time, (bodies, forces) in enumerate([rest, rest, impact, rest]):
@@ -266,7 +266,7 @@ def test_a_picture_has_pressures_an_arrow_and_their_scale_and_none_of_them_if_no
     assert (table > 128).all(axis=-1).sum() > (without[:60] > 128).all(axis=-1).sum()
 
 
-def test_what_is_usual_is_not_what_a_few_have_that_stand_out():
+def test_the_usual_force_ignores_a_few_outliers():
     assert usual([], []) == usual([3.0], [0.0]) == 0
     assert usual([5.0, 1.0, 100.0], [4.0, 4.0, 1.0]) == 5
     assert usual([1.0, 2.0], [1.0, 1.0]) == 2

@@ -49,7 +49,7 @@ def test_no_view_is_made_to_fit_a_ground(ground):
     assert made.is_ground(ground) and not made.is_ground(Placed(Box([1, 1, 1])))
 
 
-def test_a_robot_is_no_ground_of_what_is_small_nor_is_a_table_beside_it():
+def test_neither_a_robot_nor_a_table_is_ground_of_small_bodies():
     robot = {(0, link): Placed(Box([0.2, 0.2, 0.2]), (0, 0, 0.4 * link)) for link in range(-1, 3)}
     made = framing(Scene(robot | {1: Placed(Sphere(1e-4), (0, 0, 3)), 2: Placed(Box([1, 1, 0.1]), (0, 0, -1))}))
     assert_allclose(box_around(made.whole()), [(-1, -1, -1.1), (1, 1, 3.0001)])
@@ -63,7 +63,7 @@ def test_bodies_that_are_grounds_of_each_other_alone_are_seen_from_somewhere():
     assert_allclose(box_around(made.opening()), [(-0.5, -0.5, -0.1), (0.5, 0.5, 0.9)])
 
 
-def test_what_moves_and_what_overlaps_is_framed_and_all_but_grounds_is_the_whole():
+def test_moving_and_overlapping_bodies_are_framed_and_the_whole_scene_excludes_grounds():
     def at(z):
         wall, cube = Placed(Box([0.1, 2, 2]), (-3, 0, 2)), Placed(Box([0.1, 0.1, 0.1]), (0, 0, z))
         return Scene({0: SLAB, 1: wall, 2: cube, 3: Placed(Box([1, 1, 0.1]), (0, 0, 0.1))})
@@ -143,7 +143,7 @@ def test_a_ground_is_a_calm_plane_with_a_grid_whatever_its_body_looks_like(brows
     assert_allclose(scene(browser), with_grid, atol=8)
 
 
-def test_the_plane_of_a_ground_is_its_side_about_the_scene_fades_out_and_ends_where_the_ground_does(tmp_path):
+def test_the_plane_of_a_ground_faces_the_scene_fades_out_and_ends_with_the_ground(tmp_path):
     for name, ground, normal, offset, across in (
         ("plane", Placed(HalfSpace([0.6, 0, 0.8], 0.5)), (0.6, 0, 0.8), 0.5, 3),
         ("slab", Placed(Box([100, 1, 5]), (0, 0, -4.5)), (0, 0, 1), 5, 2),

@@ -21,7 +21,7 @@ from overlapper.viewer.look import BODIES, OVERLAPS, Look, owner_color, to_draw
 from overlapper.viewer.stage import Stage, rgb
 
 
-def test_a_live_view_is_seen_where_it_is_asked_to_be():
+def test_a_live_view_is_served_at_the_requested_address():
     def listening(port):
         """The addresses at which this machine answers on a port, as the kernel lists them."""
         lines = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]

@@ -50,7 +50,7 @@ def drawn(found):
         (BOX, TURNED, Placed(Capsule(0.5, 1.0))),
     ],
 )
-def test_facets_that_are_seen_cover_what_is_shared_at_every_step(pair):
+def test_visible_facets_cover_the_overlap_at_every_step(pair):
     found = overlap(*pair)
     facets = [(rings, seen) for _, rings, seen in drawn(found) if seen]
     for step in range(25):
@@ -59,7 +59,7 @@ def test_facets_that_are_seen_cover_what_is_shared_at_every_step(pair):
         assert seen == pytest.approx(ConvexHull(corners).volume, rel=0.01)
 
 
-def test_a_turn_ends_where_it_began_and_bodies_hold_what_they_share():
+def test_a_full_turn_ends_where_it_began_and_bodies_contain_their_overlap():
     bodies = [rings for attributes, rings, seen in drawn(overlap(BOX, TURNED)) if "fill-opacity" in attributes]
     assert len(bodies) == 2
     for _, rings, seen in drawn(overlap(BOX, TURNED)):
@@ -69,7 +69,7 @@ def test_a_turn_ends_where_it_began_and_bodies_hold_what_they_share():
             assert both <= 1.01 * ConvexHull(body[step]).volume
 
 
-def test_bodies_that_are_apart_have_the_line_between_them():
+def test_separated_bodies_are_drawn_with_the_line_between_them():
     picture = turning(overlap(BOX, Placed(Sphere(0.3), (1.2, 0, 0.3))))
     assert f'<path fill="none" stroke="{hexadecimal(INK)}"' in picture and "visibility" not in picture
 

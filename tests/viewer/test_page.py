@@ -78,7 +78,7 @@ def test_a_click_on_an_overlap_shows_its_numbers_and_one_beside_it_hides_them(br
 
 
 @looks
-def test_a_row_comes_near_and_its_pair_stands_out_in_the_chart_until_escape(browser, reach):
+def test_a_click_on_a_row_zooms_in_and_highlights_its_pair_until_escape(browser, reach):
     def bar():
         left, top, right, bottom = sides(browser, "#chart")
         return browser.picture()[top:bottom, left:right]
@@ -205,7 +205,7 @@ def test_the_page_needs_nothing_from_outside(tmp_path):
 
 @looks
 @pytest.mark.parametrize("name", ["constructor", "__proto__", "'constructor'", "{{film}}", "<object>"])
-def test_a_name_that_means_something_to_the_page_is_a_name(browser, tmp_path, name):
+def test_names_with_markup_are_shown_as_text(browser, tmp_path, name):
     frames = [hand_at(0.3), hand_at(0.12)]
     for bodies in frames:
         bodies.names |= {(1, -1): f"{name}/{name}", (2, 3): f"arm/{name}"}

@@ -101,7 +101,7 @@ def test_a_few_overlaps_are_not_folded(browser, tmp_path):
     assert browser.ask("document.querySelector('#time').hidden")  # there is one moment, and nothing over time
 
 
-def test_a_filter_leaves_out_small_and_shallow_overlaps_everywhere(browser, piled):
+def test_a_filter_hides_small_and_shallow_overlaps_everywhere(browser, piled):
     panel(opened(browser, piled, "#t=0"), "overlaps")
     assert text(browser, "#by option") == "dm³ volume"
     before = browser.ask("document.querySelector('#chart').ariaLabel")
@@ -302,7 +302,7 @@ def test_keys_go_from_the_largest_overlap_to_the_next(browser, piled):
     browser.press("Escape")
 
 
-def test_what_is_pink_is_told_and_colours_of_their_own_have_no_legend(browser, reach, tmp_path):
+def test_the_legend_explains_pink_and_is_absent_for_custom_colours(browser, reach, tmp_path):
     opened(browser, reach)
     browser.ask("document.querySelector('#legend').open = true")
     said = text(browser, "#legend")
@@ -334,7 +334,7 @@ def test_frames_with_names_are_shown_by_them(browser, tmp_path):
     assert browser.ask("document.querySelector('#chart').namesShown") == ["as <b>recorded</b>", "today"]
 
 
-def test_of_many_names_those_are_below_the_chart_that_have_room(browser, tmp_path):
+def test_the_chart_shows_only_the_names_that_fit(browser, tmp_path):
     recording = Recording()
     for k in range(40):
         x = 0.12 + 0.001 * k
@@ -387,7 +387,7 @@ def test_the_page_fits_a_desk_a_tablet_and_a_phone(browser, piled, sized, width,
         assert_allclose(sides(browser, "#meshcat-pane canvas"), [left, top, right, bottom], atol=1)
 
 
-def test_all_that_can_be_pressed_has_a_name_and_shows_that_it_has_the_focus(browser, piled):
+def test_every_control_has_a_name_and_shows_its_focus(browser, piled):
     panel(opened(browser, piled, "#t=0&pair=body0,body16"), "look")
     unnamed = (
         "[...document.querySelectorAll('button, input, select, canvas[role]')].filter(each => "
@@ -401,7 +401,7 @@ def test_all_that_can_be_pressed_has_a_name_and_shows_that_it_has_the_focus(brow
     assert browser.ask("getComputedStyle(document.activeElement).outlineStyle") == "solid"
 
 
-def test_what_is_framed_stays_in_sight_when_the_window_is_made_narrow(browser, reach, sized):
+def test_framed_bodies_stay_visible_in_a_narrow_window(browser, reach, sized):
     sized(1000, 800)
     browser.open(reach.as_uri(), until="document.querySelector('#time output').textContent === '1.000 s'")
     panel(browser, None)

@@ -77,7 +77,7 @@ def test_triangles_that_share_an_edge_leave_no_gap_and_do_not_overlap():
 
 
 @pytest.mark.parametrize("order", [[0, 1], [1, 0]])
-def test_of_faces_in_one_plane_the_later_one_is_in_front(order):
+def test_the_later_of_two_coplanar_faces_is_in_front(order):
     triangles = np.array(
         [[[-9, -9, -2], [9, -9, -2], [0, 9, -2]], [[-8, -9, -2], [9, -8, -2], [0, 8, -2]]], dtype=float
     )

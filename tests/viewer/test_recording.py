@@ -71,7 +71,7 @@ def test_one_polytope_stands_for_an_overlap_at_rest(tmp_path):
     ]  # fmt: skip
 
 
-def test_a_thin_overlap_that_thins_by_less_than_is_seen_of_its_width_is_drawn_anew(tmp_path):
+def test_a_thin_overlap_is_redrawn_after_a_small_change_of_its_thickness(tmp_path):
     def pressed(depth: float) -> Bodies:
         plates = Placed(Box([1, 1, 0.1])), Placed(Box([1, 1, 0.1]), (0, 0, 0.2 - depth))
         return Bodies({CUP: plates[0], HAND: plates[1]})

@@ -66,7 +66,7 @@ def colours(path):
     }
 
 
-def test_a_scene_becomes_a_page_and_its_table_a_picture_of_the_step_in_which_most_is_shared(tmp_path):
+def test_a_scene_becomes_a_page_and_its_table_a_picture_of_the_largest_overlap(tmp_path):
     assert overlapper("view", "press.py").stdout == "Written: out/press.html\n"
     assert (tmp_path / "out" / "press.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     overlapper("run", "press.py", "--out", "table.sqlite")
@@ -79,14 +79,14 @@ def test_a_scene_becomes_a_page_and_its_table_a_picture_of_the_step_in_which_mos
     assert seen["red"] > 1000
 
 
-def test_most_is_shared_when_the_cube_is_deepest():
+def test_the_overlap_is_largest_when_the_cube_is_deepest():
     view = largest(play("press.py").views)
     assert view.step == 7
     assert view.contacts[0].overlap.volume == pytest.approx(0.08 * 0.09 * 0.02)
     assert view.bodies.placed[1].position == pytest.approx([0.02, 0.01, 0.08], abs=1e-3)
 
 
-def test_what_a_table_has_is_told_from_what_its_scene_has_become(scene_file):
+def test_a_table_is_distinguished_from_its_changed_scene(scene_file):
     overlapper("run", "press.py", "--out", "press.csv")
     playback = play("press.csv", scene="press.py")
     assert len(list(playback.views)) == playback.total == 9  # the cubes are apart from then on
@@ -97,7 +97,7 @@ def test_what_a_table_has_is_told_from_what_its_scene_has_become(scene_file):
     assert re.match(r"what is seen is not what press\.csv has, as the simulation has changed: step \d, ", remark)
 
 
-def test_a_scene_is_run_no_longer_than_it_says_because_a_table_goes_on(scene_file):
+def test_a_longer_table_does_not_extend_the_run_of_a_scene(scene_file):
     overlapper("run", "press.py", "--out", "press.csv")
     text = Path("press.csv").read_text()
     last = next(line for line in text.splitlines() if line.startswith("9,"))
@@ -121,7 +121,7 @@ def test_a_table_of_bodies_with_margins_is_played_with_margins(scene_file):
     assert playback.remarks == []
 
 
-def test_an_expected_file_is_seen_without_its_scene(scene_file):
+def test_an_expected_file_is_viewed_without_its_scene(scene_file):
     record(load_scene(scene_file))
     scene_file.unlink()
     playback = play("expected/press.csv")
@@ -159,7 +159,7 @@ def test_an_expected_file_is_seen_without_its_scene(scene_file):
         ("press.py", {"live": True, "png": Path("a.png")}, "--html, --png and --live do not go together"),
     ],
 )
-def test_what_cannot_be_seen_is_refused_in_one_sentence(source, options, sentence, tmp_path):
+def test_files_that_cannot_be_viewed_are_refused_in_one_sentence(source, options, sentence, tmp_path):
     (tmp_path / "lost.csv").write_text(f"# scene: ../lost\n# steps: 3\n{','.join(NEEDED)}\n")
     (tmp_path / "mute.csv").write_text(f"{','.join(NEEDED)}\n")
     (tmp_path / "odd.csv").write_text(f"# tolerance: x\n{','.join(NEEDED)}\n")
@@ -216,7 +216,7 @@ def test_a_picture_shows_both_owners_opaque_and_comes_near(corner, whole, tmp_pa
     assert whole["green"] > 20_000
 
 
-def test_the_look_decides_what_is_drawn_of_a_picture(corner, whole, tmp_path):
+def test_the_look_selects_the_parts_drawn_in_a_picture(corner, whole, tmp_path):
     def seen(bodies, overlaps):
         return colours(picture.save(tmp_path / "a.png", corner, corner.contacts, looks=(bodies, overlaps)))
 

@@ -99,7 +99,7 @@ def test_a_row_hands_out_its_overlap():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_without_pairs_all_that_overlap_or_touch_are_found(seed):
+def test_without_a_list_of_pairs_all_overlapping_or_touching_pairs_are_found(seed):
     shapes, positions, orientations = scene(np.random.default_rng(seed))
     every = overlaps(shapes, positions, orientations, all_pairs(len(shapes)), TOLERANCE)
     answer = overlaps(shapes, positions, orientations, tolerance=TOLERANCE)
@@ -194,7 +194,7 @@ def test_the_number_of_threads_changes_no_bit(threads):
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are listed on Linux only")
 @pytest.mark.parametrize("threads", [1, 3])
-def test_no_more_threads_work_than_are_asked_for(threads):
+def test_at_most_the_requested_number_of_threads_work(threads):
     balls = [Sphere(1)] * 60
     positions, pairs = np.linspace([0, 0, 0], [0.5, 0, 0], len(balls)), all_pairs(len(balls))
     poses = positions, [[0, 0, 0, 1]] * len(balls), pairs

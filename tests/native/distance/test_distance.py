@@ -292,7 +292,7 @@ def points_of_small_polytopes(rng):
 
 
 @pytest.mark.parametrize("tilt", [0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 1])
-def test_facets_and_arcs_hold_the_way_out_that_epa_finds(tilt):
+def test_facets_and_arcs_contain_the_direction_that_epa_finds(tilt):
     """Small polytopes part along a facet's normal or an arc between two; grown by next to nothing, they go to EPA."""
     rng = np.random.default_rng(0)
     deepest = 0

@@ -133,7 +133,7 @@ def size_of(body):
 
 @pytest.mark.parametrize("axes", ["crossed", "parallel", "nearly parallel"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_no_way_out_is_shorter_than_the_depth_less_its_error(kind, axes):
+def test_no_separating_translation_is_shorter_than_the_depth_minus_its_error(kind, axes):
     rng = np.random.default_rng([KINDS.index(kind), len(axes)])
     deep = 0
     for scale in (1e-3, 1, 1, 1, 1, 1e3):
@@ -247,7 +247,7 @@ def test_functions_give_what_the_answer_gives(depth):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_cylinders_on_one_axis_leave_each_other_sideways_or_lengthwise(seed):
+def test_coaxial_cylinders_separate_sideways_or_lengthwise(seed):
     rng = np.random.default_rng(seed)
     q = quaternion(rng)
     (r, s), (k, m) = rng.uniform(0.2, 2, (2, 2))
@@ -257,7 +257,7 @@ def test_cylinders_on_one_axis_leave_each_other_sideways_or_lengthwise(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_cylinders_that_cross_leave_each_other_across_both_axes(seed):
+def test_crossing_cylinders_separate_perpendicular_to_both_axes(seed):
     rng = np.random.default_rng(seed)
     r, s, apart = rng.uniform(0.2, 1), rng.uniform(0.2, 1), rng.uniform(0.01, 1)
     turn = rng.uniform(0.1, 3)

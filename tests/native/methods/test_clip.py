@@ -18,7 +18,7 @@ PAIRS = [case for case in EVERYDAY if len(case.placed) == 2]
 
 
 @pytest.mark.parametrize("case", PAIRS, ids=repr)
-def test_a_pair_has_the_exact_volume_area_centroid_and_pull(case):
+def test_a_clipped_pair_has_the_exact_volume_area_centroid_and_gradient(case):
     found = overlap(*case.placed)
     if case.truth.dimension < 3:
         assert not found
@@ -32,7 +32,7 @@ def test_a_pair_has_the_exact_volume_area_centroid_and_pull(case):
         assert_allclose(found.gradient[body, :3], pull, atol=1e-9 * case.truth.area)
 
 
-def test_the_moment_of_a_pull_is_the_slope_of_the_volume_by_turning():
+def test_the_moment_of_the_gradient_is_the_slope_of_the_volume_by_turning():
     still = Placed(Box((1, 1.5, 0.5)), (0.2, -0.1, 0.3), (0.3, 0.2, -0.4, 0.8))
     step = 1e-5
 
@@ -107,7 +107,7 @@ def test_a_sliver_of_any_thickness_is_right_to_twelve_digits(way):
 
 
 @pytest.mark.parametrize("case", [make("many_bodies", seed) for seed in range(0, 24, 2)], ids=repr)
-def test_bodies_clipped_in_turn_have_the_exact_volume_and_each_its_pull(case):
+def test_bodies_clipped_in_turn_have_the_exact_volume_and_gradients(case):
     found = overlap(*case.placed)
     if case.truth.dimension < 3:
         assert not found

@@ -234,7 +234,7 @@ def test_crossing_cylinders_share_the_bicylinder(radius):
 @pytest.mark.parametrize(
     "other", [Cylinder(0.6, 9), Capsule(0.6, 0.3), Sphere(0.6)], ids=["cylinder", "capsule", "ball"]
 )
-def test_what_a_cap_cuts_off_is_missing_however_little_it_is(tilt, other):
+def test_a_cap_however_small_is_subtracted(tilt, other):
     turn = (np.sin(tilt / 2), 0, 0, np.cos(tilt / 2))
     axis = np.array([0, -np.sin(tilt), np.cos(tilt)])
     a, b = sink(Placed(other, (0.9, 0.2, 0.1)), Placed(Cylinder(0.4, 8), (0, 0, 0), turn), 0.03)
@@ -403,7 +403,7 @@ def test_the_gradient_is_that_of_the_volume(first, second):
         assert found.gradient[0, k] == pytest.approx(slope, abs=1e-6 * max(found.area, 1e-3))
 
 
-def test_shapes_that_coincide_are_measured_truly():
+def test_coinciding_shapes_are_measured_correctly():
     s = np.sqrt(0.5)
     crossing = (0, s, 0, s)
     pairs = [
@@ -449,7 +449,7 @@ def test_meshes_that_meet_within_their_margins_are_measured_to_eleven_digits():
 
 
 @pytest.mark.parametrize("first_seed", range(0, 200, 100))
-def test_surfaces_that_nothing_but_rounding_parts_are_measured_truly(first_seed):
+def test_surfaces_separated_only_by_rounding_are_measured_correctly(first_seed):
     for seed in range(first_seed, first_seed + 100):
         case, rng = make("flush_round", seed), np.random.default_rng(seed)
         a, b = case.bodies
@@ -535,7 +535,7 @@ def test_rounded_hulls_with_facets_nearly_in_one_plane_are_measured_of_their_rou
 
 
 @pytest.mark.parametrize("shape", [Sphere(0.3), Capsule(0.2, 0.5), Cylinder(0.2, 0.5), Box([0.2, 0.3, 0.4])], ids=repr)
-def test_the_tip_of_a_rounded_cone_of_many_slivers_is_measured_truly(shape):
+def test_the_tip_of_a_rounded_cone_of_many_slivers_is_measured_correctly(shape):
     """No plane cuts the fan of facets, nor that of the tip's seams, into smaller ones."""
     turns = 2 * np.pi * np.arange(60) / 60
     cone = RoundedHull(np.vstack([np.c_[np.cos(turns), np.sin(turns), 0 * turns] / 2, [[0, 0, 1]]]), 0.1)
@@ -576,7 +576,7 @@ def test_a_plane_or_a_piece_that_slices_have_missed_is_found(which):
 
 
 @pytest.mark.parametrize("first_seed", range(0, 600, 300))
-def test_special_poses_are_measured_truly_wherever_they_are(first_seed):
+def test_special_poses_are_measured_correctly_far_from_the_origin_too(first_seed):
     """Of those that overlap, most are sliced; what is left to polytopes and what is open are counted."""
     found = []
     for seed in range(first_seed, first_seed + 300):
@@ -619,7 +619,7 @@ def test_a_face_in_the_plane_of_a_seam_bounds_all_that_it_should(margin, wide):
         assert found.volume_error <= 1e-11 * found.volume
 
 
-def test_a_face_that_passes_the_corner_of_a_core_by_rounding_is_measured_truly():
+def test_a_face_within_rounding_of_a_core_corner_is_measured_correctly():
     for seed in range(40):
         rng = np.random.default_rng(seed)
         points, turn, half = 0.5 * rng.normal(size=(8, 3)), quaternion(rng), np.array([2, 0.25, 1])
@@ -631,7 +631,7 @@ def test_a_face_that_passes_the_corner_of_a_core_by_rounding_is_measured_truly()
         assert found.volume_error <= 1e-11 * found.volume
 
 
-def test_a_pair_that_a_plane_splits_beside_another_by_rounding_is_sliced():
+def test_a_pair_split_by_two_planes_within_rounding_is_sliced():
     # The plane in which a capsule becomes a half ball lies in a face, turned by the rounding of a quaternion.
     capsule = Placed(Capsule(2, 1))
     box = Placed(Box([0.25, 0.5, 0.5]), (0.5000000005, 1.5, 0.25), (-0.5, -0.5, -0.5, 0.5000000000000001))
@@ -753,14 +753,14 @@ def test_lids_that_are_flat_but_for_rounding_are_as_many_planes_as_they_have_tri
 
 
 @pytest.mark.parametrize("seed", [421, 693, 2590, 3551])
-def test_of_planes_of_one_direction_the_nearer_bounds_a_slice(seed):
+def test_the_nearer_of_two_parallel_planes_bounds_a_slice(seed):
     """Two triangles of a facet differ there by less than the corners far outside are right to."""
     case = make("round_contacts", seed)
     assert not a_turn_keeps_the_measures_of_round_bodies(case, overlap(*case.placed))
 
 
 @pytest.mark.parametrize("seed", [3000461, 2000219])
-def test_where_a_facet_that_rounding_folds_bends_is_known_to_more_digits_than_doubles_have(seed):
+def test_the_fold_of_a_facet_bent_by_rounding_is_known_beyond_double_precision(seed):
     """Of 1e-12 deep caps, the angle of 1e-16 between the two triangles of a facet is a trillionth."""
     found = overlap(*make("round_contacts", seed).placed)
     lower, upper = found.certificate().verify()

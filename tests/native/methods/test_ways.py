@@ -67,7 +67,7 @@ def test_the_measured_table_has_every_typical_case_by_its_way():
     assert all(float(row[2].replace(",", "")) > 0 for row in rows)
 
 
-def test_typical_cases_are_of_every_way_but_that_of_the_article():
+def test_typical_cases_use_every_method_but_the_articles():
     assert {typical.way for typical in TYPICAL.values()} == set(Overlaps.WAYS) - {"paper"}
 
 
@@ -112,16 +112,16 @@ IN_A_BOX = {
 
 
 @pytest.mark.parametrize("name", IN_A_BOX)
-def test_a_group_is_answered_by_the_line_of_the_table_that_it_fits(name):
+def test_a_group_of_bodies_is_answered_by_its_line_of_the_table(name):
     assert overlap(*TYPICAL[name].bodies, Placed(Box([3, 3, 3]))).way == IN_A_BOX[name]
 
 
-def test_nothing_is_tried_but_the_dual_hull_where_a_rounded_hull_takes_part():
+def test_groups_with_a_rounded_hull_try_only_the_dual_hull():
     for name in ("two boxes", "two meshes of 80 facets", "a ball in the floor"):
         assert overlap(*TYPICAL[name].bodies, AROUND).way == "dual hull"
 
 
-def test_the_way_of_the_article_is_that_of_whoever_asks_for_it():
+def test_the_articles_method_runs_only_on_request():
     for name in ("two boxes, apart", "two boxes", "two boxes that touch"):
         bodies = TYPICAL[name].bodies
         assert overlap(*bodies, method="paper").way == "paper"

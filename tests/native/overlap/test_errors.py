@@ -120,7 +120,7 @@ def test_errors_are_finite_at_any_size():
         assert np.isfinite(errors.gradient).all()
 
 
-def test_errors_say_what_they_are():
+def test_errors_have_a_readable_repr():
     text = repr(overlap(CUBE, Placed(CUBE, (1, 0, 0))).errors)
     assert text.startswith("Errors(volume=") and " m³, area=" in text and ", vertices=" in text
     assert ", depth=" in text and ", distance=" in text
@@ -136,7 +136,7 @@ def test_a_tolerance_is_kept_by_all_shapes(tolerance):
         assert found.converged and found.volume_error <= tolerance * found.volume
 
 
-def test_a_tolerance_that_is_not_kept_is_said_by_name():
+def test_converged_says_whether_the_tolerance_is_kept():
     three = CUBE, Placed(CUBE, (1, 0, 0), (1, 2, 3, 4)), Placed(CUBE, (0, 1, 0))
     assert overlap(*three).converged and not overlap(*three, tolerance=1e-16).converged
     assert overlap(CUBE, Placed(CUBE, (2, 0, 0)), tolerance=1e-16).converged

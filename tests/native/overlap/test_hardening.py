@@ -199,7 +199,7 @@ def test_a_spawned_process_gives_the_same_bits():
 
 
 @pytest.mark.parametrize("start", ["fork", "spawn"])
-def test_overlaps_travel_between_processes(start):
+def test_overlaps_are_pickled_between_processes(start):
     rng = np.random.default_rng(3)
     there = [overlap(*random_bodies(rng, count), tolerance=TOLERANCE) for count in (2, 2, 3, 4)]
     assert in_another_process(start, bits, there) == bits(there)

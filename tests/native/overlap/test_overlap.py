@@ -579,7 +579,7 @@ def test_gradient_of_a_lens_is_the_slope_of_its_closed_form():
     assert_allclose(answer.gradient[0, :3], [-slope, 0, 0], atol=3e-4 * abs(slope))
 
 
-def test_gradient_by_turning_a_ball_is_nothing():
+def test_gradient_by_turning_a_ball_is_zero():
     answer = overlap(Sphere(1), Placed(Box([1, 1, 1]), (1.2, 0.3, 0.1), TILT))
     assert_allclose(answer.gradient[0, 3:], 0, atol=3e-3 * answer.area)
 

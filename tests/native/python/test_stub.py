@@ -19,7 +19,7 @@ def test_the_native_surface_is_the_committed_one():
     assert not changes, f"{changes}\nIf the change is meant: cp {built} {COMMITTED}"
 
 
-def test_programs_of_others_are_checked_against_it(tmp_path):
+def test_user_programs_type_check_against_the_stub(tmp_path):
     program = "from overlapper import Sphere, overlap; reveal_type(overlap(Sphere(1.0), Sphere(2.0)).volume)"
     mypy = [sys.executable, "-m", "mypy", "--cache-dir", tmp_path, "-c", program]
     checked = subprocess.run(mypy, cwd=tmp_path, capture_output=True, text=True)

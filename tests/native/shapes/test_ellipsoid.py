@@ -138,7 +138,7 @@ def assert_is_exact(a, b, found):
 # ------------------------------------------------------------------------------------------------------------ the shape
 
 
-def test_an_ellipsoid_says_what_it_is():
+def test_an_ellipsoid_describes_itself():
     shape = Ellipsoid((1, 2, 3))
     assert repr(shape) == "Ellipsoid(half_axes=(1, 2, 3))"
     assert_array_equal(shape.half_axes, [1, 2, 3])
@@ -216,7 +216,7 @@ def test_method_paper_stretches_a_ball():
 
 
 @pytest.mark.parametrize("kind", OTHERS)
-def test_one_with_equal_axes_answers_as_the_sphere_does(kind):
+def test_an_ellipsoid_with_equal_axes_answers_as_a_sphere(kind):
     rng = np.random.default_rng(5)
     for depth in (0.3, 1e-3, 1e-8, -0.2):
         radius = rng.uniform(0.2, 0.8)
@@ -249,7 +249,7 @@ def test_volume_centroid_and_inertia_are_those_of_the_ball_at_any_depth(kind, mo
 
 
 @pytest.mark.parametrize(("size", "far"), [(1e-3, 0), (1, 1e3), (1e3, 0), (1e-3, 1e3)])
-def test_sizes_and_places_far_away_leave_the_digits(size, far):
+def test_extreme_sizes_and_far_places_keep_the_digits(size, far):
     rng = np.random.default_rng(4)
     for kind in FLAT[:2]:
         for depth in (0.2, 1e-4):
@@ -275,7 +275,7 @@ def test_the_gradient_is_the_difference_of_volumes_in_sixty_digits(seed):
 
 
 @pytest.mark.parametrize("most", [2, 30, 1000])
-def test_octants_add_up_to_the_whole(most):
+def test_octants_add_up_to_the_ellipsoid(most):
     """Volume, first moment and area, whose parts count what they share twice."""
     rng = np.random.default_rng(7)
     for _ in range(6):
@@ -297,7 +297,7 @@ def test_octants_add_up_to_the_whole(most):
 
 
 @pytest.mark.parametrize("half_axes", [(1, 2, 3), (0.001, 0.5, 1), (1e-3, 2e-3, 1), (1, 1, 1.0001)])
-def test_the_whole_has_carlsons_area(half_axes):
+def test_the_whole_ellipsoid_has_carlsons_area(half_axes):
     body = Placed(Ellipsoid(half_axes), (0.1, 0.2, 0.3), (1, 2, 3, 4))
     found = overlap(body, Box([9, 9, 9]))
     assert found.area == pytest.approx(surface(half_axes), rel=1e-13)
@@ -325,7 +325,7 @@ def test_stretched_caps_and_octants_have_closed_forms(seed):
     assert found.volume == pytest.approx(case.closed_form, rel=EXACT)
 
 
-def test_what_is_contained_is_the_smaller():
+def test_the_common_part_of_nested_bodies_is_the_smaller_body():
     big = Placed(Ellipsoid([2, 3, 4]), (1, 1, 1), (1, 2, 3, 4))
     for small in (Box([0.5, 0.6, 0.7]), Hull(np.random.default_rng(0).uniform(-0.8, 0.8, (12, 3)))):
         found = overlap(big, Placed(small, (1.2, 0.9, 1)))
@@ -390,7 +390,7 @@ def test_depth_and_distance_are_the_least_width_over_all_directions(kind, most):
 
 @pytest.mark.parametrize("kind", list(OTHERS))
 @pytest.mark.parametrize("depth", [*DEPTHS, *(-d for d in DEPTHS[::3])])
-def test_a_status_is_told_at_any_depth(kind, depth):
+def test_the_status_is_right_at_any_depth(kind, depth):
     rng = np.random.default_rng(12)
     a, b = sink(somewhere(rng, slender(rng, 20)), somewhere(rng, OTHERS[kind](rng)), depth)
     found = overlap(a, b)
@@ -398,7 +398,7 @@ def test_a_status_is_told_at_any_depth(kind, depth):
     assert found.depth - found.distance == pytest.approx(depth, rel=0, abs=1e-12)
 
 
-def test_a_flat_one_is_left_across_its_shortest_axis_even_past_its_middle():
+def test_a_flat_ellipsoid_is_left_along_its_shortest_axis_even_past_its_middle():
     """A corner above the middle of a plate is nearest to the top, but the box is in the way there."""
     plate = Placed(Ellipsoid([4, 3, 0.5]))
     below = Placed(Hull([(0, 0, 0.1), (-9, -9, -9), (9, -9, -9), (0, 9, -9)]), (0, 0, 0))
@@ -410,7 +410,7 @@ def test_a_flat_one_is_left_across_its_shortest_axis_even_past_its_middle():
         assert apart.status == ("overlapping" if shift < 1 else "separated")
 
 
-def test_the_least_way_out_of_a_halfspace_is_straight_up():
+def test_the_shortest_way_out_of_a_halfspace_is_straight_up():
     body = Placed(Ellipsoid([1, 2, 3]), (0, 0, 0.5), (1, 1, 0, 2))
     found = overlap(body, HalfSpace((0, 0, 1), 0))
     assert found.depth == pytest.approx(-body.bounds[0, 2], rel=1e-15)

@@ -24,7 +24,7 @@ def command(*arguments):
     return run.returncode, run.stdout, run.stderr
 
 
-def test_every_link_is_listed_with_its_shapes_and_whom_it_meets():
+def test_every_link_is_listed_with_its_shapes_and_the_links_it_can_meet():
     found = inventory(DATA / "mjcf" / "humanoid.xml")  # of which getCollisionShapeData would die
     assert (found.bodies, found.shapes, found.shapes_read, found.skipped) == (2, 20, 20, ())
     floor, torso, *limbs = found.links
@@ -38,7 +38,7 @@ def test_every_link_is_listed_with_its_shapes_and_whom_it_meets():
     assert listed[1]["shapes"][1]["volume"] == pytest.approx(4.18879 * 0.09**3, rel=1e-5)
 
 
-def test_self_collision_shows_in_whom_a_link_meets():
+def test_self_collision_adds_the_links_that_a_link_can_meet():
     path = DATA / "TwoJointRobot_wo_fixedJoints.urdf"
     alone, together = inventory(path), inventory(path, self_collision=True, modelling=Modelling(surface="margin"))
     assert alone.pairs == 0 and {link.meets for link in alone.links} == {0}
@@ -47,7 +47,7 @@ def test_self_collision_shows_in_whom_a_link_meets():
     assert sizes and all(size.endswith("rounded by 0.001") for size in sizes)
 
 
-def test_what_is_skipped_is_named_with_its_reason_and_is_exit_code_1(tmp_path):
+def test_skipped_shapes_are_named_with_their_reason_and_give_exit_code_1(tmp_path):
     corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
     (tmp_path / "flat.obj").write_text(f"o flat\n{corners}f 1 2 3\nf 2 3 4\n")
     (tmp_path / "plate.urdf").write_text(FLAT)
@@ -83,7 +83,7 @@ def test_a_scene_that_was_saved_is_listed(tmp_path):
         ("plane.obj", r"must end in \.urdf, \.sdf, \.xml, \.bullet, and 'plane.obj' does not"),
     ],
 )
-def test_what_pybullet_does_not_load_is_told_in_a_sentence(name, sentence, monkeypatch):
+def test_a_file_that_pybullet_does_not_load_is_reported_in_one_sentence(name, sentence, monkeypatch):
     monkeypatch.setenv("ASAN_OPTIONS", os.environ.get("ASAN_OPTIONS", "") + ":handle_segv=0")
     with pytest.raises(NotRead, match=sentence):
         inventory(DATA / name)

@@ -110,7 +110,7 @@ def test_the_status_changes_where_the_margins_meet():
         assert overlap(a, Placed(a, (0, 0, height))).status == status
 
 
-def test_a_rounded_hull_travels_as_it_is():
+def test_a_rounded_hull_is_pickled_unchanged():
     shape = RoundedHull(SKEW, 0.25)
     for again in (pickle.loads(pickle.dumps(shape)), copy.deepcopy(shape), shape_of(text_of(shape))):
         assert again.volume == pytest.approx(shape.volume, rel=1e-14)
@@ -125,7 +125,7 @@ def test_a_rounded_hull_is_drawn_with_its_facets_where_they_are():
     assert_allclose([drawn.min(axis=0), drawn.max(axis=0)], [[-0.6] * 3, [0.6] * 3], rtol=1e-12)
 
 
-def test_what_a_rounded_hull_is_not_taken_for_is_said():
+def test_unsupported_uses_of_a_rounded_hull_are_refused():
     with pytest.raises(ValueError, match="radius must be greater than 0"):
         RoundedHull(CUBE, 0)
     with pytest.raises(ValueError, match="vertices are flat"):

@@ -284,7 +284,7 @@ def flat_hull(client):
         (flat_hull, "flat|vertices"),
     ],
 )
-def test_what_is_not_convex_is_skipped_by_name_with_one_warning(client, build, reason):
+def test_concave_shapes_are_skipped_by_name_with_one_warning(client, build, reason):
     id = build(client)
     ball = body(client, p.GEOM_SPHERE, radius=1, position=[5, 5, 5])
     with pytest.warns(SkippedShapeWarning, match=reason) as caught:
@@ -333,7 +333,7 @@ def test_links_without_an_id_are_counted_as_skipped(client):
     assert bodies.keys == bodies.skipped == []
 
 
-def test_what_load_bullet_brings_is_counted_as_skipped(client, tmp_path):
+def test_bodies_from_load_bullet_are_counted_as_skipped(client, tmp_path):
     """pybullet gives it no ids, so that nothing can be asked of it."""
     p.loadURDF("cube.urdf", physicsClientId=client)
     path = str(tmp_path / "cube.bullet")
