@@ -32,7 +32,7 @@ constexpr std::array<Edge, 12> box_edges() {
 }
 constexpr std::array<Edge, 12> kBoxEdges = box_edges();
 
-/// The corners around the sides of a box, by their numbers.
+/// The corners around each side of a box, by number.
 constexpr std::array<std::array<int, 4>, 6> box_rings() {
   std::array<std::array<int, 4>, 6> rings{};
   for (int k = 0; k < 3; ++k) {
@@ -44,8 +44,8 @@ constexpr std::array<std::array<int, 4>, 6> box_rings() {
 }
 constexpr auto kBoxRings = box_rings();
 
-/// One coordinate of a box's corners and normals, from that row of its rotation. Both go by their numbers, and have the
-/// bits that placing each alone would give it.
+/// One coordinate of all corners and normals of a box, from one row of its rotation. The order is that of their
+/// numbers. The bits are the same as if each were placed alone.
 void place_box_coordinate(Vec3 row, Vec3 half, double origin, double* corners, double* normals) {
   constexpr TwoLanes sign{-1, 1};
   const TwoLanes x = sign * (row.x * half.x);
@@ -54,7 +54,7 @@ void place_box_coordinate(Vec3 row, Vec3 half, double origin, double* corners, d
   store(corners + 2, x + y - z + origin);
   store(corners + 4, x - y + z + origin);
   store(corners + 6, x + y + z + origin);
-  const Vec3 zero = 0 * row;  // or minus that
+  const Vec3 zero = 0 * row;  // or -0
   store(normals, sign * row.x + zero.y + zero.z);
   store(normals + 2, zero.x + sign * row.y + zero.z);
   store(normals + 4, zero.x + zero.y + sign * row.z);
@@ -77,7 +77,7 @@ void set_box(Solid& solid, const Box& box) {
   for (int f = 0; f < 6; ++f) solid.set_plane(f, box.facet(f).normal, box.facet(f).offset);
 }
 
-/// In the order in which hulls of cubes have long been made.
+/// In the order of hulls of cubes in recorded answers.
 std::vector<Vec3> corners_along_axes(Vec3 h) {
   std::vector<Vec3> corners;
   for (double x : {-1.0, 1.0})

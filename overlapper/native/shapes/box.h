@@ -46,8 +46,8 @@ struct Box : Bounded,
   }
   void append_planes(std::vector<Plane>& planes) const { append_box(half_extents, planes); }
 
-  /// Corners and sides by number: bit k of a corner's says on which side of axis k it is, and so does the last bit of a
-  /// side's, 2 k or 2 k + 1.
+  /// Corners and sides by number. Bit k of a corner's number is its side of axis k. Sides 2 k and 2 k + 1 are across
+  /// axis k.
   int vertex_count() const { return 8; }
   int facet_count() const { return 6; }
   Vec3 vertex(int i) const {

@@ -24,7 +24,7 @@ std::partial_ordering compare(const Placed& a, const Placed& b) {
 bool comes_before(const Placed& a, const Placed& b) { return compare(a, b) < 0; }
 
 std::vector<int> canonical_order(std::span<const Placed> bodies) {
-  if (bodies.size() == 2) {  // a sort would ask for memory first
+  if (bodies.size() == 2) {  // a sort would allocate memory
     const int first = comes_before(bodies[1], bodies[0]) ? 1 : 0;
     return {first, 1 - first};
   }

@@ -10,8 +10,8 @@ namespace overlapper {
 /// A strict weak order of bodies by their shapes and poses alone.
 bool comes_before(const Placed& a, const Placed& b);
 
-/// The numbers of the bodies in an order that depends on their shapes and poses alone: whoever computes in it gives the
-/// same bits however the caller orders them. Scaling everything by a power of two keeps it.
+/// The numbers of the bodies in an order that depends only on their shapes and poses. Computing in this order gives the
+/// same bits for every order of the caller's. Scaling everything by a power of two keeps the order.
 std::vector<int> canonical_order(std::span<const Placed> bodies);
 
 }  // namespace overlapper

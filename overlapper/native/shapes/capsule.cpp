@@ -30,11 +30,11 @@ Plane Capsule::ray_exit(Vec3 origin, Vec3 d) const {
   // The ray meets the infinite cylinder past one end, so it has left through the ball around that end.
   const Vec3 end{0, 0, sign(past) * half};
   const Vec3 q = origin - end;
-  // Lagrange's identity: seen from afar, the difference of dot(q, d)² and |q|² |d|² would cancel.
+  // Lagrange's identity. From afar, the difference of dot(q, d)² and |q|² |d|² would cancel.
   const double discriminant = std::max(0.0, norm2(d) * radius * radius - norm2(cross(q, d)));
   const double t = (std::sqrt(discriminant) - dot(q, d)) / norm2(d);
   Vec3 outward = q + t * d;
-  // Where the end begins, rounding may have the ray leave just before it, and there that ball has tangents that cut off
+  // Near the start of the end cap, rounding may put the exit just before it. The tangents of that ball would cut off
   // the other end.
   if (outward.z * end.z < 0) outward.z = 0;
   return tangent(outward, end, radius);
@@ -60,7 +60,7 @@ double Capsule::volume() const { return std::numbers::pi * radius * radius * (le
 WideVector Capsule::wide_core_support(const WideVector& d) const { return {{}, {}, {sign(d.z) * length / 2}}; }
 
 WidePlane Capsule::wide_ray_exit(const WideVector& origin, const WideVector& d) const {
-  /// The same as leave_ball() from a point that may be outside, for the far one of two crossings.
+  /// Like leave_ball(), but from a point that may be outside; takes the far one of two crossings.
   const auto leave_cap = [&](const WideVector& q) {
     const WideVector beside = cross(q, d);
     const DoubleDouble dd = dot(d, d);

@@ -17,29 +17,29 @@ struct Ellipsoid;
 struct HullData;
 class WideBody;
 
-/// What a shape's core is: its support function says where the least way out of it may lie.
+/// The kind of a shape's core. Its support function says where the least way out may lie.
 enum class CoreKind {
   kPolytope,  ///< a polytope, a segment or a point
   kRims,      ///< a cylinder
   kCurved     ///< anything else that is convex
 };
 
-/// A segment about the origin along z, and all points around it: within `radius` of it if the ends are round, else
-/// between planes across its ends.
+/// A segment about the origin along z, grown by `radius`. With round ends it is a capsule; otherwise planes across its
+/// ends bound it.
 struct Revolution {
   double radius, half_length;
   bool round_ends;
 };
 
-/// A ridge of a polytope: from vertex `from` to vertex `to`, the facet `left` on the left hand seen from outside.
+/// A ridge of a polytope from vertex `from` to vertex `to`. Seen from outside, the facet `left` is on the left hand.
 struct Edge {
   int from, to, left, right;
 };
 
-/// The facets and ridges of a core that is a polytope, by the numbers of its corners. No facets lie beside a segment:
-/// -1.
+/// The facets and ridges of a polytope core, by the numbers of its corners. A segment has no facets beside it: -1.
 struct CoreSurface {
-  /// Three corners of a facet; or an axis, 1 for its far side and 0 for the other, and -1 for a facet across that axis.
+  /// Three corners of a facet. For a facet across an axis: 1 for the far side of an axis, 0 for the near side, -1 for
+  /// the axis of the facet.
   std::vector<std::array<int, 3>> facets;
   std::vector<Edge> ridges;
 };
@@ -67,7 +67,7 @@ struct Smooth {
   static constexpr bool kSmooth = true;
 };
 
-/// Planes bound it, and no two of its own numbers stand for a curve.
+/// Planes bound it, and none of its parameters defines a curve.
 struct Flat {
   static constexpr bool kSmooth = false;
 };
@@ -76,7 +76,7 @@ struct CentredAtOrigin {
   static Vec3 centroid() { return {}; }
 };
 
-/// No numbers of a hull describe it.
+/// It has no hull data.
 struct WithoutHullData {
   static const HullData* polytope() { return nullptr; }
 };
@@ -89,7 +89,7 @@ struct NotStretched {
   static const Ellipsoid* stretched() { return nullptr; }
 };
 
-/// Its core is a polytope, along whose support function no point moves but by leaps.
+/// Its core is a polytope: the support point moves only by jumps.
 struct PolytopeCore {
   static CoreKind core_kind() { return CoreKind::kPolytope; }
   static Mat3 core_slope(Vec3) { return {{}, {}, {}}; }
@@ -103,13 +103,13 @@ struct PointCore : PolytopeCore {
   static void append_core_surface(const std::vector<char>&, CoreSurface&) {}
 };
 
-/// Its core has no corners that doubles could list.
+/// Doubles cannot list corners of its core.
 struct CurvedCore {
   static std::vector<Vec3> core_corners() { return {}; }
   static void append_core_surface(const std::vector<char>&, CoreSurface&) {}
 };
 
-/// It is its own core, grown by nothing.
+/// It is its own core, with radius 0.
 template <class S>
 struct OwnCore {
   static double core_radius() { return 0; }
@@ -118,7 +118,7 @@ struct OwnCore {
   }
 };
 
-/// The box around it is found by six supports.
+/// Six supports give the box around it.
 template <class S>
 struct BoundedBySupports {
   Bounds bounds(const Pose& pose) const {
@@ -130,13 +130,13 @@ struct BoundedBySupports {
   }
 };
 
-/// No box around it is sooner found than bounds().
+/// No box around it is faster than bounds().
 template <class S>
 struct EnclosedByBounds {
   Bounds enclosing_box(const Pose& pose) const { return static_cast<const S&>(*this).bounds(pose); }
 };
 
-/// It reaches as far as the corner of the box around it.
+/// It reaches at most to the corner of the box around it.
 template <class S>
 struct ReachesToCornerOfBounds {
   double bounding_radius() const {
@@ -153,7 +153,7 @@ struct WidePlanesAcrossAxes {
 inline std::partial_ordering order_of(double a, double b) { return a <=> b; }
 inline std::partial_ordering order_of(Vec3 a, Vec3 b) { return std::tie(a.x, a.y, a.z) <=> std::tie(b.x, b.y, b.z); }
 
-/// Of two, the one whose first field that differs is less comes first.
+/// Orders two shapes by the first field that differs.
 template <class S>
 struct OrderedByFields {
   std::partial_ordering order(const S& other) const {

@@ -11,10 +11,10 @@ class Mesh;
 struct Hull;
 struct Solid;
 
-/// A closed convex solid, known only by asking. Directions need not be unit length.
+/// A closed convex solid, known only by its answers. Directions need not be unit length.
 template <class T>
 concept ConvexOracle = requires(const T& shape, Vec3 point, Vec3 direction) {
-  { shape.support(direction) } -> std::same_as<Vec3>;  // a farthest point, any of them
+  { shape.support(direction) } -> std::same_as<Vec3>;  // any farthest point
   {
     shape.ray_exit(point, direction)
   } -> std::same_as<Plane>;  // supporting plane through which the ray leaves; point strictly inside
@@ -23,7 +23,7 @@ concept ConvexOracle = requires(const T& shape, Vec3 point, Vec3 direction) {
   } -> std::same_as<Plane>;  // supporting plane with the least slack at the point, inside or out
 };
 
-/// What a shape is called, in what order two of a kind come.
+/// The shape's name, and the order of two shapes of a kind.
 template <class S>
 concept Named = requires(const S& s) {
   { S::kName } -> std::convertible_to<const char*>;
@@ -31,22 +31,22 @@ concept Named = requires(const S& s) {
   { s.order(s) } -> std::same_as<std::partial_ordering>;
 };
 
-/// How large it is. Lengths in m, about its own origin.
+/// Its size. Lengths in m, about its own origin.
 template <class S>
 concept Measurable = requires(const S& s, const Pose& pose, std::vector<Plane>& planes) {
   { s.volume() } -> std::same_as<double>;  // m³, infinite unless bounded
-  { s.centroid() } -> std::same_as<Vec3>;  // unless bounded, the point of its border that is nearest to the origin
-  // How far it reaches; unless bounded, how far its plane is.
+  { s.centroid() } -> std::same_as<Vec3>;  // if unbounded: the boundary point nearest to the origin
+  // How far it reaches; if unbounded, the distance of its plane.
   { s.bounding_radius() } -> std::same_as<double>;
-  { s.loose_radius() } -> std::same_as<double>;       // no less than bounding_radius(), sooner
-  { s.reach() } -> std::same_as<double>;              // how far it reaches at most, as a sum of its numbers
-  { s.bounds(pose) } -> std::same_as<Bounds>;         // the box around it; infinite where it is
-  { s.enclosing_box(pose) } -> std::same_as<Bounds>;  // the same but for rounding, the sooner the better
-  // All facet planes of a polytope; of a smooth shape a few of its tangent planes that already bound it.
+  { s.loose_radius() } -> std::same_as<double>;       // at least bounding_radius(), but faster
+  { s.reach() } -> std::same_as<double>;              // upper bound of how far it reaches, a sum of its parameters
+  { s.bounds(pose) } -> std::same_as<Bounds>;         // the box around it, infinite in unbounded directions
+  { s.enclosing_box(pose) } -> std::same_as<Bounds>;  // like bounds() but for rounding, and faster
+  // All facet planes of a polytope; for a smooth shape a few tangent planes that already bound it.
   { s.append_planes(planes) };
 };
 
-/// What depths and distances ask: a shape is its core grown by a radius.
+/// Questions for depths and distances: a shape is its core grown by a radius.
 template <class S>
 concept Cored =
     requires(const S& s, const Pose& pose, Vec3 direction, const std::vector<char>& kept, CoreSurface& surface) {
@@ -54,11 +54,11 @@ concept Cored =
       { s.core_radius() } -> std::same_as<double>;
       { s.core_support(pose, direction) } -> std::same_as<Vec3>;  // in the world
       { s.core_slope(direction) } -> std::same_as<Mat3>;        // the derivative of the core's support by the direction
-      { s.core_corners() } -> std::same_as<std::vector<Vec3>>;  // none unless the core is a polytope
-      { s.append_core_surface(kept, surface) };  // the facets and ridges of it with a corner that is kept
+      { s.core_corners() } -> std::same_as<std::vector<Vec3>>;  // empty unless the core is a polytope
+      { s.append_core_surface(kept, surface) };                 // the facets and ridges of the core with a kept corner
     };
 
-/// How double-double arithmetic sees it, in its own coordinates. `triangles` are those of polytope(), made ready.
+/// The shape in double-double arithmetic, in its own coordinates. `triangles` are those of polytope(), prepared.
 template <class S>
 concept Widened = requires(const S& s, const WideVector& v, const WideTriangles& triangles, const WideBody& body,
                            std::vector<WidePlane>& planes) {
@@ -67,14 +67,14 @@ concept Widened = requires(const S& s, const WideVector& v, const WideTriangles&
   { s.append_wide_planes(body, planes) };  // as append_planes(), in the coordinates of the body
 };
 
-/// What it is made from, which the ways of measuring choose by.
+/// What the choice of a way of measuring depends on.
 template <class S>
 concept Classified = requires(const S& s) {
   { S::kBounded } -> std::convertible_to<bool>;
   { S::kSmooth } -> std::convertible_to<bool>;
-  { s.revolution() } -> std::same_as<std::optional<Revolution>>;  // nothing unless a ball, a capsule or a cylinder
-  { s.stretched() } -> std::convertible_to<const Ellipsoid*>;     // the shape, if it is an ellipsoid and no ball
-  // The polytope that a hull is, or that a rounded hull is grown from; null for other shapes.
+  { s.revolution() } -> std::same_as<std::optional<Revolution>>;  // no value unless a ball, a capsule or a cylinder
+  { s.stretched() } -> std::convertible_to<const Ellipsoid*>;     // the shape, if it is an ellipsoid and not a ball
+  // The polytope of a hull, or the core of a rounded hull; null for other shapes.
   { s.polytope() } -> std::convertible_to<const HullData*>;
 };
 
@@ -92,8 +92,9 @@ concept FlatShape = !S::kSmooth && requires(const S& s, int number, Solid& solid
   { s.facet(number) } -> std::same_as<Plane>;
   { s.ring(number) } -> std::same_as<std::span<const int>>;  // the vertices around a facet, seen from outside
   { s.edges() } -> std::same_as<std::span<const Edge>>;
-  { s.edges_known() } -> std::same_as<bool>;  // false where rounding has left a ridge without its other side
-  // A facet by exact numbers, its normal of any length, and of length 1; nothing where rounding has merged several.
+  { s.edges_known() } -> std::same_as<bool>;  // false if rounding has left a ridge with one side only
+  // A facet from exact numbers, with its normal of any length and of length 1. No value if rounding has merged several
+  // facets.
   { s.wide_facet(number) } -> std::same_as<std::optional<WidePlane>>;
   { s.unit_facet(number) } -> std::same_as<std::optional<WidePlane>>;
   { s.has_graph() } -> std::same_as<bool>;  // true if it has a Mesh
@@ -101,15 +102,15 @@ concept FlatShape = !S::kSmooth && requires(const S& s, int number, Solid& solid
   { s.give(mesh) };                         // only if it has a graph
 };
 
-/// Everything that is asked of a kind of shape. One that lacks an answer cannot be an alternative of Shape.
+/// All questions about a kind of shape. A kind that lacks an answer cannot be an alternative of Shape.
 template <class S>
 concept ConvexShape = ConvexOracle<S> && Named<S> && Measurable<S> && Cored<S> && Widened<S> && Classified<S> &&
                       (SmoothShape<S> || FlatShape<S>) && (!S::kBounded || requires(const S& s) {
-                        // The hull of points of it that lacks no more than that fraction of its volume, for method
-                        // "paper". Throws std::invalid_argument for what that method does not take.
+                        // The hull of points of the shape that lacks at most that fraction of its volume, for method
+                        // "paper". Throws std::invalid_argument if that method does not take the shape.
                         { s.inscribed(1e-3) } -> std::same_as<Hull>;
                       }) && (S::kBounded || requires(const S& s) {
-                        { s.plane } -> std::convertible_to<Plane>;  // all there is of an unbounded shape
+                        { s.plane } -> std::convertible_to<Plane>;  // the plane that defines an unbounded shape
                       });
 
 }  // namespace overlapper

@@ -28,11 +28,11 @@ WidePlane wide_supporting(Vec3 half_axes, const WideVector& outward) {
   return {normal, norm(scaled(half_axes, normal))};
 }
 
-/// A point of an ellipsoid's space in units of its shortest half axis, with the shortest axis last.
+/// A point in an ellipsoid's coordinates, in units of its shortest half axis, with the shortest axis last.
 ///
-/// The surface is nearest where n ∝ p / (τ + s), for s = g² − 1 of the half axes g: then u = g p / (τ + s), the point
-/// of the unit ball that the surface's point is an image of, has length one. For the nearest point of all, τ is not
-/// negative, and for one across the shortest axis it is (Eberly 2013, for the former).
+/// At a foot of the point p on the surface, n ∝ p / (τ + s), with s = g² − 1 for the half axes g. The image of that
+/// foot on the unit ball is u = g p / (τ + s), so |u| = 1. τ is not negative for the nearest foot (Eberly 2013), and
+/// negative for the foot across the shortest axis.
 struct Seen {
   std::array<int, 3> axis;
   std::array<double, 3> g, s, p;
@@ -49,7 +49,7 @@ struct Seen {
     }
   }
 
-  /// Of the point of the unit ball; of 0 / 0, at the centre of an axis, 0.
+  /// A component of the point of the unit ball; 0 for 0 / 0, at the centre of an axis.
   double u(int i, double tau) const { return p[i] != 0 ? g[i] * p[i] / (tau + s[i]) : 0; }
 
   Vec3 normal(double tau, double last) const {
@@ -59,15 +59,15 @@ struct Seen {
     return unit(Vec3{n[0], n[1], n[2]});
   }
 
-  /// What is left of a unit for the last component where the point lies in the plane across the shortest axis, and τ is
-  /// zero; negative if the nearest point lies in that plane, too.
+  /// The square of the last component, 1 less the others, if the point lies in the plane across the shortest axis and τ
+  /// is zero. Negative if the nearest foot lies in that plane, too.
   double left() const {
     const double x = u(0, 0), y = u(1, 0);
     return 1 - x * x - y * y;
   }
 
-  /// The greatest τ, at which |u| = 1, by Newton's method for 1 / |u|: from where one component alone is as long as
-  /// that, it comes no farther.
+  /// The greatest τ with |u| = 1, by Newton's method for 1 / |u|. It starts where one component alone has length 1, and
+  /// only approaches.
   double nearest() const {
     double tau = 0;
     for (int i = 0; i < 3; ++i) tau = std::max(tau, g[i] * std::abs(p[i]) - s[i]);
@@ -86,7 +86,7 @@ struct Seen {
     return tau;
   }
 
-  /// The least negative τ, if there is one above the poles of the other axes: |u|² is convex between.
+  /// The least negative τ, if one lies above the poles of the other axes. |u|² is convex between.
   std::optional<double> across() const {
     double tau = -std::abs(p[2]);
     constexpr int kMostSteps = 100;
@@ -123,7 +123,7 @@ Vec3 Ellipsoid::support(Vec3 direction) const {
 }
 
 Mat3 Ellipsoid::core_slope(Vec3 direction) const {
-  // With M the squares of the half axes and p = M d / √(d · M d) the point, (M − p pᵀ) / √(d · M d).
+  // (M − p pᵀ) / √(d · M d), with M the squares of the half axes and p = M d / √(d · M d) the point.
   const Vec3 h = half_axes, square = scaled(h, h);
   const double reach = norm(scaled(h, direction));
   const Vec3 p = scaled(square, direction) / reach;
@@ -171,7 +171,7 @@ WidePlane Ellipsoid::wide_ray_exit(const WideVector& origin, const WideVector& d
 }
 
 WidePlane Ellipsoid::wide_tightest(const WideVector& point, const WideTriangles&) const {
-  // Where the slack is least, a normal that is off changes it to second order: doubles know it well enough.
+  // Where the slack is least, an error of the normal changes it only to second order: doubles are accurate enough.
   return wide_supporting(half_axes, wide(ways_out(rounded(point))[0]));
 }
 

@@ -7,7 +7,7 @@ namespace overlapper {
 
 struct Hull;
 
-/// About the origin, its axes along x, y and z: a ball that has been stretched.
+/// About the origin, its axes along x, y and z: a stretched ball.
 struct Ellipsoid : Bounded,
                    Smooth,
                    CentredAtOrigin,
@@ -30,7 +30,7 @@ as closely as `tolerance` asks.)";
   /// Throws std::invalid_argument with one sentence that names the argument.
   static Ellipsoid make(Vec3 half_axes);
 
-  /// With equal axes, it answers as the sphere does.
+  /// With equal axes it gives the answers of a sphere.
   bool ball() const { return half_axes.x == half_axes.y && half_axes.y == half_axes.z; }
 
   Vec3 support(Vec3 direction) const;
@@ -38,8 +38,8 @@ as closely as `tolerance` asks.)";
   Plane tightest(Vec3 point) const;
   /// The supporting plane whose normal is along `outward`.
   Plane supporting(Vec3 outward) const;
-  /// The unit normals at the points of the surface that are nearer to the point than all around them. There are one or
-  /// two: at the nearest point of all, and across the shortest axis.
+  /// The unit normals at the local minima of the distance of the surface from the point. There are one or two: at the
+  /// nearest point, and across the shortest axis.
   std::vector<Vec3> ways_out(Vec3 point) const;
 
   CoreKind core_kind() const { return ball() ? CoreKind::kPolytope : CoreKind::kCurved; }

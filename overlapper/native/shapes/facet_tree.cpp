@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Corners of a part beside the first one of its facet.
+/// Corners of a part, without the first corner of its facet.
 constexpr int kMostCorners = 8;
 
 /// Calls `use(corner)` for the corners of a part.
@@ -36,7 +36,7 @@ Foot foot_on_part(const HullData& hull, const FacetPart& part, Vec3 x) {
   const Vec3 flat = x - signed_distance(plane, x) * plane.normal;
   const auto ring = hull.facet(part.facet);
   const int corners = static_cast<int>(ring.size());
-  // How far it is to the right of the way from one corner to another, in multiples of that.
+  // How far x is to the right of the line from one corner to another, in multiples of the line's length.
   const auto right_of = [&](int from, int to) {
     const Vec3 a = hull.vertices[ring[from]];
     return dot(cross(hull.vertices[ring[to]] - a, plane.normal), flat - a);
@@ -56,7 +56,7 @@ Foot foot_on_part(const HullData& hull, const FacetPart& part, Vec3 x) {
     if (share > 0 && share < 1) outward -= dot(outward, edge) / length2 * edge;
     if (norm2(x - point) < best.height2) best = {point, outward, norm2(x - point)};
   }
-  // Of a cut, both parts ask for the same number, so that rounding leaves nothing between them.
+  // Both parts beside a cut use the same number, so rounding leaves no gap between them.
   if (!begins_ring && right_of(0, part.first) > 0) inside = false;
   if (!ends_ring && right_of(0, part.last) < 0) inside = false;
   if (inside) best.height2 = norm2(x - flat);
@@ -82,7 +82,7 @@ int FacetTree::grow(const HullData& hull, int begin, int end) {
   const int at = static_cast<int>(nodes_.size());
   const std::span<Entry> own = std::span(entries_).subspan(begin, end - begin);
   const std::array<Vec3, 3> axes = fitted_axes(own, [](const Entry& each) { return each.middle; });
-  // About one of the points, so that rounding is as small as the box.
+  // Relative to one of the points, so that the rounding error is relative to the box.
   const Vec3 from = own[0].middle;
   Vec3 lower, upper;
   for (const Entry& each : own)

@@ -8,14 +8,14 @@ namespace overlapper {
 
 struct HullData;
 
-/// A point of a polytope, and a direction out of it there along which no other point of the polytope lies farther;
-/// {0, 0, 0} if there is none.
+/// A point of a polytope, with an outward direction along which no other point of the polytope lies farther; {0, 0, 0}
+/// if no point was found.
 struct Foot {
   Vec3 point, outward;
-  double height2;  ///< squared distance from where it was asked
+  double height2;  ///< squared distance from the query point
 };
 
-/// The first corner of a facet and those from `first` to `last` of its ring, which bound a part of it.
+/// A part of a facet: the polygon of the facet's first corner and the corners from `first` to `last` of its ring.
 struct FacetPart {
   int facet, first, last;
 };
@@ -23,23 +23,23 @@ struct FacetPart {
 /// A facet as one part.
 FacetPart whole_facet(const HullData& hull, int facet);
 
-/// The foot, on part of a facet, of a point above its plane. What lies beyond a cut through the facet has its foot on
-/// another part, and `height2` is infinite here.
+/// The foot of a point above the plane of a facet, on a part of the facet. `height2` is infinite if the foot is on
+/// another part, beyond a cut.
 Foot foot_on_part(const HullData& hull, const FacetPart& part, Vec3 x);
 
-/// Parts of facets, of few corners each, in boxes within boxes that lie as these do: the nearest point of a polytope in
-/// a time like the logarithm of its size.
+/// A tree of boxes around parts of facets with few corners each. It finds the nearest point of a polytope in
+/// logarithmic time.
 class FacetTree {
  public:
   explicit FacetTree(const HullData& hull);
 
-  /// The nearest point of the polytope to a point outside of it, on a facet that the point sees. Without direction if
-  /// it is not nearer than that.
+  /// The nearest point of the polytope to a point outside, on a facet that the point sees. {0, 0, 0} as direction if
+  /// its squared distance is not less than `nearer_than2`.
   Foot foot(const HullData& hull, Vec3 x, double nearer_than2) const;
 
  private:
   static constexpr int kLeaf = 4;
-  static constexpr int kMostDepth = 64;  ///< nodes that wait: one for each halving
+  static constexpr int kMostDepth = 64;  ///< nodes that wait, one for each halving
 
   struct Entry {
     FacetPart part;
@@ -48,14 +48,14 @@ class FacetTree {
   struct Node {
     Vec3 centre, axis[3], half;
     int begin, end;   ///< of the entries
-    int second = -1;  ///< the other child, after the one that follows; -1 of a leaf
+    int second = -1;  ///< the other child; the first child follows directly; -1 for a leaf
   };
 
   static double distance2(const Node& node, Vec3 x);
   int grow(const HullData& hull, int begin, int end);
 
   std::vector<Node> nodes_;
-  std::vector<Entry> entries_;  ///< those of a box side by side
+  std::vector<Entry> entries_;  ///< the entries of a box are contiguous
 };
 
 }  // namespace overlapper

@@ -24,7 +24,7 @@ HalfSpace HalfSpace::make(Vec3 normal, double offset) {
   require(length > 0, "normal must not be zero");
   require(length > kSmallest && length < kLargest, "normal must be of a length between 1e-25 and 1e25");
   require(std::abs(offset) / length < kLargest, "offset must be closer to the origin than 1e25 m");
-  // A normal that is unit but for its last bits stays as given, so that planes read back and built anew are the same.
+  // A normal of length 1 but for its last bits stays as given, so that a plane that is read back keeps its bits.
   if (std::abs(length - 1) <= 2 * DBL_EPSILON) return {{normal, offset}, normal, offset};
   return {{normal / length, offset / length}, normal, offset};
 }
@@ -54,7 +54,7 @@ void HalfSpace::place(Solid& solid, const Pose* pose, double beyond) const {
 std::optional<WidePlane> HalfSpace::unit_facet(int) const {
   const DoubleDouble length = norm(wide(given_normal));
   const bool as_given = norm2(plane.normal - given_normal) == 0;
-  // A normal of nearly unit length stands for its direction, and the offset counts along that direction.
+  // A normal of nearly unit length defines a direction, and the offset counts along that direction.
   return WidePlane{unit(wide(given_normal)), DoubleDouble{as_given ? plane.offset : given_offset} / length};
 }
 

@@ -10,7 +10,7 @@ namespace overlapper {
 class Mesh;
 struct Solid;
 
-/// { x : dot(plane.normal, x) <= plane.offset }. Unbounded: its support is at infinity in all directions but one.
+/// { x : dot(plane.normal, x) <= plane.offset }. Unbounded: its support is infinite in all directions but one.
 struct HalfSpace : Flat, WithoutHullData, NotRevolved, NotStretched, PolytopeCore, OrderedByFields<HalfSpace> {
   static constexpr bool kBounded = false;
   static constexpr const char* kName = "HalfSpace";
@@ -66,7 +66,7 @@ struct HalfSpace : Flat, WithoutHullData, NotRevolved, NotStretched, PolytopeCor
   void append_wide_planes(const WideBody& body, std::vector<WidePlane>& planes) const;
 
   Plane plane;
-  Vec3 given_normal;  ///< as it came, of any length: dividing by that rounds, and wider arithmetic need not
+  Vec3 given_normal;  ///< as given, of any length, for wider arithmetic: normalizing rounds
   double given_offset = 0;
 };
 

@@ -9,7 +9,7 @@ namespace overlapper {
 class Mesh;
 struct Solid;
 
-/// The convex hull of points; shared, never changed once built.
+/// The convex hull of points; shared, and constant once built.
 struct Hull : Bounded,
               Flat,
               NotRevolved,
@@ -71,7 +71,7 @@ ValueError for fewer than four points, for points that are not finite and for po
   std::shared_ptr<const HullData> data;
 };
 
-/// Interior, duplicate, collinear and coplanar points are welcome; coplanar triangles become one facet. Throws
+/// Interior, duplicate, collinear and coplanar points are allowed; coplanar triangles become one facet. Throws
 /// std::invalid_argument with one sentence that names the argument.
 inline Hull make_hull(std::span<const Vec3> points) { return Hull(hull_of_vertices(points)); }
 

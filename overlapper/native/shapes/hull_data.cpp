@@ -18,8 +18,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Subtracting it is exact: Sterbenz' lemma holds for coordinates within a factor of two of the middle, so the middle
-/// is used on an axis only where the points keep farther from zero than that.
+/// An origin that can be subtracted exactly. Sterbenz' lemma holds for coordinates within a factor of two of the
+/// middle. On each axis, the middle is therefore used only if the points are farther from zero than from the middle.
 Vec3 lossless_origin(Vec3 lower, Vec3 upper) {
   const auto middle = [](double low, double high) {
     const double centre = low / 2 + high / 2;
@@ -28,8 +28,8 @@ Vec3 lossless_origin(Vec3 lower, Vec3 upper) {
   return {middle(lower.x, upper.x), middle(lower.y, upper.y), middle(lower.z, upper.z)};
 }
 
-/// The facet that each triangle of a hull belongs to. A triangle joins its neighbour's facet if it lies within rounding
-/// of the facet's plane, that of its largest triangle.
+/// The facet of each triangle of a hull. A triangle joins its neighbour's facet if it lies in the facet's plane to
+/// rounding. That plane is the plane of the facet's largest triangle.
 struct CoplanarRegions {
   const ExpandingHull& hull;
   double rounding;
@@ -85,8 +85,8 @@ struct CoplanarRegions {
 CoplanarRegions merge_coplanar(const ExpandingHull& hull, double rounding) {
   CoplanarRegions regions{hull, rounding, std::vector<int>(hull.facets.size(), -1), {}, {}};
   regions.find_normals();
-  // Triangles lie in memory as the hull has grown, each near others that it borders on; by area they do not. What needs
-  // their surroundings is asked of them first.
+  // Triangles that are near in memory are near on the hull; triangles sorted by area are not. The work that needs
+  // neighbours therefore runs first, in the order of memory.
   struct Seed {
     double area;
     int triangle;
@@ -103,7 +103,7 @@ CoplanarRegions merge_coplanar(const ExpandingHull& hull, double rounding) {
   return regions;
 }
 
-/// Lists of numbers, one after the other.
+/// Lists of numbers in one array.
 struct Lists {
   std::vector<int> start{0}, number;
 
@@ -112,7 +112,7 @@ struct Lists {
   void end() { start.push_back(static_cast<int>(number.size())); }
 };
 
-/// The members of so many groups: `each(use)` calls use(group, member), and is asked for all twice over.
+/// The members of `count` groups. `each(use)` calls use(group, member), and runs twice.
 template <class Each>
 Lists grouped(int groups, Each each) {
   Lists lists;
@@ -165,7 +165,7 @@ Lists region_loops(const CoplanarRegions& regions) {
   return loops;
 }
 
-/// Points in the middle of an edge lie on two facets only: they are no vertices of the solid.
+/// A point inside an edge lies on two facets only: it is not a vertex of the solid.
 void drop_edge_points(Lists& loops, int points) {
   std::vector<int> facets_at(points, 0);
   for (int v : loops.number) ++facets_at[v];
@@ -181,7 +181,7 @@ void drop_edge_points(Lists& loops, int points) {
   loops.number.resize(kept);
 }
 
-/// Newell's normal of a polygon, taken about its first corner; the offset is that of its outermost corner.
+/// Newell's normal of a polygon, about its first corner; the offset is that of its outermost corner.
 Plane supporting_plane(const std::vector<Vec3>& vertices, std::span<const int> ring) {
   const Vec3 apex = vertices[ring[0]];
   Vec3 normal;
@@ -199,7 +199,7 @@ Plane supporting_plane(const std::vector<Vec3>& vertices, std::span<const int> r
   return {normal, offset};
 }
 
-/// The corners of the largest triangle of each region, unless rounding alone has merged others with that.
+/// The corners of the largest triangle of each region, unless only rounding has merged other triangles into the region.
 std::vector<std::array<int, 3>> exact_corners(const CoplanarRegions& regions) {
   const ExpandingHull& hull = regions.hull;
   std::vector<std::array<int, 3>> corners;
@@ -263,7 +263,8 @@ HullData hull_data(const CoplanarRegions& regions, const Lists& loops, Vec3 orig
   return data;
 }
 
-/// `across[i]` becomes the facet beside that of ring[i], across the edge that begins there; -1 if there are no edges.
+/// `across[i]` becomes the facet beside the facet of ring[i], across the edge that begins there; -1 if there are no
+/// edges.
 std::vector<Edge> edges_of(const HullData& data, std::vector<int>& across) {
   across.assign(data.ring.size(), -1);
   struct Side {
@@ -271,7 +272,7 @@ std::vector<Edge> edges_of(const HullData& data, std::vector<int>& across) {
   };
   const auto ends = [](const Side& s) { return std::minmax(s.from, s.to); };
   std::vector<Side> sides(data.ring.size());
-  // By the lower of both ends, counting how often each is that; then by the other, of which there are few to each.
+  // Counting sort by the lower end of each edge; then by the other end, with few edges for each lower end.
   std::vector<int> starts(data.vertices.size() + 1, 0);
   const auto for_each_side = [&](auto use) {
     for (int f = 0, number = 0; f < static_cast<int>(data.planes.size()); ++f) {
@@ -283,7 +284,7 @@ std::vector<Edge> edges_of(const HullData& data, std::vector<int>& across) {
   for_each_side([&](const Side& s) { ++starts[ends(s).first + 1]; });
   for (size_t v = 1; v < starts.size(); ++v) starts[v] += starts[v - 1];
   for_each_side([&](const Side& s) { sides[starts[ends(s).first]++] = s; });
-  // Each start has moved on to the next one's.
+  // Each start has moved on to the next start.
   for (size_t v = 0, begin = 0; v < data.vertices.size(); begin = starts[v++]) {
     cancellation_point();
     std::sort(sides.begin() + begin, sides.begin() + starts[v], [&](const Side& a, const Side& b) {
@@ -302,8 +303,8 @@ std::vector<Edge> edges_of(const HullData& data, std::vector<int>& across) {
   return edges;
 }
 
-/// Three of the facets around a vertex: the first, the one at the largest angle to it, and the one that with these
-/// spans most.
+/// Three of the facets around a vertex: the first facet, the facet at the largest angle to it, and the facet that spans
+/// most with these two.
 std::array<int, 3> well_spread(std::span<const int> around, const std::vector<Plane>& planes) {
   const auto most = [&](auto spread) {
     return *std::max_element(around.begin(), around.end(), [&](int f, int g) { return spread(f) < spread(g); });
@@ -372,14 +373,14 @@ void complete(HullData& data) {
 
 namespace {
 
-/// What a surface of triangles about `origin` makes once coplanar ones are merged; null if it has no inside.
+/// The hull of a surface of triangles about `origin`, with coplanar triangles merged; null if it has no interior.
 std::shared_ptr<HullData> merged(const ExpandingHull& hull, Vec3 origin, std::vector<int>* source) {
   double extent = 0;
   for (const ExpandingHull::Facet& facet : hull.facets)
     if (!facet.removed())
       for (int v : facet.vertex) extent = std::max(extent, max_component(abs(hull.points[v])));
-  // Corners computed by a user as centre plus rotated half extents carry a few roundings each, relative to the extent;
-  // a plane through three of them misses a fourth by up to about eight of those.
+  // Corners that a user computes as centre plus rotated half extents have a few roundings each, relative to the extent.
+  // A plane through three corners misses a fourth by up to about eight roundings.
   const double rounding = 16 * DBL_EPSILON * extent;
   const CoplanarRegions regions = merge_coplanar(hull, rounding);
   Lists loops = region_loops(regions);
@@ -390,7 +391,7 @@ std::shared_ptr<HullData> merged(const ExpandingHull& hull, Vec3 origin, std::ve
   data->volume = measures.volume;
   data->centroid = measures.centroid;
   complete(*data);
-  // A solid thinner than the rounding of its corners has no inside to speak of.
+  // A solid thinner than the rounding of its corners counts as flat.
   if (!(data->volume > rounding * measures.area / 2)) return nullptr;
   return data;
 }
@@ -471,7 +472,7 @@ std::partial_ordering order_of(const HullData& a, const HullData& b) {
   const auto &p = a.corners, &q = b.corners;
   const auto by_corners = std::lexicographical_compare_three_way(p.begin(), p.end(), q.begin(), q.end(),
                                                                  [](Vec3 u, Vec3 v) { return order_of(u, v); });
-  // Points inside leave no other trace than the order in which facets were found.
+  // Interior points change only the order of facets.
   return by_corners != 0 ? by_corners : a.triangles <=> b.triangles;
 }
 

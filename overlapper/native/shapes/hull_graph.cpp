@@ -10,10 +10,11 @@
 namespace overlapper {
 namespace {
 
-/// Rounding of a dot product of vectors whose lengths have that product: two that differ by less may be equal.
+/// Rounding error of a dot product; `lengths` is the product of the vectors' lengths. Two values closer than this may
+/// be equal.
 double rounding_of_dot(double lengths) { return 16 * 0x1p-53 * lengths; }
 
-/// Elements already looked at in one flood; one per thread, and forgotten by counting up.
+/// Elements already visited in one flood fill; one object per thread, cleared by counting up.
 class Marks {
  public:
   void begin(int elements) {
@@ -37,9 +38,9 @@ class Marks {
 thread_local Marks flooded;
 thread_local std::vector<int> plateau;
 
-/// An element higher than the plateau around `top`, all of whose elements lie within `slack` of it; -1 if none borders
-/// on it. Where edges have no length or many facets share a plane, neighbours differ by rounding only, and what climbs
-/// would stop at the first of them.
+/// An element higher than the plateau around `top`, or -1 if none borders on the plateau. All elements of the plateau
+/// are within `slack` of `top`. Where edges have no length or many facets share a plane, neighbours differ only by
+/// rounding, and a climb would stop at the first of them.
 template <class Value, class Neighbours>
 int above_plateau(int top, double height, double slack, int elements, Value value, Neighbours neighbours) {
   flooded.begin(elements);
@@ -56,8 +57,8 @@ int above_plateau(int top, double height, double slack, int elements, Value valu
   return found;
 }
 
-/// The place of the largest of values around a ring that rise to it from both sides, as a linear function does around a
-/// convex polygon: that among a few corners, then each time among it and those half as far to either side.
+/// The place of the largest of values around a ring. The values rise to it from both sides, as a linear function does
+/// around a convex polygon. Starts with a few corners, and then halves the step around the best one.
 template <class Value>
 int peak_of_ring(int size, Value value) {
   int stride = 1;
@@ -78,7 +79,7 @@ int peak_of_ring(int size, Value value) {
   return peak;
 }
 
-/// The neighbour of a fan towards which `slope(place)` says that the way is steepest; -1 without a fan.
+/// The neighbour of a fan with the steepest slope, by `slope(place)`; -1 without a fan.
 template <class Slope>
 int steepest(const std::vector<NeighbourFan>& fans, const std::vector<int>& fan_of, int element, Slope slope) {
   if (fan_of.empty() || fan_of[element] < 0) return -1;
@@ -87,13 +88,13 @@ int steepest(const std::vector<NeighbourFan>& fans, const std::vector<int>& fan_
                                     [&](int place) { return slope(fan.neighbour[place]) * fan.inverse[place]; })];
 }
 
-/// Steps after which a climb leaves the rest to a tree, if there is one.
+/// After so many steps, a climb continues in a tree, if there is one.
 constexpr int kMostSteps = 2;
-/// Steps from a cell of a map to the next that are not worth a tree.
+/// Up to so many steps between neighbouring cells of a map, a tree does not pay.
 constexpr int kUsualSteps = 8;
 
-/// `shortcut(top, height)` is the only neighbour to look at, or -1 if all are; `leap(top, height)` an element higher
-/// up, from wherever, or the same one. `steps` is counted up.
+/// `shortcut(top, height)` is the only neighbour to examine, or -1 for all. `leap(top, height)` is a higher element
+/// anywhere, or `top`. `steps` is counted up.
 template <class Value, class Neighbours, class Shortcut, class Leap>
 int climb(int start, double slack, int elements, Value value, Neighbours neighbours, Shortcut shortcut, Leap leap,
           double& height, int& steps) {
@@ -125,7 +126,7 @@ int climb(int start, double slack, int elements, Value value, Neighbours neighbo
   }
 }
 
-/// What climb() leaps by, where better elements lie beyond the plane that `aim(height)` gives.
+/// The leap of climb() by a tree; better elements lie beyond the plane `aim(height)`.
 template <class Aim, class Value>
 auto leap_in(const PointTree& tree, Aim aim, Value value) {
   return
@@ -155,8 +156,8 @@ auto facet_neighbours(const HullGraph& graph, const HullData& hull) {
   };
 }
 
-/// How much more than through facet `f` the ray leaves through another, for those around `f`: the origin is any point
-/// inside, and `rate` one over the length of the ray up to the plane of `f`.
+/// How much sooner the ray leaves through a neighbour of facet `f` than through `f`. The origin is any interior point;
+/// `rate` is 1 / the length of the ray up to the plane of `f`.
 auto facet_slope(const HullData& hull, Vec3 origin, Vec3 direction, double rate) {
   return [&hull, origin, direction, rate](int other) {
     const Plane& plane = hull.planes[other];
@@ -164,7 +165,8 @@ auto facet_slope(const HullData& hull, Vec3 origin, Vec3 direction, double rate)
   };
 }
 
-/// Twins by matching what leaves a vertex with what arrives there; false unless each half-edge has exactly one.
+/// Finds twins by matching the half-edges that leave a vertex with those that arrive; false unless each half-edge has
+/// exactly one.
 bool link(const HullData& hull, HullGraph& graph) {
   const int edges = static_cast<int>(hull.ring.size()), vertices = static_cast<int>(hull.vertices.size());
   graph.next.resize(edges);
@@ -177,7 +179,7 @@ bool link(const HullData& hull, HullGraph& graph) {
       ++graph.around_start[hull.ring[h] + 1];
     }
   for (int v = 0; v < vertices; ++v) graph.around_start[v + 1] += graph.around_start[v];
-  // As many arrive at a vertex as leave it.
+  // As many half-edges arrive at a vertex as leave it.
   std::vector<int> filled(graph.around_start.begin(), graph.around_start.end() - 1), met = filled;
   std::vector<int> leaving(edges), arriving(edges);
   graph.around.resize(edges);
@@ -194,8 +196,8 @@ bool link(const HullData& hull, HullGraph& graph) {
     cancellation_point();
     const int from = hull.ring[h], to = hull.ring[graph.next[h]];
     graph.leaving[from] = h;
-    // The smaller of the degrees at both ends of an edge, summed over those of a planar graph, is in proportion to
-    // their number (Chiba and Nishizeki 1985).
+    // For each edge, take the smaller degree of its two ends. In a planar graph, the sum over all edges is proportional
+    // to their number (Chiba and Nishizeki 1985).
     const int *start = graph.around_start.data(), degree = start[to + 1] - start[to];
     const bool from_smaller = start[from + 1] - start[from] < degree;
     const int end = from_smaller ? from : to;
@@ -224,7 +226,7 @@ bool convex(const HullData& hull, const HullGraph& graph, double rounding) {
   return true;
 }
 
-/// Adds the fan of an element unless one of its neighbours is not on the way inside, but for rounding.
+/// Adds the fan of an element, unless a neighbour is not farther inwards by more than rounding.
 void add_fan(std::vector<NeighbourFan>& fans, std::vector<int>& fan_of, size_t elements, NeighbourFan fan) {
   if (!std::ranges::all_of(fan.inverse, [](double each) { return each > 0 && std::isfinite(each); })) return;
   fan_of.resize(elements, -1);
@@ -260,7 +262,7 @@ void make_fans(const HullData& hull, HullGraph& graph) {
 
 int farthest_vertex_from(const HullData& hull, const HullGraph& graph, Vec3 direction, int start, int& steps) {
   const double size = graph.circumradius * std::sqrt(norm2(direction));
-  // About the centroid, where coordinates are as small as they get.
+  // About the centroid, where coordinates are smallest.
   const auto value = [&](int v) { return dot(hull.vertices[v] - hull.centroid, direction); };
   const auto shortcut = [&](int top, double) {
     return steepest(graph.vertex_fans, graph.fan_of_vertex, top,
@@ -284,7 +286,8 @@ int facet_towards_from(const HullData& hull, const HullGraph& graph, Vec3 from_c
                shortcut, leap_in(graph.facet_tree, aim, value), gauge, steps);
 }
 
-/// The map of so many elements by `nearest(direction, start, steps)`; `plant()` once ways from cell to cell are long.
+/// The map for so many elements by `nearest(direction, start, steps)`. Calls `plant()` once climbs between cells are
+/// long.
 template <class Nearest, class Plant>
 DirectionMap filled(int elements, Nearest nearest, Plant plant) {
   const auto fill = [&](DirectionMap& map, double allowed) {
@@ -299,7 +302,7 @@ DirectionMap filled(int elements, Nearest nearest, Plant plant) {
     return true;
   };
   DirectionMap map(elements);
-  // The way to the first cell, and on a body as long as it is wide, from the end of a row of cells to the next.
+  // Allows the steps to the first cell, and from the end of a row of cells to the next, on a body that is not slender.
   if (fill(map, 4 * std::sqrt(elements))) return map;
   plant();
   map = DirectionMap(elements / 16);
@@ -384,7 +387,7 @@ int HullGraph::facet_towards(const HullData& hull, Vec3 point, double& gauge, in
 
 int HullGraph::ray_exit(const HullData& hull, Vec3 origin, Vec3 direction, double& rate) const {
   if (static_cast<int>(dual.size()) <= kMostScanned) return ray_exit(hull, origin, direction, rate, 0);
-  // Where the ray leaves the ball around the hull is near where it leaves the hull, if that is round.
+  // If the hull is nearly round, the ray leaves the hull near its exit from the ball around the hull.
   const Vec3 from_centroid = origin - hull.centroid;
   const double along = dot(from_centroid, direction), length2 = norm2(direction);
   const double inside = std::max(0.0, circumradius * circumradius - norm2(from_centroid));
@@ -402,13 +405,13 @@ int HullGraph::ray_exit(const HullData& hull, Vec3 origin, Vec3 direction, doubl
   const auto shortcut = [&](int top, double here) {
     return steepest(facet_fans, fan_of_facet, top, facet_slope(hull, origin, direction, here));
   };
-  // Of the polar dual about the centroid, rates above one are points beyond a plane as well.
+  // In the polar dual about the centroid, rates above one are points beyond a plane, too.
   const Vec3 from_centroid = origin - hull.centroid;
   const auto aim = [&](double above) { return PointTree::Beyond{direction + above * from_centroid, above}; };
   const auto leap = leap_in(facet_tree, aim, value);
   int steps = 0;
   const int first = climb(start, 0, facets, value, facet_neighbours(*this, hull), shortcut, leap, rate, steps);
-  // Rates near that of the exit have slacks that are rounded alike.
+  // Near the rate of the exit, slacks have similar rounding.
   const double slack = -signed_distance(hull.planes[first], origin);
   const double rounding = rounding_of_dot(circumradius + norm(from_centroid)) / std::max(slack, inradius * 0x1p-40);
   return climb(first, rate * rounding, facets, value, facet_neighbours(*this, hull), shortcut, leap, rate, steps);

@@ -24,8 +24,8 @@ int corners_of_circle(double tolerance, const char* shape) {
 }
 
 std::vector<Vec3> points_of_capsule(double radius, double half_length, double tolerance) {
-  // A grid of latitudes and longitudes with the same step s lacks at most about s²/2 of the ball.
-  // Two latitudes' worth of points per band: beyond a million or so their hull is out of reach.
+  // A grid of latitudes and longitudes with the same step s lacks at most about s²/2 of the ball. Each band takes two
+  // latitudes of points. A hull of more than about a million points is out of reach.
   require(tolerance >= 1e-5, "tolerance must be 1e-5 or more where method 'paper' tessellates a round shape");
   std::vector<Vec3> points;
   const int bands = std::max(4, static_cast<int>(std::ceil(std::numbers::pi / std::sqrt(2 * tolerance))));

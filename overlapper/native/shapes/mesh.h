@@ -6,24 +6,23 @@
 
 namespace overlapper {
 
-/// A shape with a graph as it was made, with who is next to whom. Boxes are hulls too, here, of which only the sizes
-/// change.
+/// A shape that has a graph, as vertices, facets and neighbours. Boxes are hulls here, too; only their sizes change.
 class Mesh {
  public:
-  /// The shape must stay, and have a graph.
+  /// The shape must outlive the mesh, and have a graph.
   void set(const Shape& shape);
 
   const HullData& data() const { return *data_; }
   const HullGraph& graph() const { return *graph_; }
-  /// m: by how much corners may lie off the planes of facets that were merged; 0 where none were.
+  /// m: largest distance of corners from the planes of merged facets; 0 without merged facets.
   double flat() const { return flat_; }
 
-  // For shapes that give themselves.
+  // For the shapes' give().
 
   void look_at(const HullData& data, const HullGraph& graph, double flat) {
     data_ = &data, graph_ = &graph, flat_ = flat;
   }
-  /// Room for a shape that has no data of its own; it holds what it held.
+  /// Memory for a shape without hull data; it keeps its previous contents.
   std::pair<HullData, HullGraph>& own() { return own_; }
 
  private:

@@ -4,8 +4,8 @@
 
 namespace overlapper {
 
-/// Planes of shapes that this thread has asked for since it began: placed to be held against corners, or given by a
-/// shape as an answer to where a ray leaves it or which plane is tightest about a point.
+/// Number of planes of shapes that this thread has evaluated since it began. A plane counts if it is placed and
+/// compared with corners. A plane also counts as a shape's answer to a ray exit or a tightest plane.
 inline constinit thread_local std::size_t planes_asked = 0;
 
 }  // namespace overlapper

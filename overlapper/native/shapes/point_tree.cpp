@@ -15,7 +15,7 @@ PointTree::PointTree(std::span<const Vec3> points) {
   grow(0, static_cast<int>(points.size()), {inverse(size.x), inverse(size.y), inverse(size.z)});
 }
 
-/// Lengths are compared in multiples of those of all points together.
+/// Lengths are relative to the extents of all points.
 int PointTree::grow(int begin, int end, Vec3 scale) {
   cancellation_point(end - begin);
   const int at = static_cast<int>(nodes_.size());

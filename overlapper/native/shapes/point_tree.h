@@ -10,14 +10,14 @@
 
 namespace overlapper {
 
-/// Points in boxes within boxes: a good one of them, and the best in a time like the logarithm of their number, if few
-/// come near it.
+/// A tree of boxes around points. It finds a good point, or the best point in logarithmic time if few points come near
+/// the best.
 class PointTree {
  public:
   PointTree() = default;
   explicit PointTree(std::span<const Vec3> points);
 
-  /// Where dot(direction, point) > level.
+  /// The half-space dot(direction, point) > level.
   struct Beyond {
     Vec3 direction;
     double level;
@@ -25,8 +25,9 @@ class PointTree {
 
   bool empty() const { return nodes_.empty(); }
 
-  /// The number of a point whose `value(number)` is larger than that of `best`, which `height` is, the largest unless
-  /// too many come near it; `best` if none is found. Those larger than `height` lie beyond the plane `aim(height)`.
+  /// The number of a point with a larger `value(number)` than `best`, whose value is `height`. It is the largest value
+  /// unless too many points come near it. `best` if no point is larger. Points larger than `height` lie beyond the
+  /// plane `aim(height)`.
   template <class Aim, class Value>
   int better(int best, double height, Aim aim, Value value) const {
     std::array<int, kMostDepth> waiting;
@@ -57,10 +58,10 @@ class PointTree {
 
  private:
   static constexpr int kLeaf = 8;
-  /// Boxes looked into: of round bodies, and around rims, fewer hold something better. Along a slender body that lies
-  /// across the axes, all do.
+  /// Most boxes to open. For round bodies and around rims, fewer boxes hold a better point. For a slender body that
+  /// lies across the axes, all boxes do.
   static constexpr int kMostOpened = 128;
-  static constexpr int kMostDepth = 64;  ///< nodes that wait: one for each halving
+  static constexpr int kMostDepth = 64;  ///< nodes that wait, one for each halving
 
   struct Entry {
     Vec3 point;
@@ -69,7 +70,7 @@ class PointTree {
   struct Node {
     Vec3 lower, upper;
     int begin, end;   ///< of the entries
-    int second = -1;  ///< the other child, after the one that follows; -1 of a leaf
+    int second = -1;  ///< the other child; the first child follows directly; -1 for a leaf
   };
 
   static double most(const Node& node, Vec3 d) {
@@ -79,7 +80,7 @@ class PointTree {
   int grow(int begin, int end, Vec3 scale);
 
   std::vector<Node> nodes_;
-  std::vector<Entry> entries_;  ///< those of a box side by side
+  std::vector<Entry> entries_;  ///< the entries of a box are contiguous
 };
 
 }  // namespace overlapper

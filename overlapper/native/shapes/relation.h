@@ -4,19 +4,19 @@
 
 namespace overlapper {
 
-/// What the signs of a pair of polytopes are computed from: where the second body is in the first one's own
-/// coordinates.
+/// The numbers behind the signs of a pair of polytopes: the second body's pose in the first one's own coordinates, with
+/// error bounds.
 struct Relation {
   Pose pose;
-  double reach;  ///< how large the numbers are
-  double flat;   ///< m: flatness of either
-  double doubt;  ///< m: a corner that is nearer to a plane may be on either side of it
-  bool apart;    ///< the balls around the bodies are
+  double reach;  ///< size of the coordinates
+  double flat;   ///< m: sum of the two flatnesses
+  double doubt;  ///< m: a corner nearer to a plane than this may be on either side
+  bool apart;    ///< true if the balls around the bodies are disjoint
 };
 /// Neither body may be round, and the first must be bounded.
 Relation relation(const Placed& first, const Placed& second);
 
-/// m: what signed distances of numbers that large are uncertain by, between polytopes of that flatness.
+/// m: error of signed distances between polytopes of coordinates up to `reach` and of that flatness.
 double doubt_of_signs(double reach, double flat);
 
 }  // namespace overlapper

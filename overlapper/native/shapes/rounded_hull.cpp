@@ -15,12 +15,12 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Facets up to which looking at each takes no longer than a tree.
+/// Up to so many facets, a scan takes no longer than a tree.
 constexpr size_t kMostScanned = 64;
 
 bool scanned(const HullData& hull) { return !hull.graph || hull.ring.size() <= 6 * kMostScanned; }
 
-/// The nearest point of the core to a point outside of it. It lies on a facet that the point sees.
+/// The nearest point of the core to a point outside the core. It lies on a facet that the point sees.
 Foot foot(const RoundedHull& rounded, Vec3 x) {
   const HullData& hull = *rounded.core.data;
   Foot nearest{x, {}, kInfinity};
@@ -33,7 +33,7 @@ Foot foot(const RoundedHull& rounded, Vec3 x) {
     }
     return nearest;
   }
-  // The surface on the way to the centroid is not nearer, but for rounding.
+  // The surface towards the centroid is not nearer, but for rounding.
   const double from_centroid = norm(x - hull.centroid);
   const double rounding = 64 * DBL_EPSILON * (from_centroid + hull.radius) / hull.graph->inradius;
   double gauge;
@@ -53,7 +53,7 @@ Plane highest_plane(const HullData& hull, Vec3 point) {
   return *highest;
 }
 
-/// Sums over the ridges and corners of a polytope of what Steiner's formula asks for.
+/// The sums over ridges and corners of a polytope in Steiner's formula.
 struct Steiner {
   double area = 0, mean_width = 0;  ///< m², m: the volume is V + area r + mean_width r² + 4/3 π r³
   Vec3 of_facets, of_edges, of_corners;
@@ -84,7 +84,7 @@ Steiner steiner(const HullData& hull) {
     // The sum of the outward directions across the ridge: the normals' sum times the tangent of half the angle.
     sums.of_corners += length / 3 * sine / (1 + cosine) * (left + right);
   }
-  // The normals at a corner fill a solid angle as large as what its facets lack of a full turn.
+  // The solid angle of the normals at a corner is a full turn less the angles of its facets.
   for (size_t v = 0; v < defect.size(); ++v) sums.of_corners += defect[v] / 3 * hull.vertices[v];
   return sums;
 }
@@ -125,8 +125,8 @@ Plane RoundedHull::supporting(Vec3 outward) const {
   return {normal, dot(normal, core.support(normal)) + radius};
 }
 
-/// Newton's method for the distance from the core along the ray, a convex function, from outside: every step is the
-/// exit through a supporting plane, and none passes the surface.
+/// Newton's method from outside for the distance from the core along the ray, which is a convex function. Every step is
+/// the exit through a supporting plane, so no step passes the surface.
 Plane RoundedHull::ray_exit(Vec3 origin, Vec3 direction) const {
   const auto leave = [&](const Plane& plane) {
     const double rate = dot(plane.normal, direction);
@@ -141,7 +141,7 @@ Plane RoundedHull::ray_exit(Vec3 origin, Vec3 direction) const {
     }
   } else {
     exit = supporting(direction), t = leave(exit);
-    // Where the ray leaves the core, the plane there is nearer.
+    // The plane where the ray leaves the core is nearer.
     const HullGraph& graph = *core.data->graph;
     double gauge, rate;
     graph.facet_towards(*core.data, origin, gauge);

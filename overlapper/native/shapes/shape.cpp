@@ -28,7 +28,7 @@ void Placed::move_to(Vec3 new_position, Quaternion q) {
   pose = {rotation_matrix(q), new_position};
   const HullData* hull = polytope_of(shape);
   if (!hull || hull->origin == Vec3{}) return;
-  // A hull that is counted from far away may be brought back by its pose: the two nearly cancel.
+  // The pose of a hull with a far origin may bring it back: the two translations nearly cancel.
   pose.translation = rounded(wide_rotation(q) * wide(hull->origin) + wide(new_position));
 }
 

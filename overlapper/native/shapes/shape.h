@@ -25,16 +25,16 @@ namespace overlapper {
 template <ConvexShape... Kinds>
 using OneOf = std::variant<Kinds...>;
 
-/// All kinds of shapes, in the order in which bodies are computed with.
+/// All kinds of shapes, in canonical order.
 using Shape = OneOf<Sphere, Box, Capsule, Cylinder, Hull, HalfSpace, RoundedHull, Ellipsoid OVERLAPPER_MORE_KINDS>;
 
-/// What a question answers of the shape, whatever its kind.
+/// The answer to a question about the shape, whatever its kind.
 template <class Question>
 decltype(auto) ask(const Shape& shape, Question question) {
   return std::visit(question, shape);
 }
 
-/// The same of a shape that is not smooth; of a smooth one, nothing is asked, and the answer is a default value.
+/// The answer to a question about a shape that is not smooth; a default value for a smooth shape.
 template <class Question>
 auto ask_flat(const Shape& shape, Question question) {
   using Answer = decltype(question(std::declval<const Box&>()));
@@ -74,8 +74,8 @@ inline CoreKind core_kind(const Shape& shape) {
 }
 /// True for a cylinder, whose caps have round borders.
 inline bool has_rims(const Shape& shape) { return core_kind(shape) == CoreKind::kRims; }
-/// True for cylinders and stretched ellipsoids: what GJK and EPA find of a core that is curved, they approach, and know
-/// the direction there to half of the digits.
+/// True for cylinders and stretched ellipsoids. GJK and EPA only approach a curved core, and find the direction there
+/// to half of the digits.
 inline bool has_curved_core(const Shape& shape) { return core_kind(shape) != CoreKind::kPolytope; }
 /// A smooth shape is its core (a point, a segment, a polytope) grown by a radius; every other shape is its own core, of
 /// radius 0.
@@ -86,27 +86,27 @@ inline Mat3 core_slope(const Shape& shape, Vec3 direction) {
   return ask(shape, [&](const auto& s) { return s.core_slope(direction); });
 }
 
-/// Nothing unless the shape is a ball, a capsule or a cylinder.
+/// No value unless the shape is a ball, a capsule or a cylinder.
 inline std::optional<Revolution> revolution(const Shape& shape) {
   return ask(shape, [](const auto& s) { return s.revolution(); });
 }
-/// The shape, if it is an ellipsoid and no ball.
+/// The shape, if it is an ellipsoid and not a ball.
 inline const Ellipsoid* stretched(const Shape& shape) {
   return ask(shape, [](const auto& s) -> const Ellipsoid* { return s.stretched(); });
 }
-/// The polytope that a hull is, or that a rounded hull is grown from; null for other shapes.
+/// The polytope of a hull, or the core of a rounded hull; null for other shapes.
 inline const HullData* polytope_of(const Shape& shape) {
   return ask(shape, [](const auto& s) -> const HullData* { return s.polytope(); });
 }
 
-/// All facet planes of a polytope; for a smooth shape a few of its tangent planes that already bound it. About the
-/// shape's origin.
+/// All facet planes of a polytope; for a smooth shape a few tangent planes that already bound it. About the shape's
+/// origin.
 inline void append_planes(const Shape& shape, std::vector<Plane>& planes) {
   ask(shape, [&](const auto& s) { s.append_planes(planes); });
 }
 
-/// How far from its own origin a shape reaches; of a half-space, how far its plane is. For balls, capsules, cylinders,
-/// rounded hulls and ellipsoids, the corner of the box around them.
+/// How far a shape reaches from its own origin; for a half-space, the distance of its plane. For balls, capsules,
+/// cylinders, rounded hulls and ellipsoids, the corner of the box around them.
 inline double radius(const Shape& shape) {
   return ask(shape, [](const auto& s) { return s.bounding_radius(); });
 }
@@ -115,7 +115,7 @@ inline double radius(const Shape& shape) {
 inline int facets(const Shape& shape) {
   return ask_flat(shape, [](const auto& s) { return s.facet_count(); });
 }
-/// The ridges of a box or a hull; none of others.
+/// The ridges of a box or a hull; empty for other shapes.
 inline std::span<const Edge> edges(const Shape& shape) {
   return ask_flat(shape, [](const auto& s) { return s.edges(); });
 }
@@ -125,41 +125,42 @@ inline Plane facet(const Shape& shape, int number) {
 inline Vec3 vertex(const Shape& shape, int number) {
   return ask_flat(shape, [&](const auto& s) { return s.vertex(number); });
 }
-/// A facet by exact numbers, its normal of any length, and of length 1. Nothing where rounding has merged several.
+/// A facet from exact numbers, with its normal of any length and of length 1. No value if rounding has merged several
+/// facets.
 inline std::optional<WidePlane> wide_facet(const Shape& shape, int number) {
   return ask_flat(shape, [&](const auto& s) { return s.wide_facet(number); });
 }
 inline std::optional<WidePlane> unit_facet(const Shape& shape, int number) {
   return ask_flat(shape, [&](const auto& s) { return s.unit_facet(number); });
 }
-/// True if the shape has a Mesh: a box, or a hull that can be climbed.
+/// True if the shape has a Mesh: a box, or a hull with a graph.
 inline bool has_graph(const Shape& shape) {
   return ask_flat(shape, [](const auto& s) { return s.has_graph(); });
 }
 
-/// The hull of points of a bounded shape that lacks no more than that fraction of its volume. Throws
-/// std::invalid_argument for shapes that method "paper" does not take.
+/// The hull of points of a bounded shape that lacks at most that fraction of its volume. Throws std::invalid_argument
+/// for shapes that method "paper" does not take.
 Hull inscribed(const Shape& shape, double tolerance);
 
-/// How far a shape reaches from its own origin at most; of a half-space, how far its plane is.
+/// Upper bound of how far a shape reaches from its own origin; for a half-space, of the distance of its plane.
 inline double reach(const Shape& shape) {
   return ask(shape, [](const auto& s) { return s.reach(); });
 }
 
-/// m: by how much planes of facets that are not quite flat miss their corners.
+/// m: largest distance of a corner from the plane of its facet, for facets that are not quite flat.
 double flatness(const Shape& shape);
 
-/// Where the coordinates of a hull's data, and of a rounded hull's, begin.
+/// The origin of the coordinates of a hull's or a rounded hull's data.
 inline Vec3 data_origin(const Shape& shape) {
   const HullData* hull = polytope_of(shape);
   return hull ? hull->origin : Vec3{};
 }
 
-/// A shape and where it is. `pose` maps the shape's own coordinates (a hull's are about HullData::origin) to the world.
+/// A shape and its pose. `pose` maps the shape's own coordinates (for a hull, about HullData::origin) to the world.
 struct Placed {
   Shape shape;
   Vec3 position;
-  Quaternion orientation;  ///< as it came, of any length: dividing by that rounds, and wider arithmetic need not
+  Quaternion orientation;  ///< as given, of any length, for wider arithmetic: normalizing rounds
   Pose pose;
 
   Vec3 support(Vec3 direction) const;
@@ -167,19 +168,18 @@ struct Placed {
   Plane ray_exit(Vec3 origin, Vec3 direction) const;
   Plane tightest(Vec3 point) const;
 
-  /// Throws std::invalid_argument, and stays where it is, unless the numbers are finite and the quaternion is not zero.
+  /// Throws std::invalid_argument and keeps the old pose unless the numbers are finite and the quaternion is not zero.
   void move_to(Vec3 new_position, Quaternion new_orientation);
 
-  /// The same body with coordinates counted from `reference`: relative poses keep the digits that world ones lose.
+  /// The same body in coordinates about `reference`: relative poses keep digits that world poses lose.
   Placed seen_from(Vec3 reference) const;
 };
 static_assert(ConvexOracle<Placed>);
 
 Placed make_placed(Shape shape, Vec3 position, Quaternion orientation);
 
-/// How large the numbers are that the points of a body are computed from, none of which is farther than `extent` from
-/// where coordinates are counted from: so large, unless the body is a hull far from its own origin, for rotating and
-/// adding that origin rounds, too.
+/// Size of the numbers behind a body's points, if no point is farther than `extent` from the origin of coordinates. It
+/// is `extent`, or larger for a hull far from its own origin: rotating and adding that origin rounds, too.
 double reach(const Placed& body, double extent);
 
 /// The box around a placed shape; infinite for a half-space.

@@ -20,17 +20,17 @@ inline void store(double* p, const Lanes& v) {
   std::memcpy(p, &v, sizeof v);
 }
 
-/// A convex polytope, or some of its facets with the edges between them, as columns.
+/// A convex polytope, or some of its facets with the edges between these facets, as columns.
 struct Solid {
   bool whole = false;
   int vertices = 0, facets = 0;
-  int stride = 0;                          ///< facets rounded up; the rest are planes that hold everything inside
+  int stride = 0;                          ///< number of facets, padded by planes with everything inside
   std::vector<double> x, y, z;             ///< of vertices
   std::vector<double> nx, ny, nz, offset;  ///< of planes
-  std::vector<double> doubt;               ///< m: how far off each vertex may be, beside the rounding of all numbers
-  std::vector<int> owner;                  ///< of planes: the body
+  std::vector<double> doubt;               ///< m: error of each vertex, beside the rounding of all numbers
+  std::vector<int> owner;                  ///< of planes: number of the body
   std::span<const Edge> edges;
-  std::vector<Edge> own_edges;  ///< what `edges` looks at, unless that is the shape's
+  std::vector<Edge> own_edges;  ///< memory for `edges`, unless the shape has them
 
   Vec3 vertex(int i) const { return {x[i], y[i], z[i]}; }
   Vec3 normal(int f) const { return {nx[f], ny[f], nz[f]}; }
@@ -55,10 +55,10 @@ struct Ball {
   double radius;
 };
 
-/// A bounded polytope in the coordinates of `pose`, or a half-space. Planes that fill up the stride are `beyond` away.
+/// A bounded polytope in the coordinates of `pose`, or a half-space. Planes that pad the stride are `beyond` away.
 void set_solid(Solid& solid, const Placed& body, int owner, const Pose* pose, double beyond);
 
-/// Keeps those planes and edges of a body that a ball reaches; false if the ball is outside of one of the planes.
+/// Keeps the planes and edges of a body that a ball reaches; false if the ball is outside one of the planes.
 bool set_part(Solid& solid, const Placed& body, int owner, const Pose& pose, const Ball& ball, double beyond);
 
 }  // namespace overlapper

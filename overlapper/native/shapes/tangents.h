@@ -5,7 +5,7 @@
 
 #include "geometry/wide.h"
 
-/// What several shapes compute alike: where rays leave balls and discs, and the planes that are tangent there.
+/// Geometry that several shapes share: exits of rays from balls and discs, with their tangent planes.
 namespace overlapper::tangents {
 
 inline double sign(double x) { return x < 0 ? -1 : 1; }
@@ -18,14 +18,14 @@ inline double radial(Vec3 v) { return std::hypot(v.x, v.y); }
 /// A vector without its component along z.
 inline WideVector across(const WideVector& v) { return {v.x, v.y, {}}; }
 
-/// The smallest t >= 0 at which |q + t d|² = r², for q inside. The form without cancellation of the two usual ones.
+/// The smallest t >= 0 with |q + t d|² = r², for q inside. Uses the one of the two usual forms that does not cancel.
 inline double leave_disc(double qq, double qd, double dd, double r) {
   const double inside = std::max(0.0, r * r - qq);
   const double root = std::sqrt(qd * qd + dd * inside);
   return qd > 0 ? inside / (qd + root) : (root - qd) / dd;
 }
 
-/// Where the ray from q, inside, leaves the ball (or disc, for vectors without a third component) about the origin.
+/// The exit of the ray from q, inside, from the ball about the origin; from the disc for vectors with z = 0.
 inline WideVector leave_ball(const WideVector& q, const WideVector& d, double radius) {
   const DoubleDouble length = norm(q), r{radius}, dd = dot(d, d), qd = dot(q, d);
   DoubleDouble inside = (r - length) * (r + length);
@@ -45,7 +45,7 @@ inline WidePlane tangent(const WideVector& outward, const WideVector& centre, do
   return {direction, dot(direction, centre) + DoubleDouble{radius}};
 }
 
-/// The derivative, by the direction, of the point of a circle about z that is farthest along the direction.
+/// The derivative, by the direction, of the farthest point of a circle about z along the direction.
 inline Mat3 slope_of_circle(double radius, Vec3 direction) {
   const Vec3 tangent{-direction.y, direction.x, 0};
   const double across = radial(direction), curved = radius / (across * across * across);

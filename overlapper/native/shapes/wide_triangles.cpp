@@ -15,7 +15,7 @@ WideTriangles::WideTriangles(const HullData* hull) : hull_(hull) {
   if (!hull) return;
   for (const auto& [i, j, k] : hull->triangles) {
     const Vec3 a = hull->corners[i], b = hull->corners[j], c = hull->corners[k];
-    // An ulp of each corner's difference and product, as in orientation().
+    // One ulp for each difference of corners and each product, as in orientation().
     const Vec3 normal = cross(b - a, c - a);
     const double length = norm(normal);
     const double doubt = length > 0 ? 16 * 0x1p-53 * (1 + norm(b - a) * norm(c - a) / length) : kInfinity;

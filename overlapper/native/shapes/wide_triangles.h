@@ -8,23 +8,23 @@ namespace overlapper {
 
 struct HullData;
 
-/// The triangles of a hull, made ready for double-double arithmetic. Doubles rule out most of them at a glance.
+/// The triangles of a hull, prepared for double-double arithmetic. Doubles exclude most of them quickly.
 class WideTriangles {
  public:
-  /// Of no hull if that is null; it must stay.
+  /// `hull` must outlive this; empty if it is null.
   explicit WideTriangles(const HullData* hull);
 
   int size() const { return static_cast<int>(glances_.size()); }
   /// The plane of a triangle moved out by a radius.
   WidePlane plane(int triangle, double radius) const;
-  /// The plane among these, of the triangles themselves, with the least slack at a point.
+  /// The plane of the triangle with the least slack at a point, without a radius.
   WidePlane tightest(const WideVector& point) const;
 
  private:
-  /// A facet's triangle, as doubles know it: enough to tell that it is not the one looked for.
+  /// A triangle's plane in doubles: enough to exclude it from a search.
   struct Glance {
     Vec3 corner, normal;
-    double doubt;  ///< of the normal's direction
+    double doubt;  ///< error of the normal's direction
   };
 
   const HullData* hull_;
