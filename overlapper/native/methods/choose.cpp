@@ -48,7 +48,8 @@ Traits operator+(const Traits& a, const Traits& b) {
           a.other || b.other};
 }
 
-/// Line by line, so that the compiler sees what each asks: a search through pointers is felt by two boxes apart.
+/// Unrolled line by line, so that the compiler sees each condition: a search through pointers slows down two separated
+/// boxes.
 template <size_t kLine>
 const Choice& first_that_fits(const Traits& traits) {
   constexpr const Choice& choice = kChoices[kLine];
@@ -112,7 +113,7 @@ double wide_rounding(double reach) { return 0x1p-96 * reach; }
 
 namespace {
 
-/// True if one of the bodies is bounded, or the half-spaces close up: the origin is strictly inside the hull of their
+/// True if one body is bounded, or the half-spaces bound a set: the origin is strictly inside the hull of their
 /// normals.
 bool bounds_space(std::span<const Placed> bodies) {
   ExpandingHull normals;
@@ -161,14 +162,14 @@ std::vector<OwnedPlane> facing_planes(std::span<const Placed> bodies, const Dist
   return planes;
 }
 
-/// What double-doubles say of a gap or of a common ball where doubles are not sure: nothing new where they are not
-/// either.
+/// The answer of double-double arithmetic about a gap or a common ball, if doubles are uncertain. Empty if
+/// double-doubles are uncertain, too.
 struct Settled {
   Status status = Status::kTouching;
   std::optional<WideBall> ball;
 };
 
-/// The sizes that count are the same for a mirror image, for other axes and for another order.
+/// The relevant sizes do not depend on mirror images, axes and order.
 Settled settled_in_wide_arithmetic(const Arrangement& at, double reach, std::vector<OwnedPlane> hints) {
   const double plane_rounding = wide_rounding(reach);
   double least_size = kInfinity, largest_size = 0;
@@ -181,7 +182,8 @@ Settled settled_in_wide_arithmetic(const Arrangement& at, double reach, std::vec
   }
   if (!std::isfinite(least_size)) return {};
   const std::vector<WideBody> bodies = at.wide_bodies();
-  // Nearer or thinner than the rounding of their coordinates, bodies touch, but not by 1e-12 of the smaller one's size.
+  // Bodies touch if their distance or common thickness is below the rounding of their coordinates, but never above
+  // 1e-12 of the smaller body's size.
   const double margin = std::max(4 * plane_rounding, std::min(rounding(largest_size / 2), 0x1p-41 * least_size));
   if (bodies.size() == 2) {
     const WideGap gap = wide_gap(bodies[0], bodies[1], plane_rounding);
@@ -194,14 +196,14 @@ Settled settled_in_wide_arithmetic(const Arrangement& at, double reach, std::vec
   return settled;
 }
 
-/// True if the bodies overlap beyond doubt because the cores of the two are nearer to each other than their radii
-/// reach: a point of one core is then inside the other body, and near it are points inside its own.
+/// True if the bodies certainly overlap because the distance of their cores is less than the sum of their radii. A
+/// point of one core is then inside the other body, with interior points of its own body nearby.
 bool cores_reach(const Placed& a, const Placed& b, const Distance& d, double reach) {
   return core_radius(a.shape) + core_radius(b.shape) > 0 && norm2(d.normal) > 0 && -d.distance > doubt(reach);
 }
 
-/// Between the nearest points of two cores that reach each other, one that the radii of both reach: about in the middle
-/// of what both reach of that way. Nothing where one of them is its own core.
+/// A point inside both bodies, about in the middle of what both radii reach between the nearest points of the cores. No
+/// value if one body is its own core.
 std::optional<Vec3> point_between(const Placed& a, const Placed& b, const Distance& d) {
   const auto inward = [](const Shape& shape) { return bounded(shape) ? core_radius(shape) : kInfinity; };
   const double depth = -d.distance, from_a = inward(a.shape), from_b = inward(b.shape);
@@ -288,7 +290,8 @@ Region grown(const Arrangement& at, const Inside& inside, double reach, double t
 
 namespace {
 
-/// The formula's answer where it is as good as a polytope's: where its terms nearly cancel, that knows more.
+/// The closed form's answer, if it is as accurate as a polytope's. Where its terms nearly cancel, the polytope is more
+/// accurate.
 std::optional<MeasuresAndInertia> by_formula(const OverlappingBodies& overlapping, double finest) {
   const Arrangement& at = overlapping.at;
   auto found = closed_form(at.relative[0], at.relative[1], rounding(overlapping.search().reach), at.reference);
@@ -303,8 +306,8 @@ MeasuresAndInertia by_region(const Region& region, std::span<const Placed> bodie
   return answer;
 }
 
-/// The region about the middle of the largest ball that double-doubles find, if there is one: the point about which
-/// doubles grow a region may not be inside after all, or its frame not be round.
+/// The region about the middle of the largest ball in double-double, if there is one. The point for doubles may not be
+/// inside after all, or its frame may not be round.
 std::optional<Region> grown_in_wide_arithmetic(const OverlappingBodies& overlapping) {
   const double reach = overlapping.search().reach, plane_rounding = wide_rounding(reach);
   const Arrangement& at = overlapping.at;
@@ -314,7 +317,7 @@ std::optional<Region> grown_in_wide_arithmetic(const OverlappingBodies& overlapp
   return grown_about(ball, at, reach, overlapping.tolerance);
 }
 
-/// The error of a volume, without bound where rounding has turned the polytope inside out.
+/// The relative error of a volume; infinite if rounding has turned the polytope inside out.
 double error_of(const Measures& m) { return m.volume > 0 && m.volume_error >= 0 ? m.volume_error : kInfinity; }
 
 WideVector point_inside(const OverlappingBodies& overlapping) {
@@ -388,7 +391,7 @@ MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping) {
   if (choice.tries(Way::kSlicing) &&
       !(formula && error_of(formula->measures) <= kEnoughOfRound * formula->measures.volume)) {
     if (const auto& sliced = overlapping.sliced()) return *sliced;
-    // Where slices give up, features lie so near each other that a formula, too, may take one for another.
+    // If slices give up, features lie so near each other that a closed form may confuse them, too.
     if (formula && !(error_of(formula->measures) <= kSureOfFormula * formula->measures.volume)) formula.reset();
   }
   if (in_doubt) return by_region(overlapping.region(), overlapping.bodies, Way::kWideDual);

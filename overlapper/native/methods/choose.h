@@ -16,24 +16,24 @@
 
 namespace overlapper {
 
-/// What the choice of a way depends on.
+/// The properties of a pair or group that the choice of a way depends on.
 struct Traits {
   int bodies;
-  bool bounded;           ///< one of them is
-  bool clippable;         ///< half-spaces, boxes, closed hulls of at most kMostFacetsClipped facets
-  bool many_facet_pairs;  ///< two boxes or hulls that can be climbed, with more than kLeastPairsTraced
-  bool round;             ///< one of them is a ball, a capsule or a cylinder
-  bool rounded;           ///< one of them is a rounded hull
-  bool stretched;         ///< one of them is an ellipsoid whose axes differ
-  bool flat;              ///< one of them is a box, a hull or a half-space
-  bool other;             ///< one of them is smooth, and none of these kinds
+  bool bounded;           ///< at least one body is
+  bool clippable;         ///< only half-spaces, boxes and closed hulls of at most kMostFacetsClipped facets
+  bool many_facet_pairs;  ///< two boxes or hulls with graphs, with more than kLeastPairsTraced pairs of facets
+  bool round;             ///< at least one ball, capsule or cylinder
+  bool rounded;           ///< at least one rounded hull
+  bool stretched;         ///< at least one ellipsoid with different axes
+  bool flat;              ///< at least one box, hull or half-space
+  bool other;             ///< at least one smooth body of another kind
 };
 Traits traits(const Placed& a, const Placed& b);
 Traits traits(std::span<const Placed> bodies);
 
-/// A line of the table: which bodies, and the ways that are tried in turn until one answers. Before kDual, the status
-/// is found by a search for a plane between the bodies or a ball inside all of them; where kDual leaves more than
-/// kEnough of the volume in doubt, kWideDual follows it.
+/// A line of the table: a condition on the bodies, and the ways to try in turn until one answers. Before kDual, a
+/// search finds the status: a plane between the bodies, or a ball inside all of them. If kDual leaves more than kEnough
+/// of the volume in doubt, kWideDual follows.
 struct Choice {
   const char* bodies;
   bool (*fits)(const Traits&);
@@ -42,8 +42,8 @@ struct Choice {
   bool tries(Way way) const { return std::ranges::find(ways, way) != ways.end(); }
 };
 
-/// How bodies are measured. The first line that fits counts, for single calls, batches and groups alike. Numbers of
-/// facets and errors that count are in geometry/thresholds.h.
+/// The choice of ways. The first line that fits counts, for single calls, batches and groups alike. Limits for facets
+/// and errors are in geometry/thresholds.h.
 inline constexpr std::array<Choice, 7> kChoices{{
     {"two boxes or hulls of many facets",
      [](const Traits& t) { return t.many_facet_pairs && t.clippable; },
@@ -67,13 +67,13 @@ inline constexpr std::array<Choice, 7> kChoices{{
 }};
 const Choice& choose(const Traits& traits);
 
-/// What the ways before the search give: the status beyond doubt, and the measures where doubles, or corners in
-/// double-doubles, place the volume within kEnough of itself. Nothing where signs are in doubt, and for round bodies.
+/// The answer of the ways before the search: a certain status, and measures if the error of the volume is within
+/// kEnough of the volume. Corners may be placed in double-double. No value if signs are uncertain, or for round bodies.
 std::optional<Measures> measure_at_once(const Placed& a, const Placed& b);
 std::optional<Measures> measure_at_once(std::span<const Placed> bodies);
 
-/// Bodies in the order in which they are computed with, about a reference near them: the bits of an answer then do not
-/// depend on the caller's order, and keep the digits that coordinates of the world would lose.
+/// The bodies in canonical order, relative to a reference near them. The bits of an answer then do not depend on the
+/// caller's order. Coordinates keep the digits that world coordinates would lose.
 struct Arrangement {
   std::vector<int> order;
   std::vector<Placed> relative;
@@ -83,79 +83,79 @@ struct Arrangement {
 };
 Arrangement arranged(std::span<const Placed> bodies);
 
-/// What is found by looking for the largest ball inside all bodies.
+/// The result of a search for the largest ball inside all bodies.
 struct Inside {
   std::vector<OwnedPlane> planes;  ///< of all bodies
   DeepestBall ball{};
-  std::optional<WideBall> wide_ball;  ///< where it had to be looked for in double-doubles
+  std::optional<WideBall> wide_ball;  ///< set if the search needed double-double
 };
 
-/// What is found by looking for a plane between the bodies, then, if there may be none, for a ball inside all of them.
+/// The result of a search for a plane between the bodies and, if there may be none, for a ball inside all of them.
 struct Search {
   Status status = Status::kSeparated;
-  Way way = Way::kSeparation;     ///< by which the status is known; kDual or kWideDual if overlapping
-  std::vector<double> reaches;    ///< how large the numbers are that describe each body
-  double reach = 0;               ///< the largest
-  std::vector<OwnedPlane> hints;  ///< for whoever looks for a ball
-  std::optional<Vec3> between;    ///< a point inside both, beyond doubt, of a pair whose rounded cores are apart
-  std::optional<Inside> inside;   ///< nothing where the status was known without
+  Way way = Way::kSeparation;     ///< the way that gave the status; kDual or kWideDual if overlapping
+  std::vector<double> reaches;    ///< size of the numbers that describe each body
+  double reach = 0;               ///< the largest of `reaches`
+  std::vector<OwnedPlane> hints;  ///< planes for a search for a ball to start with
+  std::optional<Vec3> between;    ///< a point certainly inside both, if the rounded cores of a pair are separated
+  std::optional<Inside> inside;   ///< no value if the status was known without it
 };
 /// Throws std::invalid_argument if the common set is unbounded.
 Search search(const Arrangement& at);
 
-/// The ball of bodies that overlap, where the search has not looked for it.
+/// The ball of bodies that overlap, if the search has not found it yet.
 Inside look_inside(const Arrangement& at, const Search& found);
 
-/// m³: what the common set of bodies that only touch may hold. The inradius is rounding, and a convex set's volume is
-/// at most its inradius times its surface, which is no larger than that of a box around any of the bodies.
+/// m³: upper bound of the common volume of bodies that only touch. The inradius is rounding error. The volume of a
+/// convex set is at most its inradius times its surface. Its surface is at most that of a box around any of the bodies.
 double touching_volume(std::span<const Placed> bodies, const DeepestBall& ball);
 
-/// How large the numbers are that describe a body about the point from which `relative` counts, the corners that its
-/// facets miss included.
+/// Size of the numbers that describe a body in the coordinates of `relative`, including corners that its facets miss.
 double magnitude(const Placed& relative);
 
-/// m: how far rounding in double-double may move a plane of bodies that reach so far.
+/// m: bound of a plane's movement by rounding in double-double, for bodies of that reach.
 double wide_rounding(double reach);
 
-/// The polytope of bodies that overlap, by dual points; owners are numbers of the bodies as given.
+/// The polytope of bodies that overlap, by dual points; owners are the numbers of the bodies as given.
 Region grown(const Arrangement& at, const Inside& inside, double reach, double tolerance);
 
-/// Bodies that overlap, with what has been found of them, or is found when asked for.
+/// Bodies that overlap, with known results and results on demand.
 struct OverlappingBodies {
   const Arrangement& at;
   std::span<const Placed> bodies;
   double tolerance;
-  bool traced;  ///< by measure_at_once()
+  bool traced;  ///< true if measure_at_once() used tracing
   std::function<const Search&()> search;
   std::function<const Inside&()> inside;
   std::function<const Region&()> region;  ///< owners are numbers of `bodies`
   std::function<const std::optional<MeasuresAndInertia>&()> sliced;
 };
-/// The region of bodies that overlap as right as any way makes it: of polyhedra, with planes placed in double-doubles.
-/// Owners are numbers of the bodies as given.
+/// The most accurate region of bodies that overlap: for polyhedra, with planes placed in double-double. Owners are the
+/// numbers of the bodies as given.
 Region finest_region(const OverlappingBodies& overlapping);
 
-/// By slices of the round shapes themselves, whatever the tolerance. Nothing for bodies that have another way, or where
+/// Measures by slices of the round shapes themselves, for any tolerance. No value for bodies with another way, or if
 /// slicing gives up.
 std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping);
 
-/// How much the measures of slices change while the surface of one body moves from as far in as surfaces may have been
-/// moved to as far out: by rounding, and by what changes the volume by its error if it moves all of them. The common
-/// set grows with it, and of convex sets so do volume and area; and that body lays bare more and more of the other
-/// one's surface, and covers more of its own. The truth, and what is stated, lie between. Where surfaces are tangent
-/// but for that, the strip that changes hands is as wide as the root of how far they move, and where they coincide it
-/// is all of a facet: no slope tells that.
+/// The change of the measures by slices while the surface of one body moves between its error bounds, from inside to
+/// outside. The bounds include rounding and the movement that alone would explain the error of the volume.
+///
+/// Volume and area of convex sets are monotone under inclusion. A growing body exposes less of the other body's surface
+/// and more of its own. The true values and the stated values therefore lie between the two ends. Where surfaces are
+/// nearly tangent, the strip of uncertain owner is as wide as the square root of the movement. Where surfaces coincide,
+/// it is a whole facet. No derivative shows that.
 struct Spread {
   double volume, area;  ///< m³, m²
-  double owned;         ///< m²: what changes hands
+  double owned;         ///< m²: area of uncertain owner
 };
-/// Nothing where slicing gives up.
+/// No value if slicing gives up.
 std::optional<Spread> spread(const OverlappingBodies& overlapping, const Measures& sliced, const Measures& stated);
 
-/// The patch of a pair with such measures, by slices. Nothing where sliced() has nothing.
+/// The patch of a pair with these measures, by slices. No value where sliced() has none.
 std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, const Measures& measures);
 
-/// What measure_at_once() cannot measure well enough.
+/// Measures of bodies for which measure_at_once() is not accurate enough.
 MeasuresAndInertia measure_in_full(const OverlappingBodies& overlapping);
 
 }  // namespace overlapper

@@ -21,17 +21,17 @@
 namespace overlapper {
 namespace {
 
-/// The minimal step of the 26 shifts, as a fraction of the smaller polytope's extent. The text gives no number. Half of
-/// a double's digits are spent on getting off the boundary, half are left to the dual points.
+/// The minimal step of the 26 shifts, as a fraction of the smaller polytope's extent. The article gives no number. Half
+/// of a double's digits go into leaving the boundary; half remain for the dual points.
 constexpr double kMinimalStep = 0x1p-26;
 
-/// A polytope on the way up the tree, in the common coordinates, and the body that each of its facets came from.
+/// A polytope of the tree in the common coordinates, with the source body of each facet.
 struct Part {
   std::shared_ptr<const HullData> hull;
   std::vector<int> owner;
 };
 
-/// Nothing, or a polytope, or less than a solid.
+/// A polytope, or nothing, or a flat set.
 struct Intersection {
   Status status = Status::kSeparated;
   Part part;
@@ -46,7 +46,8 @@ Part placed_part(const Hull& hull, const Pose& pose, int owner) {
   return {data, std::vector<int>(data->planes.size(), owner)};
 }
 
-/// A cube in the half-space, one face in its plane, that holds all of it that the other bodies can reach.
+/// A cube in the half-space with one face in its plane. It contains the part of the half-space that the other bodies
+/// can reach.
 Hull stand_in(const Plane& plane, std::span<const Placed> bodies) {
   double reach = 0;
   for (const Placed& body : bodies) {
@@ -56,7 +57,7 @@ Hull stand_in(const Plane& plane, std::span<const Placed> bodies) {
   }
   if (reach == 0) throw std::invalid_argument("shapes must have a bounded one among them for method 'paper'");
   const Vec3 n = plane.normal, u = any_orthogonal(n), v = cross(n, u);
-  // A plane farther away than that cuts off all or nothing, and the cube would be a needle.
+  // A plane farther away cuts off all or nothing, and the cube would be a needle.
   const double offset = std::clamp(plane.offset, -2 * reach, 2 * reach), depth = std::max(0.0, reach + offset);
   std::vector<Vec3> corners;
   for (double a : {-2.0, 2.0})
@@ -94,8 +95,8 @@ bool shift_inside(const Part& a, const Part& b, double on_boundary, Vec3& point)
   return false;
 }
 
-/// The planes through the vertex dual to a face of the first hull: its own three, and where more planes meet in one
-/// point, those of the faces around it that have the same dual.
+/// The planes through the vertex dual to a face of the first hull: the face's own three planes. If more planes meet in
+/// that point, also the planes of neighbouring faces with the same dual.
 std::vector<int> planes_through(const ExpandingHull& dual, int face, std::span<const Vec3> vertex_of_face,
                                 double same) {
   std::vector<int> planes, stack{face};
@@ -114,15 +115,15 @@ std::vector<int> planes_through(const ExpandingHull& dual, int face, std::span<c
   return planes;
 }
 
-/// The source plane that a facet of the second hull lies in: of those through its corners, the one that all corners fit
-/// best. `tried` has an element per plane, -1 before the first call.
+/// The source plane of a facet of the second hull: of the planes through its corners, the best fit for all corners.
+/// `tried` has an element per plane, -1 before the first call.
 int plane_of_facet(const HullData& hull, int facet, std::span<const std::vector<int>> planes_at,
                    std::span<const Plane> planes, std::span<int> tried) {
   int best = -1;
   double least = std::numeric_limits<double>::infinity();
   for (int corner : hull.facet(facet)) {
     for (int p : planes_at[corner]) {
-      // Once for all corners that it passes through, and no further than up to one that it misses.
+      // Tries each plane once, and stops at the first corner that misses it.
       if (std::exchange(tried[p], facet) == facet) continue;
       double misfit = 0;
       const auto ring = hull.facet(facet);
@@ -134,8 +135,8 @@ int plane_of_facet(const HullData& hull, int facet, std::span<const std::vector<
   return best;
 }
 
-/// Steps 3 to 5: the dual points of all planes about `origin`, their hull, the dual of its faces, and the hull of
-/// those.
+/// Steps 3 to 5: the dual points of all planes about `origin`, their hull, the dual of its faces, and the hull of that
+/// dual.
 Intersection intersect_about(const Part& a, const Part& b, Vec3 origin) {
   ExpandingHull dual;
   std::vector<Plane> planes;
@@ -163,7 +164,7 @@ Intersection intersect_about(const Part& a, const Part& b, Vec3 origin) {
   std::vector<int> source;
   const auto hull = hull_of(vertices, &source);
   if (!hull) return {Status::kTouching, {}};
-  // So thin that rounding has put its centre outside: there is no solid to speak of.
+  // If rounding has put the centre of a thin polytope outside, it counts as flat.
   for (const Plane& plane : hull->planes)
     if (!(signed_distance(plane, hull->centroid) < 0)) return {Status::kTouching, {}};
   std::vector<std::vector<int>> planes_at;
@@ -190,7 +191,7 @@ Intersection intersect(const Part& a, const Part& b) {
   return intersect_about(a, b, point);
 }
 
-/// What another thread computes, which ends early if `given_up` tells it to.
+/// The result of another thread; the wait ends early if `given_up` is set.
 Intersection wait_for(std::future<Intersection>& answer, std::atomic<bool>& given_up) {
   try {
     while (answer.wait_for(cancellation::kPatience) == std::future_status::timeout) cancellation::look_at_clock();
@@ -201,13 +202,13 @@ Intersection wait_for(std::future<Intersection>& answer, std::atomic<bool>& give
   }
 }
 
-/// Step 6. A level's pairs run side by side; a body without a partner waits for the next level.
+/// Step 6. The pairs of a level run in parallel; a body without a partner waits for the next level.
 Intersection intersect_tree(std::vector<Part> parts) {
   while (parts.size() > 1) {
     std::atomic<bool> given_up{false};
     std::vector<std::future<Intersection>> pairs;
     for (size_t i = 0; i + 1 < parts.size(); i += 2) {
-      // The last pair of a level is computed here, when it is asked for, so that one pair alone costs no thread.
+      // The last pair of a level runs on this thread, on demand: one pair alone needs no thread.
       const auto policy = i + 3 < parts.size() ? std::launch::async : std::launch::deferred;
       pairs.push_back(std::async(policy, [&, i, asking = std::this_thread::get_id()] {
         if (std::this_thread::get_id() != asking) cancellation::given_up = &given_up;
@@ -271,7 +272,7 @@ PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double toleran
   if (common.status != Status::kOverlapping) return result;
   result.region = region_of(common.part);
   result.region->facets_touched = planes;
-  // So thin that rounding has turned it inside out: there is no solid to speak of.
+  // If rounding has turned a thin polytope inside out, it counts as flat.
   if (!(measure(*result.region, bodies).measures.volume > 0)) return {Status::kTouching, std::nullopt};
   return result;
 }

@@ -10,7 +10,7 @@ namespace overlapper {
 
 struct PaperResult {
   Status status = Status::kSeparated;
-  std::optional<Region> region;  ///< set if overlapping; its reference is the bodies' own
+  std::optional<Region> region;  ///< set if overlapping; relative to the bodies' own reference
 };
 
 /// The common set of two or more bodies by the method of Tereshchenko, Chevokin and Fisunenko, "Algorithm for finding

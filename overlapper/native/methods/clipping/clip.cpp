@@ -18,7 +18,7 @@ struct Workspace : TableClipping {
   std::vector<int> apex;          ///< per facet: one of its vertices, or -1
   std::vector<double> cone;       ///< per facet: six times the volume of the cone from the origin
   std::vector<double> extent;     ///< per vertex: the sum of its coordinates over their size
-  std::vector<Vec3> area_vector;  ///< per facet: twice its
+  std::vector<Vec3> area_vector;  ///< per facet: twice its area vector
   std::vector<WideLanes> wide_planes;
 };
 
@@ -27,7 +27,7 @@ Workspace& workspace() {
   return kept;
 }
 
-/// Counts coordinates from the middle of the vertices, which it returns.
+/// Makes coordinates relative to the middle of the vertices, and returns the middle.
 Vec3 centre(std::span<Vec3> vertices) {
   Vec3 middle;
   for (Vec3 v : vertices) middle += v;
@@ -36,7 +36,7 @@ Vec3 centre(std::span<Vec3> vertices) {
   return middle;
 }
 
-/// Two vectors, the coordinates of both side by side.
+/// Two vectors, with their coordinates side by side.
 struct TwoVectors {
   TwoLanes x, y, z;
 };
@@ -52,7 +52,7 @@ inline TwoVectors cross(const TwoVectors& a, const TwoVectors& b) {
 inline TwoLanes norm2(const TwoVectors& a) { return dot(a, a); }
 inline Vec3 lane(const TwoVectors& a, int k) { return {a.x[k], a.y[k], a.z[k]}; }
 
-/// Calls `use(e, f, two)` for edges two by two; of an odd number the last one is alone, and `f` is the same.
+/// Calls `use(e, f, two)` for edges two at a time. For an odd number the last call has one edge: `f` equals `e`.
 template <class Use>
 void for_each_two(std::span<const Edge> edges, Use use) {
   for (size_t i = 0; i < edges.size(); i += 2) {
@@ -61,10 +61,10 @@ void for_each_two(std::span<const Edge> edges, Use use) {
   }
 }
 
-/// Sums over the common polytope that clipping has left, its vertices counted from a point inside.
+/// Sums over the common polytope from clipping. Its vertices are relative to a point inside.
 class Sums {
  public:
-  /// `size` is how far the vertices reach along each axis, or any other unit of length.
+  /// `size` is the extent of the vertices along each axis, or any other unit of length.
   Sums(Workspace& workspace, Vec3 size) : w_(workspace) {
     const Vec3 per_size{1 / size.x, 1 / size.y, 1 / size.z};
     w_.apex.assign(w_.first.facets + w_.second.facets, -1);
@@ -74,8 +74,8 @@ class Sums {
     for (const auto* list : {&w_.edges, &w_.seam})
       for (const Edge& e : *list) w_.apex[e.left] = w_.apex[e.right] = e.from;
     for (const auto* list : {&w_.edges, &w_.seam}) add(*list);
-    // Each product of three coordinates is rounded less than eight times, and then comes the sum of the tetrahedra, of
-    // which none is negative.
+    // Each product of three coordinates is rounded less than eight times. Then follows the sum of the tetrahedra; no
+    // tetrahedron is negative.
     const double terms = 2 * static_cast<double>(w_.edges.size() + w_.seam.size());
     rounding_ = 8 * 0x1p-53 * uncancelled_ * size.x * size.y * size.z / 6 + terms * 0x1p-53 * six_volumes_ / 6;
   }
@@ -102,8 +102,8 @@ class Sums {
   }
 
  private:
-  /// Tetrahedra from the origin over each edge and a corner of either facet; none is negative. What two edges add is
-  /// computed at once, and added in their order.
+  /// Tetrahedra from the origin over each edge and a corner of either facet; none is negative. The terms of two edges
+  /// are computed together and added in order.
   void add(std::span<const Edge> edges) {
     const Vec3* vertices = w_.vertices.data();
     const double* extent = w_.extent.data();
@@ -137,16 +137,16 @@ class Sums {
   Workspace& w_;
   Vec3 moment_;
   double six_volumes_ = 0;
-  double uncancelled_ = 0;  ///< no less than the six volumes would be if none of their terms cancelled
+  double uncancelled_ = 0;  ///< upper bound of six times the volumes, without cancellation of terms
   double rounding_ = 0;
 };
 
-/// A patch that is wanted, of a body that comes second or, if swapped, first.
+/// A wanted patch. The body is the second one, or the first one if swapped.
 struct WantedPatch {
   bool swapped;
   Patch patch{};
 
-  /// From the seam, which is counter-clockwise around the first body's part.
+  /// Finds the patch from the seam, which is counter-clockwise around the first body's part.
   void find(const Workspace& w, Vec3 centroid, Vec3 force_on_first) {
     PatchSums sums(centroid, swapped ? force_on_first : -force_on_first);
     for (const Edge& e : w.seam) {
@@ -157,7 +157,7 @@ struct WantedPatch {
   }
 };
 
-/// Distance of a common facet's plane from the middle of the common polytope.
+/// The distance of a common facet's plane from the middle of the common polytope.
 struct Slack {
   Vec3 normal;
   double distance;
@@ -174,13 +174,14 @@ void for_each_facet(const Workspace& w, Vec3 middle, Use use) {
   }
 }
 
-/// The volume between the polytope and one whose planes are moved out by `moved`: its area grows on the way.
+/// The volume between the polytope and a polytope whose planes are moved out by `moved`, with the growth of the area on
+/// the way.
 double moved_volume(double area, double moved, double least_slack) {
   return moved * area * growth(moved, least_slack) / 3;
 }
 
-/// Orthogonal axes as rows, the first across the facet nearest to the middle, the second across the one that is nearest
-/// to it after that: so along each, coordinates in a sliver or a needle are no larger than its thickness there.
+/// Orthogonal axes as rows. The first axis is across the facet nearest to the middle, the second across the next
+/// nearest facet. Along each axis, the coordinates of a sliver or a needle are then no larger than its thickness.
 Mat3 thin_axes(const Workspace& w, Vec3 middle) {
   Slack nearest{{}, kInfinity}, next{{}, kInfinity};
   for_each_facet(w, middle, [&](int, const Slack& s) { nearest = s.distance < nearest.distance ? s : nearest; });
@@ -188,7 +189,7 @@ Mat3 thin_axes(const Workspace& w, Vec3 middle) {
   for_each_facet(w, middle, [&](int, const Slack& s) {
     const Vec3 along = s.normal - dot(s.normal, first) * first;
     const double length2 = norm2(along);
-    if (length2 < 0x1p-10) return;  // a direction of its own has more than rounding left
+    if (length2 < 0x1p-10) return;  // the new direction is more than rounding
     const double distance = s.distance / std::sqrt(length2);
     if (distance < next.distance) next = {along, distance};
   });
@@ -196,7 +197,7 @@ Mat3 thin_axes(const Workspace& w, Vec3 middle) {
   return {first, second, cross(first, second)};
 }
 
-/// Areas of facets from their corners alone.
+/// The areas of facets, from their corners alone.
 double area_by_corners(Workspace& w) {
   w.area_vector.assign(w.apex.size(), {});
   for (const auto* list : {&w.edges, &w.seam}) {
@@ -211,8 +212,8 @@ double area_by_corners(Workspace& w) {
   return area;
 }
 
-/// Measures what clipping has left once more, about `middle` from corners placed in wider arithmetic. Leaves `common`
-/// as it is where even that is not enough.
+/// Measures the common polytope again about `middle`, from corners placed in wider arithmetic. Leaves `common`
+/// unchanged if even that is not accurate enough.
 void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reach, double least_slack, Vec3 middle,
                      Measures& measures, Pull& on_first, WantedPatch* wanted) {
   const Mat3 axes = thin_axes(w, middle);
@@ -223,7 +224,7 @@ void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reac
   for (Vec3 v : w.vertices) size = max(size, abs(v));
   Sums sums(w, size);
   const double area = area_by_corners(w);
-  // The axes are at right angles and of length 1 but for a few roundings.
+  // The axes are orthogonal and of length 1 but for a few roundings.
   const double error =
       moved_volume(area, *corner_rounding, least_slack) + sums.volume_rounding() + 16 * 0x1p-53 * sums.volume();
   if (!(error <= kEnough * sums.volume())) return;
@@ -240,8 +241,8 @@ void measure_widened(Workspace& w, const Placed& a, const Placed& b, double reac
   wanted->patch = turned(wanted->patch, transposed(axes), middle);
 }
 
-/// Measures as sums in doubles say, about `middle`. False if a plane passes that nearer than `least_slack`, which
-/// becomes the distance of the nearest.
+/// Measures by sums in doubles, about `middle`. False if a plane is nearer to `middle` than `least_slack`, which
+/// becomes the distance of the nearest plane.
 bool measure(Workspace& w, const Sums& sums, Vec3 middle, double rounding, double& least_slack, Measures& common) {
   common.status = Status::kOverlapping;
   common.way = Way::kClipping;
@@ -260,13 +261,13 @@ bool measure(Workspace& w, const Sums& sums, Vec3 middle, double rounding, doubl
   return true;
 }
 
-/// The body with more facets comes first, whose coordinates are used; then the order does not depend on the caller's.
+/// The body with more facets comes first, and its coordinates are used. The order then does not depend on the caller's.
 bool comes_first(const Placed& a, const Placed& b) {
   const int facets_a = facets(a.shape), facets_b = facets(b.shape);
   return facets_a != facets_b ? facets_a > facets_b : !comes_before(b, a);
 }
 
-/// Clips in the coordinates of `a`, and finds the pull on that; false if doubles cannot tell.
+/// Clips in the coordinates of `a`, and finds the pull on `a`; false if doubles cannot decide.
 bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_first, WantedPatch* wanted = nullptr) {
   const auto [pose, reach, flat, doubt, apart] = relation(a, b);
   if (apart) return true;
@@ -277,7 +278,7 @@ bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_
   if (signs != Signs::kCertain) return signs == Signs::kSeparated;
   const Vec3 middle = centre(w.vertices);
   const Sums sums(w, {1, 1, 1});
-  double least_slack = 4 * doubt;  // rounding might hide what is thinner
+  double least_slack = 4 * doubt;  // rounding might hide thinner sets
   if (!measure(w, sums, middle, rounding(reach) + flat, least_slack, common)) return false;
   if (!common.measured) {
     measure_widened(w, a, b, reach, least_slack, middle, common, on_first, wanted);
@@ -290,7 +291,7 @@ bool clip_in_first(const Placed& a, const Placed& b, Measures& common, Pull& on_
   return true;
 }
 
-/// The bodies, smallest first, whose order then does not depend on the caller's.
+/// The bodies from the smallest to the largest. The order then does not depend on the caller's.
 std::vector<int> from_small_to_large(std::span<const Placed> bodies) {
   std::vector<int> order = canonical_order(bodies);
   const auto size = [&](int i) { return bounded(bodies[i].shape) ? radius(bodies[i].shape) : kInfinity; };
@@ -308,7 +309,7 @@ Ball ball_around(const Solid& solid, double rounding) {
   return ball;
 }
 
-/// Cuts the first of some bodies by the others one after the other, all in its coordinates.
+/// Clips the first body by the other bodies in turn, in its own coordinates.
 Signs clip_in_turn(Workspace& w, std::span<const Placed> bodies, std::span<const int> order, double reach,
                    double doubt) {
   const Placed& first = bodies[order[0]];
@@ -323,8 +324,8 @@ Signs clip_in_turn(Workspace& w, std::span<const Placed> bodies, std::span<const
   return Signs::kCertain;
 }
 
-/// The pulls that the common polytope has on its bodies, and their moments about the centroid: as for a seam, along
-/// all borders between two bodies.
+/// The pulls of the common polytope on its bodies, with moments about the centroid: like a seam, along all borders
+/// between two bodies.
 void add_pulls(const Workspace& w, const Pose& pose, Vec3 centroid, std::vector<Pull>& pulls) {
   for (const Edge& e : w.edges) {
     const int left = w.owner(e.left), right = w.owner(e.right);
@@ -374,7 +375,7 @@ std::optional<Measures> clip(std::span<const Placed> bodies) {
   w.show_first();
   const Vec3 middle = centre(w.vertices);
   const Sums sums(w, {1, 1, 1});
-  // Every cut moves what is left of an edge off its planes by three half-ulps or less.
+  // Each cut moves the rest of an edge off its planes by at most three half-ulps.
   const double rounded = rounding(far) + 3 * 0x1p-53 * far * static_cast<double>(bodies.size()) + flat;
   double least_slack = 4 * doubt;
   std::optional<Measures> common(std::in_place);

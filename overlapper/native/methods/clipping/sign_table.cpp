@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Two or four planes are worked on at once, by whatever the machine has.
+/// Processes two or four planes at once, depending on the machine.
 template <class Lanes>
 constexpr int kLanes = sizeof(Lanes) / sizeof(double);
 template <class Lanes>
@@ -20,7 +20,7 @@ inline void load(const double* p, Lanes& v) {
   std::memcpy(&v, p, sizeof v);
 }
 
-/// Calls `use(plane)`, from the first to the last, for planes whose bit j % 64 is set.
+/// Calls `use(plane)` for each plane whose bit j % 64 is set, in order.
 template <class Use>
 inline void for_each_plane(std::uint64_t marked, int stride, Use use) {
   for (int first = 0; first < stride; first += 64) {
@@ -29,33 +29,33 @@ inline void for_each_plane(std::uint64_t marked, int stride, Use use) {
   }
 }
 
-/// Where an edge meets a plane: at `from + at * (to - from)`.
+/// The point where an edge meets a plane: `from + at * (to - from)`.
 struct Crossing {
   int plane;
   double at;
 };
 
-/// What of an edge the other body keeps.
+/// How much of an edge is inside the other body.
 enum class Kept { kNothing, kPart, kUncertain };
 
-/// One edge against all planes of the other body: the signed distances of its ends. The planes that it enters or leaves
-/// through are among the few that an end is outside of.
+/// An edge and all planes of the other body: the signed distances of its ends. The edge enters and leaves through
+/// planes that one of its ends is outside of; these are few.
 struct EdgeSigns {
   const double *from, *to;
   std::uint64_t from_outside, to_outside;  ///< as in SignTable
   int stride;
   double rounding;
 
-  /// How far off the point may be where an edge of that length crosses a plane: the rounding of two signs as seen along
-  /// the edge.
+  /// Error of the point where an edge of that length crosses a plane: the rounding of the two signs, seen along the
+  /// edge.
   double doubt(Crossing crossing, double length) const {
     return 2 * rounding * (1 + length / std::abs(to[crossing.plane] - from[crossing.plane]));
   }
 
-  /// True if the point where the edge crosses a plane, with that doubt, is certainly inside all others.
+  /// True if the point where the edge crosses a plane, with its error, is certainly inside all other planes.
   template <class Lanes>
   bool certain(Crossing crossing, double doubt) const {
-    decltype(Lanes{} > Lanes{}) hidden{};  // per lane, how many planes it may be outside of
+    decltype(Lanes{} > Lanes{}) hidden{};  // per lane: number of planes that it may be outside of
     for (int j = 0; j < stride; j += kLanes<Lanes>) {
       Lanes begin, end;
       load(from + j, begin);
@@ -64,12 +64,12 @@ struct EdgeSigns {
     }
     auto planes = hidden[0];
     for (int k = 1; k < kLanes<Lanes>; ++k) planes += hidden[k];
-    return planes == 1;  // The crossed one is among them: rounding alone has moved the point off that.
+    return planes == 1;  // This is the crossed plane itself, by rounding.
   }
 
   Crossing at_plane(int g) const { return {g, from[g] / (from[g] - to[g])}; }
 
-  /// The plane through which it leaves from an end that is inside.
+  /// The plane through which the edge leaves from an end that is inside.
   Crossing exit(bool from_inside) const {
     const double *inner = from_inside ? from : to, *outer = from_inside ? to : from;
     double steepest = 0;
@@ -81,14 +81,14 @@ struct EdgeSigns {
     return at_plane(g);
   }
 
-  /// True if both ends are certainly outside of the same plane.
+  /// True if both ends are certainly outside the same plane.
   bool outside() const {
     bool found = false;
     for_each_plane(from_outside & to_outside, stride, [&](int j) { found |= std::min(from[j], to[j]) > rounding; });
     return found;
   }
 
-  /// Where an edge enters and leaves whose ends are both outside, of different planes.
+  /// The points where an edge enters and leaves, if both its ends are outside, of different planes.
   std::pair<Crossing, Crossing> passage() const {
     Crossing enter{-1, -kInfinity}, leave{-1, kInfinity};
     for_each_plane(from_outside, stride, [&](int j) {
@@ -102,14 +102,14 @@ struct EdgeSigns {
     return {enter, leave};
   }
 
-  /// True if the edge is certainly outside of one of two planes all along.
+  /// True if each point of the edge is certainly outside one of two planes.
   bool misses(int g, int h) const {
     const double slope_g = to[g] - from[g], slope_h = to[h] - from[h];
     const double level = std::clamp((from[h] - from[g]) / (slope_g - slope_h), 0.0, 1.0);
     return std::max(from[g] + level * slope_g, from[h] + level * slope_h) > 2 * rounding;
   }
 
-  /// Where an edge enters and leaves, of which not both ends are inside.
+  /// Finds where an edge enters and leaves, if at most one end is inside.
   Kept cut(bool from_inside, bool to_inside, Crossing& enter, Crossing& leave) const {
     if (from_inside) {
       leave = exit(true);
@@ -132,7 +132,7 @@ Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
   stride = by.stride;
   rows.resize(static_cast<size_t>(of.vertices) * stride);
   outside.resize(of.vertices);
-  // Taken once: for all that a compiler knows, a sign that is stored might move them.
+  // Local copies: as far as the compiler knows, storing a sign might move the arrays.
   const double *nx = by.nx.data(), *ny = by.ny.data(), *nz = by.nz.data(), *offset = by.offset.data();
   const double *vx = of.x.data(), *vy = of.y.data(), *vz = of.z.data(), *doubt = of.doubt.data();
   double* signs = rows.data();
@@ -173,7 +173,7 @@ Signs SignTable::fill(const Solid& of, const Solid& by, double rounding) {
   return uncertain ? Signs::kUncertain : Signs::kCertain;
 }
 
-/// True if all vertices are farther than `margin` outside of the same plane.
+/// True if all vertices are farther than `margin` outside the same plane.
 bool SignTable::beyond_a_plane(double margin) const {
   std::uint64_t shared = ~std::uint64_t{0};
   for (std::uint64_t marked : outside) shared &= marked;
@@ -186,7 +186,7 @@ bool SignTable::beyond_a_plane(double margin) const {
   return found;
 }
 
-/// Finds the common polytope of a clipping whose solids are in place.
+/// Finds the common polytope, once its two solids are set.
 template <class Lanes>
 class EdgeCutter {
  public:
@@ -264,8 +264,8 @@ class EdgeCutter {
     return true;
   }
 
-  /// An edge of one body meets a facet of the other in a common vertex, where two edges of the seam end: walking around
-  /// the facet on its left, one follows the edge up to the exit and turns onto the other body.
+  /// An edge of one body meets a facet of the other in a common vertex, where two edges of the seam end. A walk around
+  /// the facet on the edge's left follows the edge up to the exit, and turns onto the other body.
   void meet(const Edge& e, int facet, int vertex, bool enters, bool is_first) {
     if (is_first) {
       join(e.left, facet, vertex, !enters);

@@ -26,8 +26,8 @@ struct SignTable {
   bool beyond_a_plane(double margin) const;
 };
 
-/// A list that is begun with room for all that may come: adding to it calls nothing, for which the numbers that a loop
-/// works with would have to leave their registers.
+/// A list that reserves room for all elements at the start. Adding an element then calls no function, so a loop keeps
+/// its numbers in registers.
 template <class T>
 class RoomyList {
  public:
@@ -57,23 +57,23 @@ class RoomyList {
   T* end_ = nullptr;
 };
 
-/// Two solids and what they have in common, whose facets are numbered as the first one's and then the second one's.
+/// Two solids and their common polytope. The second solid's facets are numbered after the first one's.
 struct TableClipping {
   Solid first, second;
   RoomyList<Vec3> vertices;         ///< of the common polytope
-  RoomyList<CornerSource> corners;  ///< parallel to them
-  RoomyList<double> doubt;          ///< parallel to them: see Solid
+  RoomyList<CornerSource> corners;  ///< parallel to `vertices`
+  RoomyList<double> doubt;          ///< parallel to `vertices`: see Solid
   RoomyList<Edge> edges;            ///< of the common polytope
-  RoomyList<Edge> seam;             ///< its edges between the first body's facets, on the left, and the second's
+  RoomyList<Edge> seam;             ///< its edges between facets of the first body, on the left, and of the second body
 
-  /// Finds the common polytope; what is not certain or separated has none.
+  /// Finds the common polytope; none for separated or uncertain solids.
   Signs run(double rounding);
 
   int owner(int facet) const { return facet < first.facets ? first.owner[facet] : second.owner[facet - first.facets]; }
 
-  /// The common polytope becomes the first solid; see set_solid for `beyond`.
+  /// Makes the common polytope the first solid; see set_solid for `beyond`.
   void take_common(double beyond);
-  /// Puts the first solid into the place of the common polytope.
+  /// Makes the first solid the common polytope.
   void show_first();
 
  private:
@@ -81,9 +81,9 @@ struct TableClipping {
   friend class EdgeCutter;
 
   SignTable first_signs, second_signs;
-  std::vector<int> first_vertex, second_vertex;  ///< which common vertex a body's vertex is, or -1
-  /// The open end of each pair of facets: 1 + the vertex at which their common edge begins, minus that if it ends
-  /// there.
+  std::vector<int> first_vertex, second_vertex;  ///< per vertex of a body: its number in the common polytope, or -1
+  /// The open end of each pair of facets: 1 + the vertex where their common edge begins, or the negative of that where
+  /// it ends.
   std::vector<int> open;
   int unpaired = 0;
   Solid next;

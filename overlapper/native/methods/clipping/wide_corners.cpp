@@ -8,7 +8,7 @@ namespace {
 constexpr WideColumns kIdentity{WideLanes{Quad{1, 0, 0, 0}, Quad{}}, WideLanes{Quad{0, 1, 0, 0}, Quad{}},
                                 WideLanes{Quad{0, 0, 1, 0}, Quad{}}};
 
-/// Columns of the rotation that a quaternion of any length stands for.
+/// The columns of the rotation of a quaternion of any length.
 template <bool fused>
 WideColumns rotation_columns(Quaternion given) {
   if (unturned(given)) return kIdentity;
@@ -66,7 +66,7 @@ class WideCorners {
     translation_ = translation_ - in_lanes(common.origin);
   }
 
-  /// Planes of facets: a normal, of length 1 but for rounding, and last the offset with the other sign.
+  /// Planes of facets: a normal, of length 1 but for rounding, and then the negative offset.
   bool add_planes() {
     const int facets = static_cast<int>(common_.apex.size()), first_facets = common_.first_facets;
     const Box *box_a = std::get_if<Box>(&common_.a.shape), *box_b = std::get_if<Box>(&common_.b.shape);
@@ -94,13 +94,13 @@ class WideCorners {
     return WideSum<fused>(columns, vector(v)).lanes();
   }
 
-  /// Heights of a point above planes through the origin, a coordinate of whose normals is in each of the columns.
+  /// Heights of a point above planes through the origin. Each column holds one coordinate of the normals.
   static WideLanes heights(const WideColumns& normals, const WideLanes& point) {
     const auto [x, y, z] = vector(point);
     return product<fused>(normals[0], x) + product<fused>(normals[1], y) + product<fused>(normals[2], z);
   }
 
-  /// The box has its middle at the given heights above planes across its axes.
+  /// Adds the sides of a box. `middle` is the height of its middle above planes across its axes.
   void add_sides(const Box& box, const WideColumns& axes, const WideLanes& middle, std::span<WideLanes> planes) {
     const Vec3 half = box.half_extents;
     const WideLanes extents{Quad{half.x, half.y, half.z}, Quad{}};
@@ -124,7 +124,7 @@ class WideCorners {
     return true;
   }
 
-  /// A corner in each lane.
+  /// Places four corners, one in each lane.
   void place_four(const Mat3& axes, std::span<Vec3> vertices, const std::array<size_t, 4>& at) {
     const QuadVector vertex(vertices[at[0]], vertices[at[1]], vertices[at[2]], vertices[at[3]]);
     QuadVector way{Vec3{}, Vec3{}, Vec3{}, Vec3{}};
@@ -146,8 +146,7 @@ class WideCorners {
     for (int n = 0; n < 4; ++n) vertices[at[n]] = {x.head[n], y.head[n], z.head[n]};
   }
 
-  /// The steps from vertices that doubles have placed to where three planes meet; of other corners, nothing that means
-  /// anything.
+  /// The steps from vertices placed by doubles to the point where three planes meet; meaningless for other corners.
   void beside_planes(const std::array<size_t, 4>& at, const QuadVector& vertex, QuadVector& way) {
     const auto planes = [&](int n) {
       const auto plane = [&](size_t i) -> const WideLanes& { return planes_[common_.corners[i].facets[n]]; };
@@ -167,7 +166,7 @@ class WideCorners {
     const Quad& c = height_r.head;
     way = {(a * qr.x + b * rp.x + c * pq.x) / -volume, (a * qr.y + b * rp.y + c * pq.y) / -volume,
            (a * qr.z + b * rp.z + c * pq.z) / -volume};
-    // The sum is off by what the heights are and by the roundings of its own terms.
+    // The error of the sum is the error of the heights plus the roundings of its own terms.
     Quad size, high_a, high_b, high_c, high, highest;
     choose(volume < 0, -volume, volume, size);
     choose(a < 0, -a, a, high_a);
@@ -180,7 +179,7 @@ class WideCorners {
       if (common_.corners[at[n]].vertex < 0) corner_rounding_ = std::max(corner_rounding_, rounding[n]);
   }
 
-  /// The step from a vertex that doubles have placed to the body's own.
+  /// The step from a vertex placed by doubles to the body's own vertex.
   Vec3 beside_vertex(const CornerSource& corner, Vec3 vertex) const {
     const Shape& shape = corner.body == 0 ? common_.a.shape : common_.b.shape;
     const Vec3 local = overlapper::vertex(shape, corner.vertex);
@@ -198,9 +197,9 @@ class WideCorners {
   const CommonCorners& common_;
   std::span<WideLanes> planes_;
   WideColumns columns_;     ///< of the rotation from the second body's coordinates to the first's
-  WideLanes translation_;   ///< and what follows it
+  WideLanes translation_;   ///< applied after the rotation
   double wide_rounding_;    ///< m: of a few dozen operations in double-double
-  double corner_rounding_;  ///< m: of the corners placed so far
+  double corner_rounding_;  ///< m: largest, of the corners placed so far
 };
 
 using Placing = std::optional<double>(const CommonCorners&, const Mat3& axes, std::span<Vec3> vertices,
@@ -225,7 +224,7 @@ Placing* fastest_placing() { return is_wider() ? place_by_wider : place_by<kFuse
 Placing* fastest_placing() { return place_by<kFused>; }
 #endif
 
-/// Equal but for what underflows, which is nothing beside any body's size.
+/// Equal but for underflow, which is negligible beside any body's size.
 [[maybe_unused]] bool same(Vec3 a, Vec3 b) { return !(max_component(abs(a - b)) > 1e-250); }
 
 }  // namespace

@@ -38,7 +38,8 @@ void CloseBody::set(const Mesh& mesh, const CloseFrame& frame, bool is_second) {
   }
   if (corner_placed_.size() < vertices) corner_placed_.resize(vertices, 0), corners_.resize(vertices);
   if (side_placed_.size() < facets) side_placed_.resize(facets, 0), sides_.resize(facets);
-  // What is rounded is a point of either body, turned and moved, and a dual point, whose plane merging may have tilted.
+  // Rounding of a point of either body, rotated and translated, and of a dual point, whose plane merging may have
+  // tilted.
   const double rounding = 64 * 0x1p-53 * (data().radius + graph().circumradius) + 2 * mesh.flat();
   doubt_ = rounding / graph().inradius;
   const double inside = std::max(0.0, graph().inradius - rounding);

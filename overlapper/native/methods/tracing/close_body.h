@@ -9,31 +9,31 @@
 
 namespace overlapper {
 
-/// The rotation from the second body's axes to those of the first, each entry right to half an ulp.
+/// The rotation from the second body's axes to the first's; the error of each entry is half an ulp.
 struct CloseFrame {
   Mat3 turn;
   Vec3 origin;                            ///< the common point in the first body's own coordinates, plain doubles
-  Vec3 origin_in_second, rest_in_second;  ///< the same point in the second body's, as head and tail
+  Vec3 origin_in_second, rest_in_second;  ///< the same point in the second body's coordinates, as head and tail
 };
 CloseFrame close_frame(const Placed& first, const Placed& second, Vec3 origin);
 
-/// A polytope in the axes of the first body of a pair, about a point that both have in common. A corner is off by a few
-/// half-ulps of its distance from that point, however large the bodies are and however far from the world's origin:
-/// the point is known in either body's coordinates beyond doubles, and subtracting it comes first. Corners and normals
-/// are placed when asked for, so that what nobody asks for costs nothing.
+/// A polytope in the axes of the first body of a pair, about a common point of both. The error of a corner is a few
+/// half-ulps of its distance from that point, for bodies of any size and at any distance from the world's origin. The
+/// point is known beyond doubles in either body's coordinates, and is subtracted first. Corners and normals are placed
+/// on demand.
 class CloseBody {
  public:
-  /// Rounding of a corner, as a share of its distance from the common point: of the first body that of one subtraction;
-  /// of the second two, then the entry of the turn, a product and two sums over coordinates that add up to no more than
-  /// √3 times the distance: 2 + 4 √3 half-ulps.
+  /// Rounding of a corner, relative to its distance from the common point. For the first body it is one subtraction.
+  /// For the second it is two subtractions, the entry of the turn, a product and two sums. The coordinates add up to at
+  /// most √3 times the distance: 2 + 4 √3 half-ulps.
   double corner_rounding() const { return (turned_ ? 9 : 1) * 0x1p-53; }
 
-  /// The rounding of a normal's direction: three half-ulps as it was made, and the turn.
+  /// Error of a normal's direction: three half-ulps from its construction, and the turn.
   double normal_rounding() const { return (turned_ ? 10 : 3) * 0x1p-53; }
 
-  /// Rounding of a signed distance, as a share of both corners' distances from the common point: that of the corners,
-  /// of the normal over their distance, and four half-ulps of that for difference, product and sums: 9 (|v| + |c|) +
-  /// (10 + 4) |v - c| or less.
+  /// Rounding of a signed distance, relative to both corners' distances from the common point. It includes the error of
+  /// the corners, the error of the normal times their distance, and four half-ulps for difference, product and sums. In
+  /// half-ulps: at most 9 (|v| + |c|) + (10 + 4) |v - c|.
   static constexpr double kSign = 32 * 0x1p-53;
 
   void set(const Mesh& mesh, const CloseFrame& frame, bool is_second);
@@ -55,7 +55,7 @@ class CloseBody {
     return turned_ ? turn_ * own : own;
   }
 
-  /// A corner once placed is kept for whoever asks again.
+  /// A placed corner, kept for further calls.
   struct PlacedCorner {
     Vec3 at;
     double size;  ///< its distance from the common point
@@ -66,21 +66,20 @@ class CloseBody {
   }
   struct Side {
     Vec3 normal;
-    Vec3 through;     ///< the facet's corner that is nearest to the common point
+    Vec3 through;     ///< the facet's nearest corner to the common point
     double size;      ///< the distance of that corner from the common point
-    double farthest;  ///< the distance of the farthest
+    double farthest;  ///< the distance of the facet's farthest corner
   };
   const Side& side(int facet) {
     if (side_placed_[facet] != now_) place_side(facet);
     return sides_[facet];
   }
 
-  /// A point of these coordinates in the body's own, and a direction.
+  /// Maps a point of these coordinates, or a direction, to the body's own.
   Vec3 own_point(Vec3 at) const { return own_direction(at) + origin_; }
   Vec3 own_direction(Vec3 direction) const { return turned_ ? apply_transposed(turn_, direction) : direction; }
 
-  /// 1 if the point is certainly inside, -1 if certainly outside, 0 if rounding hides it. Climbs from where the last
-  /// answer was.
+  /// 1 if the point is certainly inside, -1 if certainly outside, 0 if rounding hides it. Climbs from the last answer.
   int holds(Vec3 at);
 
  private:
@@ -91,9 +90,9 @@ class CloseBody {
   bool turned_ = false;
   Mat3 turn_;
   Vec3 origin_, rest_;
-  double surely_inside2_ = 0;  ///< the square of a radius about the centroid
+  double surely_inside2_ = 0;  ///< the square of a safe radius about the centroid
   double doubt_ = 0;           ///< of a gauge
-  int last_ = -1;              ///< the facet towards the last point asked for
+  int last_ = -1;              ///< the facet towards the last point
   int now_ = 0;
   std::vector<int> corner_placed_, side_placed_;
   std::vector<PlacedCorner> corners_;

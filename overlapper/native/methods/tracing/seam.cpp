@@ -24,7 +24,7 @@ void Seam::begin(CloseBody& first, CloseBody& second) {
   }
 }
 
-/// How far a vertex lies outside of the plane of the other body's facet.
+/// The signed distance of a vertex outside the plane of the other body's facet.
 double Seam::height(CloseBody& of, int vertex, CloseBody& over, int facet) {
   const CloseBody::PlacedCorner& v = of.corner(vertex);
   const CloseBody::Side& side = over.side(facet);
@@ -33,15 +33,15 @@ double Seam::height(CloseBody& of, int vertex, CloseBody& over, int facet) {
   return s;
 }
 
-/// The half-edge of a body's facet over which the line leaves it, looked for from one of its half-edges on: a facet of
-/// the first body is left over an edge that comes from outside of the other plane, one of the second over an edge that
-/// goes there. -1 if the line misses the facet.
+/// The half-edge of a body's facet over which the line leaves the facet. The search starts at one of its half-edges. On
+/// the first body, this edge comes from outside the other plane; on the second, it goes there. -1 if the line misses
+/// the facet.
 int Seam::turning_edge(int body, int from, CrossingFacets at) {
   CloseBody &self = *bodies_[body], &other = *bodies_[1 - body];
   const int plane = other_facet(at, body);
   const auto outside = [&](int vertex) { return (height(self, vertex, other, plane) > 0) == (body == 0); };
-  // Of the two sides of a convex polygon only one edge goes from the one to the other: backwards to where it starts
-  // from an edge that ends behind it, forwards otherwise.
+  // The plane divides a convex polygon into two sides, and only one edge goes from one side to the other. Search
+  // backwards if the start edge ends behind it, else forwards.
   const int edges = static_cast<int>(self.data().facet(self.facet(from)).size());
   int h = from;
   bool begins = outside(self.begin(h)), ends = outside(self.end(h));
@@ -60,7 +60,7 @@ int Seam::turning_edge(int body, int from, CrossingFacets at) {
   return -1;
 }
 
-/// Positive if a half-edge of one body, coming from outside of a facet of the other, passes on the inner side of that
+/// Positive if a half-edge of one body, coming from outside a facet of the other, passes on the inner side of that
 /// facet's half-edge.
 double Seam::order(int body, int entering, int other_edge) {
   CloseBody &self = *bodies_[body], &other = *bodies_[1 - body];
@@ -69,15 +69,15 @@ double Seam::order(int body, int entering, int other_edge) {
   const Vec3 along = q.at - p.at, side = s.at - r.at, between = r.at - p.at;
   const double a = std::sqrt(norm2(along)), b = std::sqrt(norm2(side)), c = std::sqrt(norm2(between));
   const double det = dot(cross(along, side), between);
-  // Each corner moves the determinant by its own rounding times the product of two lengths; the products and sums lose
-  // less than the rest of it.
+  // Each corner moves the determinant by its own rounding times the product of two lengths. The products and sums lose
+  // less than the rest of the bound.
   const double moved =
       16 * 0x1p-53 * (p.size + q.size + r.size + s.size) + 4 * (self.mesh().flat() + other.mesh().flat());
   certain_ &= std::abs(det) > moved * (a * b + b * c + c * a);
   return det;
 }
 
-/// True if the segments that the line has in both facets overlap.
+/// True if the line's segments in both facets overlap.
 bool Seam::crosses(CrossingFacets facets, std::array<int, 2> exit) {
   if (exit[0] < 0 || exit[1] < 0) return false;
   const auto entry_edge = [&](int body) {
@@ -89,12 +89,12 @@ bool Seam::crosses(CrossingFacets facets, std::array<int, 2> exit) {
     } while ((height(self, self.end(h), other, plane) > 0) != (body == 0));
     return h;
   };
-  // The first body's two crossings are seen from the second's facet: the one at the exit comes after that facet begins,
-  // the one at the entry before it ends.
+  // The first body's two crossings, seen from the second body's facet: the exit is after the facet begins, and the
+  // entry is before it ends.
   return order(0, exit[0], entry_edge(1)) > 0 && order(0, bodies_[0]->twin(entry_edge(0)), exit[1]) > 0 && certain_;
 }
 
-/// Where a half-edge that comes from outside of the other body's facet crosses its plane.
+/// The point where a half-edge that comes from outside the other body's facet crosses its plane.
 Vec3 Seam::meet(int body, int entering, int plane) {
   CloseBody &self = *bodies_[body], &other = *bodies_[1 - body];
   const int from = self.begin(entering), to = self.end(entering);
@@ -103,9 +103,9 @@ Vec3 Seam::meet(int body, int entering, int plane) {
   const Vec3 along = q.at - p.at, through = other.side(plane).through;
   const double share = above / (above + below), rest = below / (above + below);
   const Vec3 at = share < rest ? p.at + share * along : q.at - rest * along;
-  // Interpolating from the nearer end rounds the difference, its product with the share and the sum. A plane's distance
-  // from the ends is off by its normal's rounding and by that of four operations, as seen from its corner; that of the
-  // shares counts no more than four others.
+  // Interpolation from the nearer end rounds the difference, its product with the fraction, and the sum. The error of a
+  // plane's distance from the ends is its normal's rounding plus four operations, relative to its corner. The error of
+  // the fractions is at most four more operations.
   const double size = std::sqrt(norm2(at)), interpolated = 0x1p-53 * (std::sqrt(norm2(along)) + size);
   const double away = rest * std::sqrt(norm2(p.at - through)) + share * std::sqrt(norm2(q.at - through));
   marks_[body].rounding = std::max(marks_[body].rounding, interpolated);

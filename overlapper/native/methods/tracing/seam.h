@@ -16,22 +16,21 @@ struct CrossingFacets {
 /// A point of the seam: an edge of one body meets a facet of the other.
 struct SeamCorner {
   Vec3 at;
-  int body;              ///< whose edge: 0 or 1
+  int body;              ///< 0 or 1: the body of the edge
   int edge;              ///< its half-edge that enters the other body here
-  int next, previous;    ///< along the seam, which has what the first body keeps on its left
+  int next, previous;    ///< along the seam, with the kept part of the first body on its left
   CrossingFacets ahead;  ///< the facets of the segment to the next corner
 };
 
-/// The closed lines in which the surfaces of two polytopes cross, followed from facet to facet. The line through two
-/// facets' planes leaves either facet over an edge that its corners' signs name; which of the two comes first is the
-/// orientation of the two edges. A sign that rounding might turn ends it all: what is found is then incomplete, and
-/// `certain()` false.
+/// The closed lines in which the surfaces of two polytopes cross, followed from facet to facet. The signs of corners
+/// tell over which edge the line of two facets' planes leaves each facet. The orientation of the two edges tells which
+/// exit comes first. An uncertain sign ends the search: the result is then incomplete, and `certain()` is false.
 class Seam {
  public:
   void begin(CloseBody& first, CloseBody& second);
 
-  /// Follows the line that has a segment in both facets. False if there is none, if it is known already, or a sign is
-  /// not certain.
+  /// Follows the line that has a segment in both facets. False if there is none, if it is known already, or if a sign
+  /// is uncertain.
   bool follow(CrossingFacets start);
 
   bool certain() const { return certain_; }
@@ -39,7 +38,7 @@ class Seam {
 
   struct Line {
     int first_corner;
-    std::array<bool, 2> crosses_edges_of;  ///< per body; if none, all of the line lies in one of its facets
+    std::array<bool, 2> crosses_edges_of;  ///< per body; if false, all of the line lies in one facet of this body
   };
   const std::vector<Line>& lines() const { return lines_; }
 
@@ -51,7 +50,7 @@ class Seam {
   /// The largest distance of a corner from the common point.
   double reach() const { return reach_; }
 
-  /// m: how far rounding may have put corners off the planes of a body's facets.
+  /// m: bound of the distance of corners from the planes of a body's facets, by rounding.
   double rounding(int body) const {
     const Marks& m = marks_[body];
     return bodies_[body]->corner_rounding() * m.farthest + m.rounding;
@@ -66,11 +65,11 @@ class Seam {
   Vec3 meet(int body, int entering, int plane);
   int other_facet(CrossingFacets at, int body) const { return body == 0 ? at.second : at.first; }
 
-  /// What was found on a body.
+  /// The results on a body.
   struct Marks {
-    std::vector<int> entered, corner;  ///< per half-edge: the run in which it was last entered, and where
-    double farthest = 0;               ///< corner of a facet passed, from the common point
-    double rounding = 0;               ///< m: see rounding(), without what that of those corners moves its planes
+    std::vector<int> entered, corner;  ///< per half-edge: the last run that entered it, and the corner
+    double farthest = 0;               ///< distance of the farthest corner of a visited facet from the common point
+    double rounding = 0;               ///< m: see rounding(), without the part of those corners' planes
   };
 
   std::array<CloseBody*, 2> bodies_{};

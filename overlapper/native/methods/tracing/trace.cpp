@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The common polytope of two bodies as it is put together.
+/// The common polytope of two bodies under construction.
 class Tracing {
  public:
   enum class Answer { kApart, kTraced, kUnknown };
@@ -32,19 +32,19 @@ class Tracing {
     return find_seam(normal) && complete() && closed() ? Answer::kTraced : Answer::kUnknown;
   }
 
-  /// False if the planes pass the middle nearer than `least`.
+  /// False if a plane is nearer to the middle than `least`.
   bool measure(double least, Measures& common, Pull& on_first) const;
   Region region(const Placed& a, Vec3 reference);
 
  private:
   struct Exit {
     CrossingFacets facets;
-    double rate_first, rate_second;  ///< one over the length of the ray within each body
+    double rate_first, rate_second;  ///< 1 / the length of the ray within each body
     bool leaves_first() const { return rate_first > rate_second; }
   };
 
   struct Outside {
-    int body, edge;  ///< a half-edge that goes from the common part to a vertex outside of the other body
+    int body, edge;  ///< a half-edge from the common part to a vertex outside the other body
   };
 
   struct OwnedFacet {
@@ -80,8 +80,8 @@ class Tracing {
     return static_cast<int>(vertices_.size() + facets_.size()) - static_cast<int>(ring_.size()) / 2 == 2;
   }
 
-  /// m: how far corners of the common polytope, counted from the middle, may lie off the planes of the body's facets:
-  /// rounding, and the flatness of both.
+  /// m: bound of the distance of the common polytope's corners, relative to the middle, from the planes of the body's
+  /// facets: rounding, and the flatness of both.
   double off_planes(int body) const {
     const double reach = std::sqrt(reach2_), kept = bodies_[body].corner_rounding() * reach;
     return std::max(kept, seam_.rounding(body)) + 2 * 0x1p-53 * std::max(reach, seam_.reach()) +
@@ -99,17 +99,17 @@ class Tracing {
   Seam seam_;
 
   std::optional<Outside> outside_;
-  std::optional<std::pair<int, int>> seed_;  ///< body and vertex inside the other, where no seam is known
+  std::optional<std::pair<int, int>> seed_;  ///< body and vertex inside the other, if no seam is known
   bool certain_ = true;
-  double reach2_ = 0;  ///< of kept vertices, the square of their largest distance from the common point
+  double reach2_ = 0;  ///< the squared largest distance of a kept vertex from the common point
   int now_ = 0;
   struct Kept {
-    int when, as;  ///< the run in which it was kept, and which vertex it is there
+    int when, as;  ///< the run that kept it, and its number there
   };
   std::array<std::vector<Kept>, 2> kept_;  ///< per vertex
-  std::array<std::vector<int>, 2> done_;   ///< per facet: the last run in which it was put in
-  std::array<std::vector<int>, 2> open_;   ///< half-edges between kept vertices, whose facet may not be done
-  std::vector<Vec3> vertices_;             ///< those of the seam first
+  std::array<std::vector<int>, 2> done_;   ///< per facet: the last run that added it
+  std::array<std::vector<int>, 2> open_;   ///< half-edges between kept vertices, with facets to do
+  std::vector<Vec3> vertices_;             ///< vertices of the seam first
   std::vector<int> ring_, ring_start_;
   std::vector<OwnedFacet> facets_;
 };
@@ -144,9 +144,9 @@ Tracing::Exit Tracing::exit(Vec3 direction, std::optional<CrossingFacets> near) 
   return e;
 }
 
-/// Facets that cross on the way from a direction in which the first body ends first to one in which the second does.
-/// One over the length of the ray is a convex function of the direction, linear on a facet: Newton's method for where
-/// the two are equal, within brackets.
+/// Facets that cross between two directions: in the first direction the ray leaves the first body sooner, in the second
+/// the second body. 1 / the length of the ray is a convex function of the direction, linear on a facet. Newton's method
+/// within brackets finds where the two are equal.
 CrossingFacets Tracing::between(Vec3 first, Vec3 second) const {
   double low = 0, high = 1, at = 0.5;
   bool newton = false;
@@ -167,7 +167,7 @@ CrossingFacets Tracing::between(Vec3 first, Vec3 second) const {
   return *last;
 }
 
-/// Finds a first line of the seam; or, where one body seems to lie inside the other, one of its vertices that does.
+/// Finds a first line of the seam. If one body seems to lie inside the other, finds a vertex of the inner body.
 bool Tracing::find_seam(Vec3 normal) {
   seed_.reset();
   const Vec3 side = any_orthogonal(normal), other_side = cross(normal, side);
@@ -177,7 +177,7 @@ bool Tracing::find_seam(Vec3 normal) {
   for (size_t i = 0; i < directions.size(); ++i) {
     e = exit(directions[i]);
     leaves_first[i] = e.leaves_first();
-    // Only directions along other axes are compared with: between opposite ones there is no middle.
+    // Compares only with directions along other axes: opposite directions have no middle.
     for (size_t j = 0; j < (i & ~size_t{1}); ++j)
       if (leaves_first[j] != leaves_first[i])
         return seam_.follow(leaves_first[i] ? between(directions[i], directions[j])
@@ -187,7 +187,8 @@ bool Tracing::find_seam(Vec3 normal) {
   return begin_inside(body, body == 0 ? e.facets.first : e.facets.second, directions.back());
 }
 
-/// Begins from a body that lies inside the other where the ray leaves through the facet; elsewhere it may not.
+/// Begins from a body that lies inside the other where the ray leaves through the facet. Elsewhere the body may be
+/// outside.
 bool Tracing::begin_inside(int body, int facet, Vec3 direction) {
   const int vertex = bodies_[body].data().ring[bodies_[body].data().ring_start[facet]];
   const Vec3 at = bodies_[body].corner(vertex).at;
@@ -199,8 +200,8 @@ bool Tracing::begin_inside(int body, int facet, Vec3 direction) {
 
 // -------------------------------------------------------------------------------------------------------- what they keep
 
-/// Puts the common polytope together. Every vertex that is kept is asked of the other body; one that is outside shows
-/// a line of the seam that was not known, and all begins once more.
+/// Builds the common polytope. Asks the other body about every kept vertex. A vertex outside shows an unknown line of
+/// the seam, and the construction starts again.
 bool Tracing::complete() {
   for (int round = 0; round < 64; ++round) {
     outside_.reset();
@@ -260,7 +261,7 @@ bool Tracing::assemble() {
   return spread(0) && spread(1);
 }
 
-/// Adds the piece of a facet that a line of the seam cuts out, all of which lies within the facet.
+/// Adds the piece of a facet that a line of the seam cuts out; all of the line lies within the facet.
 bool Tracing::add_whole_line(int body, const Seam::Line& line) {
   const std::vector<SeamCorner>& corners = seam_.corners();
   const CrossingFacets& facets = corners[line.first_corner].ahead;
@@ -275,8 +276,8 @@ bool Tracing::add_whole_line(int body, const Seam::Line& line) {
   return true;
 }
 
-/// Adds what is kept of the facet in which the seam goes on from a corner on its border: along the seam to the border,
-/// along the border to where the seam comes in again.
+/// Adds the kept part of the facet where the seam goes on from a corner on its border. The ring follows the seam to the
+/// border, and the border to the next entry of the seam.
 bool Tracing::add_cut_facet(int body, int first_corner) {
   const std::vector<SeamCorner>& corners = seam_.corners();
   const CloseBody& self = bodies_[body];
@@ -303,7 +304,7 @@ bool Tracing::add_cut_facet(int body, int first_corner) {
   return true;
 }
 
-/// Spreads from facet to facet over edges that are kept.
+/// Continues from facet to facet over kept edges.
 bool Tracing::spread(int body) {
   std::vector<int>& open = open_[body];
   while (!open.empty()) {
@@ -329,7 +330,7 @@ bool Tracing::add_whole_facet(int body, int half_edge) {
   return true;
 }
 
-/// Puts the end of a half-edge into the ring.
+/// Adds the end of a half-edge to the ring.
 bool Tracing::keep(int body, int half_edge) {
   const int vertex = bodies_[body].end(half_edge);
   const Kept& kept = kept_[body][vertex];
@@ -356,12 +357,12 @@ bool Tracing::keep_vertex(int body, int vertex) {
 
 double extent(Vec3 v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
-/// Sums over blocks of facets, which are added up then: of n terms, most are rounded far less than n times.
+/// Sums over blocks of facets, which are then added up. Most of n terms are then rounded far less than n times.
 struct BlockSums {
   static constexpr int kBlock = 64;  ///< facets
   double six_volumes = 0, area = 0;
-  double uncancelled = 0;  ///< no less than the six volumes would be if none of their terms cancelled
-  double moved = 0;        ///< volume, by the rounding of planes
+  double uncancelled = 0;  ///< upper bound of six times the volumes, without cancellation of terms
+  double moved = 0;        ///< volume change by the rounding of planes
   Vec3 moment;
 
   void add(const BlockSums& other) {
@@ -399,7 +400,8 @@ bool Tracing::measure(double least, Measures& common, Pull& on_first) const {
     const double area = std::sqrt(norm2(twice_area)) / 2;
     block.area += area;
     block.moved += area * off[facets_[f].body];
-    // The cone's volume tells how far its plane is, at least; only where that might be least is the plane looked at.
+    // The cone's volume gives a lower bound of its plane's distance. The plane itself is computed only if this may be
+    // the least.
     const double uncancelled = extent(a) * spanned;
     if (!(cone / 2 - 8 * 0x1p-53 * uncancelled > area * least_slack)) {
       const CloseBody::Side& side = bodies_[facets_[f].body].side(facets_[f].facet);
@@ -429,8 +431,8 @@ bool Tracing::measure(double least, Measures& common, Pull& on_first) const {
   }
   on_first.moment = on_first.moment - cross(centroid, on_first.force);
   common.centroid = frame_.origin + (origin + centroid);
-  // The error is, as for a region, what all planes moved by their rounding add, growth on the way included; then that
-  // of each product, and of the sums.
+  // As for a region, the error is the volume that all planes add when moved by their rounding, including growth on the
+  // way. The roundings of products and of sums come on top.
   const double most = std::max(off[0], off[1]);
   const double terms = static_cast<double>(most_in_block + facets_.size() / BlockSums::kBlock + 1);
   const double summed = 8 * 0x1p-53 * total.uncancelled / 6 + terms * 0x1p-53 * common.volume;
@@ -439,7 +441,7 @@ bool Tracing::measure(double least, Measures& common, Pull& on_first) const {
   return true;
 }
 
-/// The lower triangular matrix that makes the identity of a symmetric positive one: m = l lᵀ.
+/// The lower triangular matrix l of a symmetric positive definite matrix m, with m = l lᵀ.
 Mat3 cholesky(const Mat3& m, double least) {
   const auto root = [&](double x) { return std::sqrt(std::max(x, least)); };
   Mat3 l{{}, {}, {}};
@@ -452,7 +454,7 @@ Mat3 cholesky(const Mat3& m, double least) {
   return l;
 }
 
-/// The region in a frame about the middle of its vertices, in whose axes these spread evenly.
+/// The region in a frame about the middle of its vertices. In the axes of this frame, the vertices spread evenly.
 Region Tracing::region(const Placed& a, Vec3 reference) {
   const Vec3 origin = middle();
   Mat3 spread{{}, {}, {}};

@@ -8,15 +8,15 @@
 
 namespace overlapper {
 
-/// What two boxes or hulls with a graph have in common, from where their surfaces cross: the seam is followed from
-/// facet to facet, and what lies within it is kept as it is. Time grows with the seam and with what is kept; what is
-/// outside is never looked at. Everything is computed about a point in the common part, so that rounding is that of its
-/// size. Nothing is said where one of the signs that decide is not certain, or where it is not that the bodies are
-/// apart, or have a ball in common, by more than the doubt of their relation.
+/// The common set of two boxes or hulls with a graph, from the crossing of their surfaces. Tracing follows the seam
+/// from facet to facet, and keeps everything inside it unchanged. Time grows with the seam and the kept part; the
+/// outside is never visited. All coordinates are relative to a point in the common part, so rounding is relative to its
+/// size. No value if a deciding sign is uncertain. Also no value unless the bodies certainly are separated or have a
+/// common ball, by more than the doubt of their relation.
 std::optional<Measures> trace(const Placed& a, const Placed& b);
 
-/// The polytope that trace() has measured. Whoever asks has asked trace() the same and been answered; otherwise there
-/// may be nothing. The owner of a facet is 0 for the body that comes first in canonical order, else 1.
+/// The polytope that trace() has measured. Call it only after trace() of the same bodies gave a value; otherwise there
+/// may be none. The owner of a facet is 0 for the first body in canonical order, else 1.
 std::optional<Region> traced_region(const Placed& a, const Placed& b, Vec3 reference);
 
 }  // namespace overlapper
