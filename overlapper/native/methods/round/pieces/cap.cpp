@@ -29,7 +29,8 @@ struct Cap {
 
 /// Adds second moments. A shallow cap is far less along its axis than across.
 void add_second_moments(const Cap& cap, Moments& sum) {
-  const auto& [height, volume, disc, n, tip, first, along, across] = cap;
+  const double volume = cap.volume, first = cap.first, along = cap.along, across = cap.across;
+  const Vec3 n = cap.n, tip = cap.tip;
   const auto square = [&](double p, double u, double v, double w) {
     return volume * p * p + 2 * first * p * u + along * u * u + across * (v * v + w * w);
   };
@@ -42,7 +43,8 @@ void add_second_moments(const Cap& cap, Moments& sum) {
 
 /// The sizes of the terms of the moments.
 Moments sizes_of(const Cap& cap) {
-  const auto& [height, volume, disc, n, tip, first, along, across] = cap;
+  const double volume = cap.volume, first = cap.first, along = cap.along, across = cap.across;
+  const Vec3 n = cap.n, tip = cap.tip;
   const Vec3 p = abs(tip), u = abs(n), diagonal = scaled(u, u);
   const Vec3 other{diagonal.y + diagonal.z, diagonal.z + diagonal.x, diagonal.x + diagonal.y};
   Moments sizes{volume, first * u + volume * p, {}, {}};

@@ -177,7 +177,8 @@ struct CylinderScratch {
 bool add_cylinder(const Round& cylinder, const EnclosingPolytope& polytope, const DistinctWalls& distinct,
                   const PieceSetting& setting, Sums& sums) {
   const Scratch<CylinderScratch> scratch;
-  auto& [rings, owners] = *scratch;
+  quadric::Rings& rings = scratch->rings;
+  std::vector<int>& owners = scratch->owners;
   const Vec3 axis = rounded(cylinder.axis), across = any_orthogonal(axis);
   const Mat3 turn{across, cross(axis, across), axis};
   const Vec3 centre = rounded(slicing::foot(cylinder));
