@@ -1,5 +1,5 @@
-// libFuzzer harness: raw bytes become two to four placed shapes, near-degenerate ones above all, and every quantity of
-// their overlap is asked for and checked. With OVERLAPPER_FUZZ_PRINT set, the shapes are printed as Python before.
+// libFuzzer harness. Raw bytes become two to four placed shapes, mostly near-degenerate ones. Every quantity of their
+// overlap is computed and checked. With OVERLAPPER_FUZZ_PRINT set, it first prints the shapes as Python.
 
 #include <fuzzer/FuzzedDataProvider.h>
 
@@ -56,7 +56,7 @@ class Decoder {
     return q.x == 0 && q.y == 0 && q.z == 0 && q.w == 0 ? Quaternion{} : q;
   }
 
-  /// Points of which some are copies, nearly copies or middles of earlier ones, flattened by up to 2^-30.
+  /// Points, flattened by up to 2^-30. Some are copies, near copies or midpoints of earlier points.
   std::vector<Vec3> points() {
     std::vector<Vec3> points;
     const int count = integer(4, 20);
@@ -78,7 +78,7 @@ class Decoder {
     const double x = positive(), y = positive(), z = positive();
     return {x, y, z};
   }
-  /// A shape of a kind from positive fields, unless its fields may be anything.
+  /// A shape of a kind from positive fields, or from any fields if allowed.
   template <class S>
   S draw(const S*) {
     const auto draw_each = [&](const auto&... field) { return std::tuple{drawn(S().*field.member)...}; };
@@ -106,8 +106,8 @@ class Decoder {
     return found;
   }
 
-  /// Bytes that have run out decode to a box, which is cheapest. Kinds after the ellipsoid take numbers that else stand
-  /// for a hull.
+  /// Bytes that have run out decode to a box, the cheapest shape. Kinds after the ellipsoid take numbers that otherwise
+  /// mean a hull.
   Shape shape() {
     constexpr int kOfHull = 7;
     const int number = integer(0, 26);
@@ -132,7 +132,7 @@ class Decoder {
     return make_placed(std::move(chosen), position, orientation());
   }
 
-  /// The body moved until its support plane against `direction` meets that of the other, but for a nudge.
+  /// The body moved until its supporting plane against `direction` meets that of the other body, but for a nudge.
   Placed brought_to(const Placed& body, const Placed& other) {
     const Vec3 u = direction();
     const double nudge = integer(0, 2) == 0 ? 0 : integer(-2, 2) * power_of_two(-52, -1);
@@ -265,7 +265,7 @@ void check_measures(const Measures& m, const Mat3& inertia) {
 void check_boundary(const Boundary& boundary, int bodies, Method method) {
   const int facets = static_cast<int>(boundary.planes.size()), vertices = static_cast<int>(boundary.vertices.size());
   require(boundary.ring.size() % 2 == 0 && boundary.owner.size() == boundary.planes.size(), "facets are complete");
-  // The article's second hull joins facets that are coplanar but for rounding, which may be all there is of a body.
+  // The article's second hull merges facets that are coplanar but for rounding. A thin body may have no other facets.
   const bool closed = vertices - static_cast<int>(boundary.ring.size()) / 2 + facets == 2;
   require(closed || method == Method::kPaper, "Euler's formula for the surface");
   for (int v : boundary.ring) require(v >= 0 && v < vertices, "facets refer to vertices");
@@ -295,7 +295,7 @@ void check_contact(const Overlap& overlap) {
   require(finite(c.witness_a) && finite(c.witness_b), "the witness points are finite");
   require(finite(c.separating.normal) && std::isfinite(c.separating.offset), "the separating plane is finite");
   const double rounding = 0x1p-46 * extent(overlap.bodies());
-  // What the paper's method calls separated need not be.
+  // Method "paper" may report bodies as separated that are not.
   if (overlap.status() != Status::kSeparated || overlap.method() == Method::kPaper) return;
   require(c.distance > 0, "separated bodies are apart");
   if (bounded(a.shape))
@@ -306,7 +306,7 @@ void check_contact(const Overlap& overlap) {
             "the separating plane has b on its near side");
 }
 
-/// The forces are the area vectors of the facets, which close.
+/// The forces are the area vectors of a closed surface, so they sum to zero.
 void check_gradient(const Overlap& overlap) {
   Vec3 sum;
   for (const auto& row : overlap.gradient()) {
@@ -365,7 +365,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   try {
     overlapper::run(decoder);
   } catch (const std::invalid_argument&) {
-    // Flat hulls and half-spaces alone are refused, which is an answer.
+    // Flat hulls, or only half-spaces, are refused. A refusal is a valid answer.
   }
   return 0;
 }

@@ -12,7 +12,7 @@
 #include "overlap/overlap.h"
 #include "shapes/shape.h"
 
-/// numpy and the core, both ways.
+/// Conversions between numpy and the core.
 namespace overlapper::python {
 
 namespace nb = nanobind;
@@ -23,14 +23,14 @@ using Matrix = nb::ndarray<nb::numpy, const double, nb::ndim<2>>;
 using Indices = nb::ndarray<nb::numpy, const int, nb::ndim<1>>;
 using IndexMatrix = nb::ndarray<nb::numpy, const int, nb::ndim<2>>;
 
-/// What `compute` returns; other Python threads run meanwhile.
+/// The result of `compute`; other Python threads run meanwhile.
 template <class Compute>
 decltype(auto) unlocked(Compute compute) {
   const nb::gil_scoped_release release;
   return compute();
 }
 
-/// Hands a vector over to numpy, which frees it.
+/// Moves a vector into a numpy array, which frees it.
 template <class Array, class T>
 Array to_numpy(std::vector<T> values, std::initializer_list<size_t> shape) {
   auto* owned = new std::vector<T>(std::move(values));
@@ -53,7 +53,7 @@ inline Indices to_numpy(std::span<const int> values) {
   return to_numpy<Indices>(std::vector<int>(values.begin(), values.end()), {values.size()});
 }
 
-/// Rows of points, counted from elsewhere.
+/// Rows of points, with `origin` added.
 inline Matrix to_numpy(std::span<const Vec3> rows, Vec3 origin) {
   std::vector<Vec3> moved;
   moved.reserve(rows.size());
@@ -92,7 +92,7 @@ using Doubles = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
   throw nb::value_error((name + " " + reason).c_str());
 }
 
-/// Any array_like as contiguous doubles. `expected` describes the shape wanted, for the message.
+/// Any array_like as contiguous doubles. `expected` describes the required shape, for the message.
 inline Doubles to_doubles(nb::handle value, const std::string& name, const std::string& expected) {
   try {
     return nb::cast<Doubles>(nb::module_::import_("numpy").attr("ascontiguousarray")(value, "dtype"_a = "float64"));
@@ -133,7 +133,7 @@ inline double to_double(nb::handle value, const std::string& name) {
   }
 }
 
-/// Whole numbers of any width, in one dimension or in rows: copied, so that nobody can change them meanwhile.
+/// Whole numbers of any width, in one dimension or in rows. The copy keeps other threads from changing them.
 inline std::vector<std::int64_t> to_indices(nb::handle value, const std::string& name, int columns = 0) {
   const std::string expected = columns
                                    ? "must be an array of whole numbers of shape (p, " + std::to_string(columns) + ")"
@@ -142,7 +142,7 @@ inline std::vector<std::int64_t> to_indices(nb::handle value, const std::string&
   try {
     const nb::module_ numpy = nb::module_::import_("numpy");
     array = numpy.attr("asarray")(value);
-    // An empty list has no type of its own.
+    // numpy gives an empty list a float type.
     if (nb::cast<size_t>(array.attr("size")) == 0) array = array.attr("astype")("int64");
     array = array.attr("astype")("int64", "order"_a = "C", "casting"_a = "same_kind");
   } catch (nb::python_error& error) {
@@ -167,18 +167,18 @@ inline std::vector<Vec3> to_rows(nb::handle value, const std::string& name) {
   return rows;
 }
 
-/// A read-only property that makes a new array each time it is asked for.
+/// A read-only property that makes a new array on each access.
 template <class Class, class Getter>
 void array_property(Class& cls, const char* name, Getter getter, const char* doc) {
   cls.def_prop_ro(name, getter, nb::rv_policy::move, doc);
 }
 
-/// A shape as it came, or the hull of an (n, 3) array. TypeError or ValueError naming the argument.
+/// A shape as given, or the hull of an (n, 3) array. TypeError or ValueError naming the argument.
 Shape to_shape(nb::handle value, const std::string& name);
 nb::object to_python(const Shape& shape);
-/// The type of any shape, as signatures have it.
+/// The type of any shape in signatures.
 std::string any_shape();
-/// The same, placed at the origin unless it is a Placed.
+/// The same, at the origin unless it is a Placed.
 Placed to_placed(nb::handle value, const std::string& name);
 /// "auto" or "paper".
 Method to_method(nb::handle value);

@@ -15,7 +15,7 @@ std::vector<Shape> to_shapes(nb::handle given) {
   return shapes;
 }
 
-/// (k, columns) numbers, one row per shape: copied, as other threads may write to the array while this one works.
+/// (k, columns) numbers, one row per shape. The copy keeps other threads from changing them.
 std::vector<double> to_poses(nb::handle given, const char* name, size_t k, size_t columns) {
   const std::string expected = "an array of shape (k, " + std::to_string(columns) + "), one row per shape";
   const Doubles array = to_doubles(given, name, expected);
@@ -84,7 +84,7 @@ nb::object candidates(Batch& batch, nb::handle positions, nb::handle orientation
   return nb::cast(to_numpy<IndexMatrix>(std::move(flat), {pairs.size(), 2}), nb::rv_policy::move);
 }
 
-/// What NumPy makes of an element of a column: numbers of one type, in a shape.
+/// The numpy form of a column's element: numbers of one type, in a shape.
 template <class T>
 struct Numbers {
   using Type = T;
@@ -120,7 +120,7 @@ constexpr const char* kNumpyName<std::int8_t> = "int8";
 template <>
 constexpr const char* kNumpyName<bool> = "bool_";
 
-/// A read-only array over the vector that `values(overlaps)` finds, which the answer keeps alive.
+/// A read-only array over the vector `values(overlaps)`; the result keeps the vector alive.
 template <class T, class Values>
 void define_column(nb::class_<Overlaps>& cls, const char* name, Values values, const char* doc) {
   using Number = typename Numbers<T>::Type;
@@ -178,8 +178,7 @@ moments and the distance take some microseconds a pair when one of them is first
 without an area.)");
 }
 
-/// One that others have as well is copied to where Python keeps it: nanobind ends the process if it has no memory to
-/// share one.
+/// A shared Overlap is copied into memory of Python: nanobind ends the process if it has no memory to share one.
 nb::object overlap_of_row(const Overlaps& overlaps, size_t row) {
   std::shared_ptr<Overlap> found;
   {
@@ -200,7 +199,7 @@ nb::list shape_list(const std::vector<Shape>& shapes) {
   return list;
 }
 
-/// What the rows are of: their arrays are computed again, to the same bits.
+/// The inputs of the rows. Unpickling computes the arrays again, to the same bits.
 nb::tuple state_of(const Overlaps& self) {
   std::vector<double> positions, orientations;
   for (const PoseNumbers& pose : *self.poses) {
@@ -276,7 +275,7 @@ as an answer to where a ray leaves it or which of its planes is tightest about a
 
 #define OVERLAPPER_POSES "positions: numpy.typing.ArrayLike, orientations: numpy.typing.ArrayLike"
 
-/// The type of shapes in a row, as signatures have it.
+/// The type of a sequence of shapes in signatures.
 std::string any_shapes() { return "collections.abc.Sequence[" + any_shape() + "]"; }
 
 constexpr const char* kOverlapsDoc =

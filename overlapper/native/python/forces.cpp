@@ -6,7 +6,7 @@
 namespace overlapper::python {
 namespace {
 
-/// A patch has no direction if its area vector is less than this fraction of the surface of what is shared.
+/// A patch has no direction if its area vector is less than this fraction of the surface of the common set.
 constexpr double kNoDirection = 1e-6;
 
 std::vector<double> numbers(nb::handle given, const char* name, size_t rows, size_t columns = 1) {
@@ -105,7 +105,7 @@ nb::tuple solve(ContactSolver& solver, double duration, nb::handle velocity_give
                         to_numpy<Vector>(std::move(solution.acceleration), {coordinates}), solution.sweeps);
 }
 
-/// Where shapes are that go on as their links move now.
+/// The poses of shapes after `duration` at the present velocities of their links.
 nb::tuple ahead(const ContactSolver& solver, double duration, nb::handle velocity_given, nb::handle links_given,
                 nb::handle positions_given, nb::handle orientations_given) {
   const Multibodies& bodies = solver.bodies();

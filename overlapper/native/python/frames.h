@@ -2,10 +2,10 @@
 
 #include "python/arrays.h"
 
-/// What pybullet says of where things are.
+/// Frames as pybullet returns them.
 namespace overlapper::python {
 
-/// A list or a tuple of what is given.
+/// The items of a list or a tuple.
 struct Items {
   explicit Items(nb::handle given)
       : list(nb::steal(PySequence_Fast(given.ptr(), "frames must be pairs of sequences of numbers"))) {
@@ -31,7 +31,7 @@ void read(nb::handle given, std::array<double, n>& numbers) {
   }
 }
 
-/// A frame in the world, its quaternion as given.
+/// A frame in the world, with its quaternion as given.
 struct Frame {
   Vec3 position;
   Quaternion orientation;
@@ -54,7 +54,7 @@ inline Vec3 rotated(Quaternion q, Vec3 v) {
   return v + q.w * twice + cross(axis, twice);
 }
 
-/// Turns by `b`, then by `a`.
+/// The rotation by `b`, then by `a`.
 inline Quaternion operator*(Quaternion a, Quaternion b) {
   const Vec3 v = vector_part(a), u = vector_part(b), product = a.w * u + b.w * v + cross(v, u);
   return {product.x, product.y, product.z, a.w * b.w - dot(v, u)};

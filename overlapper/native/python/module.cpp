@@ -6,8 +6,8 @@
 
 namespace {
 
-/// Lets Python handle signals: false if a handler raised, as that of Ctrl-C does. What a handler computes is not
-/// counted to what was interrupted.
+/// Lets Python handle signals. False if a handler raised, as the handler of Ctrl-C does. Planes that a handler
+/// evaluates do not count for the interrupted call.
 bool no_handler_raised() {
   const auto asked = overlapper::planes_asked;
   const nanobind::gil_scoped_acquire acquire;
@@ -16,7 +16,7 @@ bool no_handler_raised() {
   return none;
 }
 
-/// What was cancelled raises what the handler raised.
+/// A cancelled call raises the exception of the handler.
 void raise_again(const std::exception_ptr& exception, void*) {
   try {
     std::rethrow_exception(exception);
@@ -28,7 +28,7 @@ void raise_again(const std::exception_ptr& exception, void*) {
 }  // namespace
 
 NB_MODULE(_core, m) {
-  // A test runner that keeps tracebacks alive at exit is not a leak of ours.
+  // A test runner may keep tracebacks alive at exit, which is not a leak of this module.
   nanobind::set_leak_warnings(false);
   m.doc() = "Convex shapes and the polytopes they share.";
   overlapper::cancellation::still_wanted = &no_handler_raised;

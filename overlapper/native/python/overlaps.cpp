@@ -30,13 +30,13 @@ Overlap make_overlap(std::vector<Placed> bodies, double tolerance, Method method
   return Overlap(std::move(bodies), tolerance, method);
 }
 
-/// The type of what to_placed() takes, as signatures have it.
+/// The type of the argument of to_placed() in signatures.
 std::string any_body() { return any_shape() + " | Placed | numpy.typing.ArrayLike"; }
 
-/// True where the answer takes so few microseconds that letting other Python threads run meanwhile would double them.
+/// True if the answer takes so few microseconds that releasing the interpreter lock would double them.
 bool quick(const Shape& shape) { return !smooth(shape) && facets(shape) <= 64; }
 
-/// The answer is built where Python keeps it.
+/// Constructs the result in memory of Python.
 nb::object overlap_of_pair(nb::handle type, const Placed& a, const Placed& b) {
   nb::object answer = nb::inst_alloc(type);
   const auto build = [&] { new (nb::inst_ptr<Overlap>(answer)) Overlap(a, b, 1e-3, Method::kAuto); };
@@ -50,20 +50,20 @@ nb::object overlap_of_pair(nb::handle type, const Placed& a, const Placed& b) {
   return answer;
 }
 
-/// What `compute` returns of such bodies; other Python threads run meanwhile unless it is quick.
+/// The result of `compute` for such bodies; other Python threads run meanwhile unless it is quick.
 template <class Compute>
 decltype(auto) computed_of(std::span<const Placed> bodies, Compute compute) {
   if (std::ranges::all_of(bodies, [](const Placed& body) { return quick(body.shape); })) return compute();
   return unlocked(compute);
 }
 
-/// What an overlap answers, and may have to compute first.
+/// An answer of an overlap, which may have to be computed first.
 template <class Answer>
 Answer computed(const Overlap& o, Answer (Overlap::*ask)() const) {
   return computed_of(o.bodies(), [&]() -> Answer { return (o.*ask)(); });
 }
 
-/// Computes what the properties are about to read while other Python threads run.
+/// Computes the values of the properties to be read, while other Python threads run.
 const Overlap& measured(const Overlap& o) {
   if (solid(o) && !o.measured_at_once()) {
     const nb::gil_scoped_release release;
@@ -95,7 +95,7 @@ void contact_property(nb::class_<Overlap>& cls, const char* name, Given given, G
       sig, doc);
 }
 
-/// Likewise, of the patch.
+/// The same for a property of the patch.
 template <class Getter, class Given>
 void patch_property(nb::class_<Overlap>& cls, const char* name, Given given, Getter getter, const nb::sig& sig,
                     const char* doc) {
@@ -193,11 +193,11 @@ arithmetic from the shapes' own numbers, as were centroid, area, inertia and gra
 of the facets that the body owns, and its moment. m² and m³; zeros unless overlapping.)");
 }
 
-/// Of an overlap, whose figures it is about.
+/// The error bounds of an overlap.
 struct ErrorsOf {
   Errors errors;
   bool solid;
-  std::optional<ContactErrors> contact;  ///< of a pair
+  std::optional<ContactErrors> contact;  ///< only for a pair
 };
 
 std::string repr(const ErrorsOf& e) {
@@ -431,7 +431,7 @@ volume in m³. Raises CertificateError where there is none.)");
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
-/// In the order and from the reference of an Overlap, so that both say the same to the last bit.
+/// In the order and about the reference of an Overlap, so that both give the same bits.
 std::array<Placed, 2> relative_pair(nb::handle a, nb::handle b) {
   const std::array<Placed, 2> pair{to_placed(a, "a"), to_placed(b, "b")};
   const std::vector<int> order = canonical_order(pair);
@@ -439,7 +439,7 @@ std::array<Placed, 2> relative_pair(nb::handle a, nb::handle b) {
   return {first.seen_from(first.pose.translation), second.seen_from(first.pose.translation)};
 }
 
-/// Of a pair whose status doubles alone do not know, or whose contact they do not know well enough.
+/// The contact of a pair if doubles alone do not decide its status, or do not give its contact accurately enough.
 Contact contact_in_doubt(nb::handle a, nb::handle b) {
   const std::array pair{to_placed(a, "a"), to_placed(b, "b")};
   return computed_of(pair, [&] { return Overlap(pair[0], pair[1], 1e-3, Method::kAuto).contact(); });

@@ -73,7 +73,7 @@ std::string text(Vec3 v) { return tuple_text({v.x, v.y, v.z}); }
 
 std::string text(double value) { return number(value); }
 
-/// By its fields.
+/// Equality by fields.
 template <class S>
 std::string repr(const S& shape) {
   std::string arguments;
@@ -97,7 +97,7 @@ std::string repr(const Shape& shape) {
   return ask(shape, [](const auto& s) { return repr(s); });
 }
 
-/// Divided by its length; as given if that is 1 but for a rounding, so that what is read back is the same body.
+/// Divided by its length; as given if the length is 1 to rounding, so that a body read back keeps its bits.
 Quaternion unit(Quaternion given) {
   const auto length = [](Quaternion q) { return std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w); };
   if (std::abs(length(given) - 1) <= 2 * DBL_EPSILON) return given;
@@ -112,7 +112,7 @@ std::string repr(const Placed& p) {
          ", orientation=" + tuple_text({q.x, q.y, q.z, q.w}) + ")";
 }
 
-/// What all shapes share: measures, printing, copies that are the same object.
+/// Members of all shape classes: measures, printing, copies that are the same object.
 template <class T>
 void define_common(nb::class_<T>& cls) {
   cls.def_prop_ro("volume", [](const T& s) { return s.volume(); }, "Volume in m³; infinite for a half-space.");
@@ -140,7 +140,7 @@ using Fields = decltype(S::fields());
 template <size_t>
 using Handle = nb::handle;
 
-/// The class of a kind of shape whose fields are the arguments of its make(), and what a pickle has.
+/// The class of a kind of shape. Its fields are the arguments of its make() and the state of a pickle.
 template <class S, size_t... I>
 nb::class_<S> class_of(nb::module_& m, std::index_sequence<I...>) {
   nb::class_<S> cls(m, S::kName, S::kAbout);
@@ -181,7 +181,7 @@ void define_attribute(nb::class_<S>& cls, const Field<S, Vec3>& field) {
   array_property(cls, field.name, [member](const S& s) { return to_numpy(s.*member); }, field.about);
 }
 
-/// A kind of shape that is told by its fields alone.
+/// A kind of shape that its fields define completely.
 template <class S>
 void define(nb::module_& m, const S*) {
   nb::class_<S> cls = class_of<S>(m);
@@ -193,7 +193,7 @@ nb::object triples(const std::vector<std::array<int, 3>>& rows) {
   return nb::cast(to_numpy(std::span<const int>(rows.data()->data(), 3 * rows.size())), nb::rv_policy::move);
 }
 
-/// A hull travels as it was built, so that indices into its facets mean the same in another process.
+/// A pickled hull keeps its facets, so that their indices mean the same in another process.
 nb::tuple hull_state(const Hull& hull) {
   const HullData& d = *hull.data;
   return nb::make_tuple(
@@ -208,7 +208,7 @@ bool equal(nb::handle a, nb::handle b) {
   return nb::cast<bool>(nb::module_::import_("numpy").attr("array_equal")(a, b));
 }
 
-/// Only the surface is taken from a state: all else is made anew, and must be what is there.
+/// Takes only the surface from a state. All else is computed again, and must equal the state.
 Hull hull_from_state(nb::handle given) {
   constexpr const char* kNoHull = "state must be that of a hull";
   if (!nb::isinstance<nb::tuple>(given) || nb::len(given) != 8) throw nb::value_error(kNoHull);

@@ -39,28 +39,28 @@ Row4<Scalar> solve(std::array<Row4<Scalar>, 4> m, Row4<Scalar> b) {
   return z;
 }
 
-/// A plane of the basis that may leave it: with which weight it is left, and how much of it the entering plane has.
+/// A plane of the basis that may leave it: the ratio of its weight to its share of the entering plane, and that share.
 template <class Scalar>
 struct Leaving {
   int plane = -1;
   Scalar ratio{std::numeric_limits<double>::infinity()}, share{};
 };
 
-/// Shares beyond it are not rounding.
+/// Larger shares are not rounding.
 inline bool has_share(double share) { return share > 1e-12; }
-/// The shares add up to one, so that one of them is a quarter or more.
+/// The shares add up to one, so at least one of them is a quarter or more.
 inline bool has_share(DoubleDouble share) { return share.head > 0x1p-80; }
 
-/// Rounding tells equal ratios apart at random: the first that comes out least will do.
+/// Rounding orders equal ratios at random, so any least ratio is good.
 inline bool leaves_sooner(const Leaving<double>& a, const Leaving<double>& b) { return a.ratio < b.ratio; }
-/// Double-doubles tell equal ratios from others, and of those the largest share keeps the basis farthest from singular.
+/// Double-doubles recognize equal ratios. Of these, the largest share keeps the basis farthest from singular.
 inline bool leaves_sooner(const Leaving<DoubleDouble>& a, const Leaving<DoubleDouble>& b) {
   const bool equal = b.plane >= 0 && abs(a.ratio - b.ratio).head <= 0x1p-80;
   return equal ? a.share > b.share : a.ratio < b.ratio;
 }
 
-/// Four planes at which the optimum of a linear programme lies, the largest ball within all planes seen so far: max r
-/// with dot(n, x) + r <= offset. Scalars are doubles or double-doubles; a `Cut` has a `plane` with a unit normal.
+/// The four planes at the optimum of a linear programme: the largest ball within all planes seen so far, max r with
+/// dot(n, x) + r <= offset. Scalars are doubles or double-doubles; a `Cut` has a `plane` with a unit normal.
 template <class Cut>
 class Basis {
  public:
@@ -96,8 +96,8 @@ class Basis {
     return true;
   }
 
-  /// An upper bound of the radius that holds whatever rounding did to the basis: the mean of the four inequalities by
-  /// non-negative weights, about `centre`, for balls whose centre is within `reach` of it.
+  /// An upper bound of the radius that holds despite the rounding of the basis, for balls with a centre within `reach`
+  /// of `centre`. It is the mean of the four inequalities by non-negative weights, about `centre`.
   double certified_radius(const Vector& centre, double reach) const {
     Scalar total{}, bound{};
     Vector left_over;
@@ -115,7 +115,7 @@ class Basis {
     return {plane.normal.x, plane.normal.y, plane.normal.z, Scalar{1}};
   }
 
-  /// The weights of the four inequalities that bound the radius: rounding alone makes one of them negative.
+  /// The weights of the four inequalities that bound the radius. Only rounding can make one of them negative.
   void weigh() {
     weight_ = combination_of(Row4<Scalar>{Scalar{}, Scalar{}, Scalar{}, Scalar{1}});
     for (Scalar& w : weight_)

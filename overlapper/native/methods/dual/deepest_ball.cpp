@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The largest of the numbers that the planes were made from.
+/// The largest number that the planes were computed from.
 double magnitude(std::span<const OwnedPlane> planes, std::span<const double> reach) {
   double largest = 0;
   for (const OwnedPlane& p : planes)
@@ -21,7 +21,7 @@ double magnitude(std::span<const OwnedPlane> planes, std::span<const double> rea
   return largest;
 }
 
-/// The plane of the listed ones and of the smooth bodies that `point` violates most.
+/// The plane that `point` violates most, of the listed planes and those of the smooth bodies.
 OwnedPlane tightest(std::span<const Placed> bodies, std::span<const OwnedPlane> planes, Vec3 point) {
   const OwnedPlane* worst = nullptr;
   double outside = -kInfinity;
@@ -39,8 +39,8 @@ OwnedPlane tightest(std::span<const Placed> bodies, std::span<const OwnedPlane> 
   return result;
 }
 
-/// A tetrahedron around one of the bounded bodies, of its supporting planes; around everything of interest if none is
-/// bounded.
+/// A tetrahedron of supporting planes around one of the bounded bodies. If none is bounded, a tetrahedron around
+/// everything relevant.
 std::array<OwnedPlane, 4> surrounding_simplex(std::span<const Placed> bodies, std::span<const OwnedPlane> planes) {
   const double s = 1 / std::sqrt(3.0);
   const std::array<Vec3, 4> directions{Vec3{s, s, s}, Vec3{s, -s, -s}, Vec3{-s, s, -s}, Vec3{-s, -s, s}};
@@ -72,13 +72,13 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double>
     best.cuts.push_back(hint);
     basis.exchange(hint);
   }
-  // Every exchange lowers the optimum or, at a degenerate corner, keeps it; smooth bodies add planes without end.
+  // Each exchange lowers the optimum or, at a degenerate corner, keeps it. Smooth bodies add planes without end.
   constexpr int kMaxRounds = 256;
   const double largest_reach = *std::max_element(reach.begin(), reach.end());
   for (int round = 0; round < kMaxRounds; ++round) {
     cancellation_point(planes.size());
     const auto [centre, radius] = basis.ball();
-    // At a nearly singular corner the centre runs away, and both figures with it.
+    // At a nearly singular corner the centre runs away, and so do both bounds.
     const OwnedPlane worst = tightest(bodies, planes, centre);
     const double made_from = std::max(magnitude(basis.cuts(), reach), worst.owner >= 0 ? reach[worst.owner] : 0);
     const double rounding_here = rounding(std::max(made_from, norm(centre)));
@@ -88,7 +88,7 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double>
     const double slack = -signed_distance(worst.plane, centre);
     if (slack > best.lower)
       best.lower = slack, best.centre = centre, best.rounding = rounding_here, best.sure = slack > certain;
-    // Newton's method starts from any inner point; a share of the depth is enough.
+    // Newton's method starts from any inner point; a fraction of the depth is enough.
     const bool deep = best.lower > best.rounding && best.lower >= best.upper / 4;
     const bool optimal = best.upper - best.lower <= 2 * best.rounding;
     if (deep || best.apart || optimal || !basis.exchange(worst)) break;
@@ -99,7 +99,7 @@ DeepestBall deepest_ball(std::span<const Placed> bodies, std::span<const double>
 
 namespace {
 
-/// The rows of dual points a, factored as a = R^T q with orthonormal columns of q: the Dikin frame of the rows is R^-1.
+/// The rows of dual points a, factored as a = R^T q with orthonormal columns of q. The Dikin frame of the rows is R^-1.
 struct Orthogonalised {
   std::vector<Vec3> rows;  ///< q
   Mat3 inverse_r;          ///< x = inverse_r * y
@@ -107,8 +107,8 @@ struct Orthogonalised {
 
 double column(const Vec3& v, int j) { return v[j]; }
 
-/// Gram-Schmidt, twice, on the three columns of the rows, the longest remaining column first. Rows of sliver planes are
-/// larger by any factor than the rest; each column is therefore first divided by its length.
+/// Gram-Schmidt, twice, on the three columns of the rows, the longest remaining column first. Rows of sliver planes may
+/// be larger than the others by any factor. Each column is therefore first divided by its length.
 Orthogonalised orthogonalise(std::span<const Vec3> a) {
   const int n = static_cast<int>(a.size());
   std::array<std::vector<double>, 3> q;
@@ -158,9 +158,9 @@ Mat3 axes_along(Vec3 first) {
   return {first, second, cross(first, second)};
 }
 
-/// The step along `direction` that makes the product of the slacks largest. Row q has the slack 1 - step * dot(q,
-/// direction) of what it had; the sum of their logarithms is concave, so its slope is bisected. Unlike the damped step,
-/// which at most doubles a slack, this crosses a sliver of any aspect in one go.
+/// The step along `direction` that maximizes the product of the slacks. The step multiplies the slack of row q by 1 -
+/// step * dot(q, direction). The sum of the logarithms is concave, so bisection of its slope finds the maximum. A
+/// damped step at most doubles a slack; this step crosses a sliver of any aspect at once.
 double best_step(std::span<const Vec3> rows, Vec3 direction) {
   double steepest = 0;
   for (Vec3 q : rows) steepest = std::max(steepest, dot(q, direction));
@@ -181,14 +181,14 @@ double best_step(std::span<const Vec3> rows, Vec3 direction) {
   return low;
 }
 
-/// The point that is moved by transposed(axes) * way.
+/// The point moved by transposed(axes) * way.
 Vec3 moved(Vec3 point, const Mat3& axes, Vec3 way) { return point + apply_transposed(axes, way); }
 WideVector moved(const WideVector& point, const Mat3& axes, Vec3 way) {
   return point + apply_transposed(axes, wide(way));
 }
 
-/// Newton's method for the analytic centre of the planes, from a point strictly inside all of them. Works in the frame
-/// of the last step, so that slacks of any ratio meet as numbers near one.
+/// Newton's method for the analytic centre of the planes, from a point strictly inside all of them. It works in the
+/// frame of the last step, so that slacks of any ratio become numbers near one.
 template <class AnyPlane>
 class AnalyticCentre {
  public:
@@ -206,7 +206,7 @@ class AnalyticCentre {
         const double slack = -rounded(signed_distance(p.plane, frame_.origin));
         if (slack < closest) closest = slack, nearest = rounded(p.plane.normal);
       }
-      // In axes along the nearest plane's normal, the large entries of a sliver's rows fall into one column.
+      // In axes along the nearest plane's normal, the large entries of a sliver's rows are in one column.
       const Mat3 axes = axes_along(nearest);
       for (const Owned<AnyPlane>& p : planes) {
         const double slack = -rounded(signed_distance(p.plane, frame_.origin));
@@ -236,14 +236,14 @@ FrameAbout<PointOf<Body>> round_frame(std::span<const Body> bodies, std::span<co
                                       std::vector<Owned<PlaneOf<Body>>> cuts, const PointOf<Body>& inside) {
   using Cut = Owned<PlaneOf<Body>>;
   PointOf<Body> safe = inside;
-  // A cut may pass through the point by rounding only; such a plane would stop Newton's method before it starts.
+  // A plane may pass through the point only by rounding. It would stop Newton's method at the start.
   AnalyticCentre<PlaneOf<Body>> centre(safe);
   constexpr int kMaxRounds = 64;
   for (int round = 0; round < kMaxRounds; ++round) {
     cancellation_point(planes.size() + cuts.size());
     centre.settle(cuts);
     const FrameAbout<PointOf<Body>>& frame = centre.frame();
-    // The plane that is nearest in the metric of the frame, or violated.
+    // The nearest or a violated plane, in the metric of the frame.
     Cut worst{{}, -1};
     double eccentricity = kEccentricity;
     const auto consider = [&](const Cut& p) {
@@ -260,11 +260,11 @@ FrameAbout<PointOf<Body>> round_frame(std::span<const Body> bodies, std::span<co
     const double slack = -rounded(signed_distance(worst.plane, frame.origin));
     const double safe_slack = -rounded(signed_distance(worst.plane, safe));
     if (slack > 0) continue;
-    // The centre goes back towards the safe point, to the middle of what the new plane leaves.
+    // The centre moves back towards the safe point, to the middle of the part that the new plane leaves.
     const double reach = safe_slack / (safe_slack - slack);
     centre.restart(safe + reach / 2 * (frame.origin - safe));
   }
-  // The axes stay, about the point known to be inside; this is not seen to happen.
+  // The axes stay, about the point known to be inside. No test has reached this.
   return {safe, centre.frame().axes};
 }
 

@@ -39,7 +39,7 @@ struct Growth {
   }
 
   /// The plane of the smooth bodies through which the ray from the origin to `vertex` leaves first. `reach` is the
-  /// distance of the vertex over that of the exit.
+  /// distance of the vertex divided by that of the exit.
   std::optional<Cut> first_exit(Vec3 vertex, double& reach) const {
     std::optional<Cut> first;
     reach = 0;
@@ -53,9 +53,9 @@ struct Growth {
     return first;
   }
 
-  /// Adds tangent planes where a vertex reaches too far out of a smooth body, until none does.
+  /// Adds tangent planes where a vertex lies too far outside a smooth body, until none does.
   void refine(double tolerance) {
-    constexpr int kMostPlanes = 1 << 20;  // what is left beyond it is in the error bound
+    constexpr int kMostPlanes = 1 << 20;  // the error bound includes the rest
     inner.assign(hull.facets.size(), 1);
     std::deque<int> unsettled(hull.facets.size());
     std::iota(unsettled.begin(), unsettled.end(), 0);
@@ -80,11 +80,11 @@ struct Growth {
   }
 };
 
-/// How far a polytope may shrink about its origin for the volume to be right to the fraction `tolerance`: by s it loses
-/// less than 3 s of its volume, of which measure() leaves 7/12 in doubt; rounding has the rest.
+/// How far a polytope may shrink about its origin within a volume error of `tolerance`. Shrinking by s loses less than
+/// 3 s of the volume, and measure() leaves 7/12 of that in doubt. The remainder is for rounding.
 double shrinking_within(double tolerance) { return 0.56 * tolerance; }
 
-/// The region's reference and frame, for one about `reference`.
+/// Sets the region's reference and frame. The given frame is about `reference`.
 void set_frame(Region& region, const Frame& frame, Vec3 reference) {
   region.reference = reference;
   region.frame = frame;
@@ -162,15 +162,15 @@ std::optional<Region> widened(std::span<const Placed> bodies, const Region& regi
 
 namespace {
 
-/// The volume of the star about the origin over the vertices pulled in to where they lie in the common set. Each of its
-/// tetrahedra has its corners in the set, so it lies inside.
+/// The volume of the star about the origin over the vertices, pulled in to the common set. Each of its tetrahedra has
+/// its corners in the set, so it lies inside.
 double inner_volume(const Region& region) {
   const Polytope& p = region.polytope;
   SumInPairs<double> sum;
   for (int f = 0; f < p.facets(); ++f) {
     const auto ring = p.facet(f);
     const auto pulled = [&](int v) { return region.inner[v] * p.vertices[v]; };
-    // The fan starts at the corner that is pulled least.
+    // The fan starts at the corner with the least pull.
     size_t first = 0;
     for (size_t i = 1; i < ring.size(); ++i)
       if (region.inner[ring[i]] > region.inner[ring[first]]) first = i;
@@ -208,7 +208,7 @@ MeasuresAndInertia measure(const Region& region, std::span<const Placed> bodies)
   const bool exact = std::all_of(region.inner.begin(), region.inner.end(), [](double t) { return t == 1; });
   const double inner = exact ? outer : scale * inner_volume(region);
   // On a doubly curved surface, a regular facet's tangent polygon leaves 5/12 of the shell between the two polytopes
-  // outside of the body and the fan over its pulled-in corners 7/12 inside of it.
+  // outside the body. The fan over its pulled-in corners leaves 7/12 inside.
   m.volume = outer - 5.0 / 12.0 * (outer - inner);
 
   const Vec3 centre = in_frame.first_moment / in_frame.volume;
@@ -237,9 +237,10 @@ MeasuresAndInertia measure(const Region& region, std::span<const Placed> bodies)
   m.area = areas.total();
   if (bodies.size() > 2) m.pulls_of_group.resize(bodies.size());
   for (size_t i = 0; i < bodies.size(); ++i) (bodies.size() > 2 ? m.pulls_of_group[i] : m.pulls[i]) = pulls[i].total();
-  // The error is, to first order, what all planes moved by their rounding add; then by the area that grows on the way.
+  // To first order, the error is the volume that all planes add when moved by their rounding. The area also grows on
+  // the way.
   const double moved = moves.total() * growth(farthest, least_slack) / 3;
-  // The sums themselves follow, whose vertices are placed to about a hundred roundings.
+  // The error of the sums follows: vertices are placed to about a hundred roundings.
   m.volume_error = 7.0 / 12.0 * (outer - inner) + moved + 256 * DBL_EPSILON * outer;
   return {std::move(m), inertia_tensor(spread)};
 }

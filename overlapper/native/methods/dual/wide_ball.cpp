@@ -17,7 +17,7 @@ WidePlane supporting(const WideBody& body, const WideVector& outward) {
   return {normal, dot(normal, body.support(normal))};
 }
 
-/// A tetrahedron around one of the bounded bodies; around everything of interest if none is bounded.
+/// A tetrahedron around one of the bounded bodies; around everything relevant if none is bounded.
 std::array<Owned<WidePlane>, 4> surrounding_simplex(std::span<const WideBody> bodies, double reach) {
   const std::array<Vec3, 4> directions{Vec3{1, 1, 1}, Vec3{1, -1, -1}, Vec3{-1, 1, -1}, Vec3{-1, -1, 1}};
   std::array<Owned<WidePlane>, 4> simplex;
@@ -53,7 +53,7 @@ WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const Own
   Basis basis(simplex);
   WideBall best{{}, -kInfinity, kInfinity, {}};
   best.cuts.assign(simplex.begin(), simplex.end());
-  /// Takes a plane into the basis, moved out by so much.
+  /// Adds a plane to the basis, moved out by `out`.
   const auto enter = [&](const Owned<WidePlane>& cut, double out = 0) {
     best.cuts.push_back(cut);
     return basis.exchange({{cut.plane.normal, cut.plane.offset + DoubleDouble{out}}, cut.owner});
@@ -68,7 +68,7 @@ WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const Own
     const bool shallow = best.upper <= margin && best.lower >= -margin;
     return deep || shallow || best.upper < -margin || best.upper - best.lower <= 4 * rounding;
   };
-  /// Notes how far inside all bodies the ball's centre is, and returns the plane that is nearest to it, or passed.
+  /// Updates how far inside all bodies the ball's centre is. Returns the plane nearest to the centre, or violated.
   const auto looked_at = [&](const WideVector& centre) {
     const Owned<WidePlane> worst = tightest(bodies, centre);
     const double slack = -signed_distance(worst.plane, centre).head - rounding;
@@ -83,9 +83,9 @@ WideBall wide_deepest_ball(std::span<const WideBody> bodies, std::span<const Own
     if (decided() || !enter(worst)) break;
   }
   if (decided() || !(best.upper > margin)) return best;
-  // Where many planes touch the largest ball, the simplex method may go round in circles. It does not among planes that
-  // are each moved out by another small part of the radius, and how far the ball of those is inside is asked of the
-  // bodies as they are.
+  // Where many planes touch the largest ball, the simplex method may cycle. It does not cycle if each plane is moved
+  // out by a different small fraction of the radius. The bodies themselves then tell how far inside that ball's centre
+  // is.
   basis = Basis(simplex);
   double part = 0;
   for (int round = 0; round < kMaxRounds && !decided(); ++round) {

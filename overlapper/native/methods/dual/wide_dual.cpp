@@ -6,8 +6,8 @@
 namespace overlapper {
 namespace {
 
-/// Makes the dual points of one body: the frame's origin and axes are turned into its own coordinates once, and its
-/// planes stay as they are.
+/// Makes the dual points of one body. It maps the frame's origin and axes to the body's own coordinates once, and
+/// leaves the body's planes unchanged.
 class BodyDuals {
  public:
   BodyDuals(const Placed& body, int owner, Vec3 reference, const Frame& frame)
@@ -20,8 +20,8 @@ class BodyDuals {
              apply_transposed(rotation_, wide(columns.row2))};
   }
 
-  /// True if the plane of a triangle certainly keeps farther from the origin than `reach` in the frame. Doubles
-  /// answer, their rounding taken for granted: most planes of a large mesh need no more.
+  /// True if the plane of a triangle is certainly farther from the origin than `reach` in the frame. Uses doubles with
+  /// an error bound, which decide for most planes of a large mesh.
   bool far(Vec3 a, Vec3 b, Vec3 c, double reach) const {
     const Vec3 normal = cross(b - a, c - a), away = a - rounded(origin_);
     const double slack = dot(normal, away) - 0x1p-46 * norm(b - a) * norm(c - a) * (norm(a) + norm(away));
@@ -30,8 +30,7 @@ class BodyDuals {
     return slack > 2 * reach * norm(along);
   }
 
-  /// The dual of the plane with that normal, of any length, through a point; and of a plane with a normal of any
-  /// length.
+  /// The dual of the plane through a point with that normal of any length; and of a plane with a normal of any length.
   WideDual through(const WideVector& normal, Vec3 point) const {
     return make(normal, dot(normal, wide(point) - origin_));
   }

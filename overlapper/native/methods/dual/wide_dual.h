@@ -8,26 +8,27 @@
 
 namespace overlapper {
 
-/// Rounding, relative, where only the last steps are in doubles and all before them in double-double: four ulps.
+/// Relative rounding error if only the last steps are in doubles and all others in double-double: four ulps.
 inline constexpr double kLastRounding = 8 * 0x1p-53;
 
-/// m: a dual point rounded once moves its plane, as seen from the origin, by an ulp at the distance of the vertices.
+/// m: the movement of a plane when its dual point is rounded once: an ulp, as seen from the origin, at the distance of
+/// the vertices.
 inline double rounding_of_dual(double slack, Vec3 dual, double farthest) {
   return slack * kLastRounding * std::max(1.0, norm(dual) * farthest);
 }
 
-/// The dual point of a body's plane in the coordinates of a frame, each coordinate right to an ulp of the point's
-/// length.
+/// The dual point of a body's plane in the coordinates of a frame. The error of each coordinate is an ulp of the
+/// point's length.
 struct WideDual {
   Vec3 point;
   Vec3 normal;   ///< unit, in the world
-  double slack;  ///< m: distance of the plane from the frame's origin; not positive if that is outside
+  double slack;  ///< m: distance of the plane from the frame's origin; not positive if the origin is outside
   int owner;
 };
 
-/// The dual points of all planes of polytopes and half-spaces, from the numbers that define them: corners, half
-/// extents, positions, and orientations taken as the exact rotations that their quaternions stand for at any length.
-/// The frame is about `reference`.
+/// The dual points of all planes of polytopes and half-spaces, from their defining numbers: corners, half extents,
+/// positions and orientations. An orientation is the exact rotation of its quaternion of any length. The frame is about
+/// `reference`.
 std::vector<WideDual> wide_duals(std::span<const Placed> bodies, Vec3 reference, const Frame& frame, double reach);
 
 }  // namespace overlapper
