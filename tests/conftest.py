@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-SLOW = [HealthCheck.too_slow]  # which a machine that is busy with something else may be
+SLOW = [HealthCheck.too_slow]  # a busy machine may be slow
 settings.register_profile(
     "same", deadline=None, derandomize=True, database=None, max_examples=40, suppress_health_check=SLOW
 )
@@ -14,7 +14,7 @@ settings.register_profile("explore", deadline=None, max_examples=2000, suppress_
 settings.load_profile("same")
 
 
-# Tests press Ctrl-C, which a shell has whatever it puts into the background ignore, and all that is started from there.
+# Tests send Ctrl-C. A process that a shell started in the background ignores it, so the handler is set again.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -22,7 +22,7 @@ HERE = Path(__file__).parent
 
 
 def pytest_collection_modifyitems(items):
-    """Counting lines would slow down exact arithmetic by a half, in tests that are not about Python."""
+    """Turns off line coverage for tests of the core: it would slow down their exact arithmetic by a half."""
     for item in items:
         if item.path.is_relative_to(HERE / "native") or item.path.is_relative_to(HERE / "support"):
             item.add_marker("no_cover")

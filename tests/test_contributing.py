@@ -1,4 +1,4 @@
-"""What is written for whoever carries on is so: what is named exists, lists are short, and versions agree."""
+"""CONTRIBUTING is true: the files and names that it names exist, its lists are short, and versions agree."""
 
 import re
 import subprocess

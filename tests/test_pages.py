@@ -19,9 +19,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [str(page.relative_to(ROOT)) for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))]
 BLOCK = re.compile(r"^```([^`\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-# What makes the environment that these tests run in is run by .ci/run, and what waits for Ctrl-C by test_live.py.
+# .ci/run runs the commands that make the environment. test_live.py runs the commands that wait for Ctrl-C.
 ELSEWHERE = re.compile(r"(make|python3 -m venv|\. env/bin/activate|pip install)\b|.* --live\b")
-# Of these, 1 says that something overlaps, has moved or is skipped.
+# These exit with 1 if something overlaps, has moved or is skipped.
 ANSWERS_BY_EXIT_CODE = re.compile(r"overlapper (audit|clashes|check|diff|shapes)\b|pytest\b")
 
 LOOP = """
@@ -65,7 +65,7 @@ def run(page):
 
 
 def shell(page, command):
-    """What the command prints; a page whose command fails ends here."""
+    """The output of the command. A command that fails ends the page."""
     if ELSEWHERE.match(command):
         return ""
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=300)
@@ -125,7 +125,7 @@ def model(name):
     return Path(pybullet_data.getDataPath(), name)
 
 
-# What pages name and a reader has: scripts, scenes, models, meshes, tables.
+# Files of the reader that pages name: scripts, scenes, models, meshes, tables.
 OF_THE_READER = {
     "my_script.py": lambda folder: (folder / "my_script.py").write_text(LOOP),
     "plain.py": lambda folder: (folder / "plain.py").write_text(LOOP),

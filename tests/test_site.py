@@ -23,7 +23,7 @@ CLASSES = re.findall(r"^\.\. autoclass:: ([\w.]+)", "\n".join(PAGES.values()), r
 
 
 def offered(package):
-    """What is in `__all__`, and what is imported when it is asked for: type checkers are told of that."""
+    """The names in `__all__` and the names imported lazily, which stand under TYPE_CHECKING."""
     tree = ast.parse(Path(package.__file__).read_text(encoding="utf-8"))
     lazy = [line for node in tree.body if isinstance(node, ast.If) for line in node.body]
     names = {alias.name for line in lazy if isinstance(line, ast.ImportFrom) for alias in line.names}

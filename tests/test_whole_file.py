@@ -63,7 +63,7 @@ WRITERS = {
 
 
 class Failing:
-    """Calls of the system that change a folder, of which the `number`-th fails, as on a disk that is full."""
+    """Makes the `number`-th system call that changes a folder fail, as on a full disk."""
 
     def __init__(self, monkeypatch, folder, number):
         self.calls, self.number, self.folder = 0, number, str(folder)

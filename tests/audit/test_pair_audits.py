@@ -1,4 +1,4 @@
-"""What an audit says of pairs of links is what each configuration says by itself."""
+"""An audit of pairs of links agrees with the answers of its single configurations."""
 
 from collections import Counter
 from contextlib import closing
@@ -71,7 +71,7 @@ def test_links_are_adjacent_if_a_joint_or_a_link_without_a_shape_connects_them(t
     assert {names for names, each in found.items() if each.status == "always"} == {("arm", "plate"), ("wall", "plate")}
     assert found["arm", "plate"].largest.contact.volume == pytest.approx(0.2 * 0.2 * 0.02)
     assert found["arm", "plate"].deepest.contact.depth == pytest.approx(0.04)
-    # What no joint moves is asked for at rest; what is adjacent, in few configurations.
+    # Pairs that no joint moves are asked at rest only. Adjacent pairs are asked in few configurations.
     assert {names for names, each in found.items() if each.asked == 1} == {
         ("disc", "arm"), ("post", "wall"), ("post", "plate"), ("wall", "plate"),
     }  # fmt: skip

@@ -1,4 +1,4 @@
-"""What each way costs is written into its page's table, or it is said why not, and then nothing is written."""
+"""The benchmark writes the cost of each way into the table of its page, or refuses in one sentence."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""What single features cost: each benchmark runs small, and says what it is there to say."""
+"""Costs of single features: each benchmark runs on a small case and prints its figures."""
 
 import re
 import sys
@@ -64,7 +64,7 @@ worker.kill()
 
 @pytest.mark.parametrize("spoilt", [False, True])
 def test_a_sweep_is_killed_at_random_moments_and_compared_with_one_that_was_not(spoilt, capsys, monkeypatch, tmp_path):
-    """What is swept is a script that takes the options of a sweep."""
+    """A script that takes the options of a sweep stands for the command."""
     text = SWEEP.replace("BITS", "time.time_ns() % 251" if spoilt else "number")
     (tmp_path / "sweep.py").write_text(text, encoding="utf-8")
     monkeypatch.setattr(kills, "SWEEP", (sys.executable, str(tmp_path / "sweep.py")))

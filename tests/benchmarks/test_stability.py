@@ -154,7 +154,7 @@ def test_each_library_is_asked_for_depths_and_distances_of_every_kind_of_body(na
 
 
 class Anything:
-    """What takes any argument and any attribute."""
+    """An object that takes any arguments."""
 
     def __init__(self, *_: object, **__: object) -> None: ...
 

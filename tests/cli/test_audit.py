@@ -54,7 +54,7 @@ def test_an_audit_is_written_as_json_table_srdf_and_page(robot, tmp_path):
     assert 0 < wall["fraction_low"] < wall["fraction"] < wall["fraction_high"] < 1
     assert 1.2 < wall["volume_joints"]["turn"] < 1.9 and 0.005 < wall["volume_m3"] < 0.008 and wall["depth_m"] > 0.1
     assert pairs["post", "arm"]["volume_m3"] is None
-    # Of adjacent pairs, those that never overlap, and those that always do.
+    # The SRDF file disables adjacent pairs, pairs that never overlap and pairs that always overlap.
     disabled = {
         (each.get("link1"), each.get("link2")): each.get("reason")
         for each in ElementTree.parse("made/table.srdf").getroot()

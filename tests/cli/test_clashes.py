@@ -85,7 +85,7 @@ def test_the_planted_clash_is_found_among_thirty_parts(tmp_path):
     assert pair["volume_m3"] == pytest.approx(1e-9 * exact, rel=1e-4)
     assert pair["volume_of"] == "meshes" and pair["volume_error_m3"] < 1e-8 * pair["volume_m3"]
     assert 1e-4 < pair["depth_m"] < 2e-4
-    # What CoACD's parts have more than the mesh is told, and only these two were decomposed.
+    # The volume that CoACD's parts add to a mesh is reported. Only the two clashing meshes were decomposed.
     ways = {body["name"]: body["way"] for body in found["bodies"]}
     assert {name for name, way in ways.items() if way == "decomposed"} == {*bearing.CLASH}
     assert {name for name, way in ways.items() if way == "convex"} == {"shaft.stl"}
@@ -153,7 +153,7 @@ def test_other_files_of_a_folder_are_ignored(tmp_path):
     assert [body["name"] for body in facts("parts")[1]["bodies"]] == ["a.stl", "b.STL"]
 
 
-# What is a clash
+# Which pairs are clashes
 
 
 def test_bodies_that_touch_are_no_clash_whatever_rounding_does_to_them():
@@ -397,7 +397,7 @@ def test_neither_a_simulator_nor_a_viewer_is_needed(tmp_path, monkeypatch):
     assert done.stderr == "overlapper: overlapper.viewer needs meshcat: pip install meshcat\n"
 
 
-# What the user can mend
+# Errors of the user
 
 
 def test_files_that_cannot_be_read_are_named_and_the_others_measured(tmp_path):

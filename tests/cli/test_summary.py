@@ -1,4 +1,4 @@
-"""What a run came to is told in the words of its numbers."""
+"""The summary of a run has the right sentences for its numbers."""
 
 import io
 from collections import Counter

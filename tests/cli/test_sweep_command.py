@@ -68,7 +68,7 @@ def test_json_lists_failures_with_exit_code_1():
 def test_a_sweep_says_what_has_moved_since_another():
     words = ["--grid", "apart=0.1:0.3:3", "--grid", "fate=good,raises", "--grid", "seed=0,1"]
     assert sweep(*words, "--out", "before").returncode == 1
-    # What failed has failed before.
+    # A task that failed in both sweeps has not moved.
     same = sweep(*words, "--out", "same", "--check", "before")
     assert same.returncode == 0 and "\n12 of 12 tasks are as in before.\nWritten: " in same.stdout
     Path("balls.py").write_text(BALLS.replace("radius=0.1", "radius=0.101"))

@@ -81,7 +81,7 @@ def alone(*arguments):
 
 
 def said(done):
-    """What goes to stderr below what pybullet says of itself."""
+    """The lines of stderr below the first line, which pybullet prints."""
     return done.stderr.partition("\n")[2]
 
 

@@ -20,7 +20,7 @@ def job(setup="x"):
 
 
 def told(outcomes):
-    """What was found of each, or how it failed."""
+    """The value of each outcome, or its kind of failure and the sentence about it."""
     return [each.value[1] if isinstance(each, Done) else (each.what, each.sentence) for each in outcomes]
 
 

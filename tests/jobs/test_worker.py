@@ -103,7 +103,7 @@ def test_a_module_that_cannot_be_imported_there_ends_the_process_at_once(monkeyp
 
 
 class Failing:
-    """Calls that start a process or what it needs, of which one fails, as on a system that has no more of them."""
+    """Makes one call fail that starts a process, as on a system without free processes or files."""
 
     def __init__(self, monkeypatch, owner, name, error):
         self.started = []

@@ -1,4 +1,4 @@
-"""Meshes of which bytes are changed, or that count more than they have, are read or refused in a sentence, and soon."""
+"""Meshes with changed bytes or false counts are read or refused quickly, in one sentence."""
 
 import contextlib
 import io
@@ -36,7 +36,7 @@ def written():
 
 
 def refusal(path):
-    """What is said of a mesh that is refused."""
+    """The reason for which a mesh is refused."""
     with pytest.raises(ValueError, match="is not a mesh with a hull: ") as refused:
         read_hull(path)
     said = str(refused.value)
@@ -101,7 +101,7 @@ def test_counts_of_off_and_indices_of_obj_that_are_not_there_are_refused(tmp_pat
 
 
 def scene(count=4, nodes=1, **buffer):
-    """A glTF scene of one mesh, of which a buffer has the four corners and the indices say `count`."""
+    """A glTF scene of one mesh. Its buffer has four corners; its accessor claims `count` indices."""
     corners = {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}
     return {
         "asset": {"version": "2.0"},

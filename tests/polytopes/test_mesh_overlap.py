@@ -1,4 +1,4 @@
-"""What closed meshes share, concave or not, against exact booleans of the same meshes."""
+"""Common volumes of closed meshes, convex or concave, against exact booleans of the same meshes."""
 
 import bearing
 import numpy as np
@@ -17,7 +17,7 @@ def triangles(solid):
 
 
 def carved(rng):
-    """A cube of which balls and turned boxes are taken away, or added to."""
+    """A cube with balls and turned boxes added or subtracted."""
     solid = Manifold.cube([1, 1, 1], True)
     for _ in range(rng.integers(4)):
         ball = Manifold.sphere(0.4, 12)

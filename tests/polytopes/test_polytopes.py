@@ -37,7 +37,7 @@ def test_a_cloud_stays_in_its_cube_or_ball_and_fills_it_as_it_grows():
 
 
 def test_the_points_of_a_ball_are_uniform_in_volume():
-    # The hull of four points, of which the mean volume is known: Kingman, Random secants of a convex body, 1969.
+    # The mean volume of the hull of four points is known: Kingman, Random secants of a convex body, 1969.
     rng = np.random.default_rng(3)
     volumes = [random_polytope(4, "ball", rng=rng).volume for _ in range(4000)]
     expected = 9 / 715 * 4 / 3 * np.pi

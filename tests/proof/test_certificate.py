@@ -74,7 +74,7 @@ def proved(common):
     lower, upper = claim.verify()
     volume, error = Fraction(common.volume), Fraction(common.volume_error)
     assert 0 <= lower <= upper
-    # Of several bodies with a round one, the inner polytope is a star about another point than the core's.
+    # For several bodies with a round one, the inner polytope is a star about another point than the core uses.
     room = 2 if len(common.shapes) > 2 and rounded(common) else 1
     assert volume - room * error <= lower and upper <= volume + error
     return lower, upper
@@ -156,7 +156,7 @@ def test_three_bodies_at_random_places_are_proved(a, b, c):
     ],
 )
 def test_several_bodies_with_a_round_one_have_proved_bounds_as_stated(bodies):
-    """From the mean of the corners, of which most are on the round body, corners would be pulled too far in."""
+    """Most corners are on the round body. Scaling towards the mean of the corners would pull corners too far in."""
     common = found(bodies)
     lower, _ = proved(common)
     assert lower >= Fraction(common.volume) - Fraction(common.volume_error)

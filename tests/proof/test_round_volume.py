@@ -93,7 +93,7 @@ def test_bounds_hold_the_closed_form(name):
 
 
 def test_a_rounded_hull_is_the_sum_of_its_pieces_by_steiner():
-    """Volume, area and mean width of the core, of which the latter two come from its facets and edges."""
+    """Steiner's formula uses volume, area and mean width of the core. Area comes from facets, mean width from edges."""
     rng = np.random.default_rng(3)
     around = Placed(Box([9, 9, 9]), (0.1, 0.2, 0.3), rng.normal(size=4))
     for _ in range(5):
@@ -142,7 +142,7 @@ def enlarged(shape, by):
 
 
 def sunk(rng, first, second, turns, larger=1.0, away=0.0):
-    """Two bodies of which the one is as deep in the other as chance will have it, from 1e-1 to 1e-10 m or any depth."""
+    """Two bodies that overlap by a random depth, from 1e-1 to 1e-10 m or any depth."""
     places = [rng.normal(size=3) * 0.3 for _ in range(2)]
     if turns != "general" and rng.random() < 0.5:
         places = [np.round(8 * place * (rng.random(3) < 0.5)) / 8 for place in places]
@@ -203,7 +203,7 @@ def test_neither_size_nor_place_costs_digits(first, larger):
 
 
 def test_pieces_of_a_body_share_no_volume_and_leave_none_out():
-    """What a rounded hull shares with a ball is what its pieces do, and what is counted in points."""
+    """The common volume with a ball equals the sum over the pieces of a body, and an estimate by random points."""
     rng = np.random.default_rng(2)
     a, b = Placed(CUBE, (0, 0, 0), rng.normal(size=4)), Placed(Sphere(0.5), (0.5, 0.4, 0.3))
     lower, _ = bounds(a, b)

@@ -1,4 +1,4 @@
-"""What pushes the bodies of a scene apart: contact points, or what they share."""
+"""Contact models of a scene: contact points or volumetric contact."""
 
 import re
 from dataclasses import replace

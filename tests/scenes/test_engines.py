@@ -44,7 +44,7 @@ def scripted(monkeypatch, tmp_path):
 
 
 def sunk(step):
-    """What the ball and the cube share after so many steps of the scene."""
+    """The overlap of the ball and the cube after `step` steps of the scene."""
     return overlap(Box([0.1] * 3), Placed(Sphere(0.05), (0, 0, 0.2 - 0.02 * step)))
 
 

@@ -154,7 +154,7 @@ def test_other_runs_import_nothing_for_the_plugin(pytester):
             assert not heavy & set(sys.modules)
         """
     )
-    # Of an editable install, pytest says that it came too late for a module of which it has no need.
+    # With an editable install, pytest warns that a module is imported already. The warning is harmless.
     quiet = ["-W", "ignore:Module already imported:pytest.PytestAssertRewriteWarning"]
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *quiet, pytester.path]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)

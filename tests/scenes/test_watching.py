@@ -26,7 +26,7 @@ def empty_folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def pile(client):
-    """Two boxes, of which one falls into the other."""
+    """Two boxes. One falls into the other."""
     p.setGravity(0, 0, -9.8, physicsClientId=client)
     box(client, mass=0)
     box(client, position=[0.1, 0, 0.9])

@@ -1,4 +1,4 @@
-"""What bodies of a simulation share, pair by pair, and by what names and in what colours."""
+"""Overlaps of the bodies of a simulation, pair by pair, with names and colours."""
 
 import pickle
 import re

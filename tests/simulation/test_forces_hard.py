@@ -78,7 +78,7 @@ def test_a_body_placed_in_contact_stays_there(client):
 
 
 def test_a_swinging_pole_is_detected_before_it_hits(client):
-    """What is fast is the end of a link, of which the joint knows."""
+    """The end of the link is fast. Its speed follows from the velocity of the joint."""
     _ground(client)
     shape = pybullet.createCollisionShape(
         *(pybullet.GEOM_BOX, 0, [0.5, 0.02, 0.02]), collisionFramePosition=[0.5, 0, 0], physicsClientId=client
@@ -109,7 +109,7 @@ def test_a_swinging_pole_is_detected_before_it_hits(client):
 
 
 def test_bodies_without_mass_slip_without_a_response(client):
-    """Two bodies without mass, one of which goes on as it was told: what friction there is ends no slip."""
+    """Neither body has a mass. One moves at a given velocity, and friction cannot end its slip."""
     ground, box = _ground(client), _box(client, [0, 0, 0.049], mass=0, velocity=[0.1, 0, 0])
     with VolumetricContact(Bodies(client), pairs=[(ground, box)]) as contact:
         contact.step()

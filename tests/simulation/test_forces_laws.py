@@ -198,7 +198,7 @@ def test_friction_of_a_patch_follows_coulombs_law(seed):
 
 @pytest.mark.parametrize("friction", [None, "distributed"])
 def test_friction_in_a_heap_is_within_its_limit_and_against_the_slip(friction):
-    """Of all patches at once: they are solved until nothing changes."""
+    """All patches are solved together, until nothing changes."""
     with World() as world:
         heap(world)
         with world.contact(friction=friction) as contact:
@@ -302,7 +302,7 @@ def test_a_robot_answers_to_forces_as_the_solver_says(client, file, fixed, link)
     assert np.abs(dynamics.velocity() / STEP - foretold).max() < 1e-11 * np.abs(foretold).max()
 
 
-# What has no direction
+# Contacts without a direction
 
 
 def test_a_body_that_gets_within_another_is_pushed_as_it_was_last(client):

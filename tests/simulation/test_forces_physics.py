@@ -103,7 +103,7 @@ def test_dissipation_slows_rolling_bodies_at_any_stiffness(shape, factor, stiffn
     v0, v1, _, _ = experiments.roll(shape, stiffness=stiffness, substeps=4, dissipation=tau, seconds=seconds)
     decay = math.log(v0 / v1) / seconds
     assert decay / (factor * tau * G / r) == pytest.approx(1, abs=0.02)
-    # Of the depth as it is: friction acts at the centroid of what is shared, which is nearer to the axis.
+    # Friction acts at the centroid of the overlap, which is nearer to the axis.
     if shape == "cylinder":
         moment = r**2 / 2
         depth = brentq(lambda d: 0.1 * (r**2 * math.acos(1 - d / r) - (r - d) * _half(r, d)) - G / stiffness, 0, r / 2)

@@ -264,7 +264,7 @@ def test_pairs_that_a_script_has_filtered_stay_filtered(client, recorder):
     assert {point[1] for point in p.getContactPoints(physicsClientId=client)} == {other}
 
 
-# What else is told
+# Other commands to bodies
 
 
 def slider(world, **motor):
@@ -451,7 +451,7 @@ def test_poses_and_velocities_set_between_steps_give_no_kick(world, substeps):
 
 
 def test_forces_may_be_asked_for_between_steps(world):
-    """What else acts is known as before, so that the bodies go the same way as far as it is solved."""
+    """Asking changes no other force. The bodies follow the same path to the accuracy of the solver."""
 
     def path(asking):
         with World() as world:

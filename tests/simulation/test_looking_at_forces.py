@@ -1,4 +1,4 @@
-"""What is seen of forces: the mean over a step, between bodies where they are at its end."""
+"""Forces as read by a user: means over a step, with the bodies at their poses at its end."""
 
 import numpy as np
 import pybullet

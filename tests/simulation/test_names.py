@@ -1,4 +1,4 @@
-"""What bodies are called: by their files, robots, meshes and shapes, or as somebody wants them called."""
+"""Names of bodies: from their files, robots, meshes and shapes, or given by the user."""
 
 import numpy as np
 import pybullet as p

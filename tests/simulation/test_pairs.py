@@ -38,7 +38,7 @@ def chain(client, folder, joints=("revolute",) * 3, **options):
 
 
 def in_contact(client):
-    """The pairs of links of which pybullet reports contacts."""
+    """The set of pairs of links that pybullet reports as in contact."""
     p.performCollisionDetection(client)
     found = p.getContactPoints(physicsClientId=client)
     return {tuple(sorted([(each[1], each[3]), (each[2], each[4])])) for each in found}
@@ -49,7 +49,7 @@ def overlapping(bodies, **options):
 
 
 def agree(client, bodies):
-    """What is found, once it is sure that pybullet finds the same."""
+    """The overlapping pairs, after checking that pybullet finds the same pairs."""
     found = overlapping(bodies)
     assert found == in_contact(client)
     return found
@@ -321,7 +321,7 @@ def test_shapes_of_one_link_are_a_pair_only_by_name(client):
 
 
 def test_possible_pairs_are_counted_as_they_would_be_found(client, recorder, tmp_path):
-    """Against bodies all of which overlap each other, so that every pair is examined."""
+    """All bodies overlap each other, so every pair is examined."""
     for i, (group, mask) in enumerate([(1, -1), (2, 1), (2, 2), (4, 3), (0, 0)]):
         shape = p.createCollisionShapeArray(
             shapeTypes=[p.GEOM_SPHERE] * (i + 1),

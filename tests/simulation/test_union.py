@@ -1,4 +1,4 @@
-"""What unions of convex shapes share, against sums in which nothing can be counted twice."""
+"""Common volumes of unions of convex shapes, against sums that count nothing twice."""
 
 import itertools
 

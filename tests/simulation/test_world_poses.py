@@ -1,4 +1,4 @@
-"""What is fixed to moving frames: their poses in the world, many at once."""
+"""World poses of shapes fixed to moving frames, computed for many shapes at once."""
 
 import numpy as np
 import pytest

@@ -106,7 +106,7 @@ class Polytope:
 
     @cached_property
     def centroid(self) -> Vector:
-        """Of a solid; the point itself of a point."""
+        """The centroid of a solid polytope; for a single point, the point itself."""
         if self.dimension == 0:
             return coordinates(self.vertices[0])
         origin = coordinates(self.vertices[0])
@@ -132,7 +132,7 @@ class Polytope:
 
     @cached_property
     def area(self) -> float:
-        """Of the surface: a sum of square roots, each rounded once."""
+        """The surface area: a sum of square roots, each rounded once."""
         return sum(sqrt(dot(vector, vector)) for vector in map(area_vector, self.facets))
 
     def pull(self, body: int) -> Vector:

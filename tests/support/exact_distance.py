@@ -38,7 +38,7 @@ class Core:
 
 
 def core(body: exact.Polytope | Placed) -> Core:
-    """Of a solid, and of a ball, a capsule or a rounded hull at a pose."""
+    """The core of an exact polytope, or of a ball, a capsule or a rounded hull at a pose."""
     if isinstance(body, exact.Polytope):
         around = {frozenset(edge) for facet in body.facets for edge in exact.edges_of(facet.ring)}
         return Core(
@@ -81,7 +81,7 @@ def root(square: Fraction) -> Fraction:
 
 
 def distance_squared(a: Sequence[exact.Vector], b: Sequence[exact.Vector]) -> Fraction:
-    """Of the hulls of points; zero if they have one in common."""
+    """The squared distance of the hulls of two lists of points; zero if the hulls have a common point."""
     (p, q), scale = integers(a, b)
     corners = [minus(p[0], q[0])]
     while True:
@@ -128,7 +128,7 @@ def foot(face: Sequence[Integers]) -> list[Fraction] | None:
 
 
 def depth_squared(a: Core, b: Core) -> Fraction:
-    """Of two hulls that have a point in common.
+    """The squared penetration depth of two hulls that have a common point.
 
     The nearest face of their difference is upright on a facet of either body, or on an edge of each. Doubles say of
     each such direction how near it may be, with an allowance for their rounding, and the nearest are then done exactly
@@ -229,7 +229,7 @@ def integers(*clouds: Sequence[exact.Vector]) -> tuple[list[list[Integers]], int
 
 
 def whole(direction: exact.Vector) -> Integers:
-    """Of any length, by integers."""
+    """A vector of whole numbers along the direction. Its length is arbitrary."""
     ((row,),), _ = integers([direction])
     return row
 

@@ -316,7 +316,7 @@ def slivers(rng):
 
 
 def tilted_slivers(rng):
-    """Slivers of which one body is tilted by 1e-3 to 1e-12: `parameter` is the tilt."""
+    """Slivers between two bodies, one of them tilted by 1e-3 to 1e-12. `parameter` is the tilt."""
     low, high = two_features(rng)
     tilt, depth = power(rng, -12, -3), power(rng, -12, -1)
     way, bodies = somewhere(rng, stacked(rng, low, high, -depth, tilt))
@@ -376,7 +376,7 @@ def shared_planes(rng):
 
 
 def shared_facets(rng):
-    """Hulls of which `parameter` triangles are the same, both bodies on one side of each."""
+    """Two hulls that share `parameter` triangles. Both bodies are on the same side of each shared triangle."""
     shared = int(rng.integers(1, 6))
     points = hull_points(rng, 14)
     triangles = rng.permutation(ConvexHull(points).simplices)
@@ -711,7 +711,7 @@ def round_contacts(rng):
         room = reach(Placed(shape), -up) + reach(Placed(other), up)
         return Case(f"{kind} on {met}", depth, (Placed(shape, away + up * (room - depth)), Placed(other, away)))
     matrix, extents = rotation(quaternion(rng)), size * rng.uniform(1, 2, 3)
-    # What is met is in the middle of so many axes of the box, and at the end of the others.
+    # The foot is at the end of one axis of the box for a facet, of two for an edge, of three for a corner.
     ends = np.array([1.0] * {"facet": 1, "edge": 2, "corner": 3}[met] + [0.0] * 2)[:3]
     up, foot = mapped(np.array([ends / np.linalg.norm(ends), ends * extents]), matrix)
     at = away + foot + up * (reach(Placed(shape), -up) - depth)

@@ -35,7 +35,7 @@ EARLY = 5e-5  # m, by which Bullet's GJK has been seen to stop early on hulls of
 
 def load(path, client, flags=0):
     if path.suffix == ".urdf":
-        # What is only seen is of no concern here, and takes nine tenths of the time.
+        # Visual shapes are not tested here, and loading them takes nine tenths of the time.
         return p.loadURDF(str(path), flags=flags | p.URDF_IGNORE_VISUAL_SHAPES, physicsClientId=client)
     if path.suffix == ".sdf":
         return p.loadSDF(str(path), physicsClientId=client)
@@ -83,7 +83,7 @@ class Walk:
             corners = p.getMeshData(*link, physicsClientId=self.twin)[1] if meshes else ()
             if (meshes > 0) != (hulls > 0) and link not in self.skipped:
                 self.complain(link, f"{meshes} meshes are {hulls} hulls")
-            # Of a concave mesh pybullet tells no corners.
+            # pybullet returns no corners for a concave mesh.
             if corners and self.pose(link):
                 self.check_corners(link, np.array(corners), [part for part in parts if isinstance(part.shape, Hull)])
 
@@ -104,7 +104,7 @@ class Walk:
             self.complain(link, f"{(~inside).sum()} corners of pybullet are in no hull")
 
     def pose(self, link):
-        """Of the link's inertial frame; None for a body of more than 128 links, of which pybullet tells no poses."""
+        """The pose of the link's inertial frame. None for bodies of more than 128 links: pybullet returns no poses."""
         if p.getNumJoints(link[0], self.client) > 128:
             return None
         if link[1] < 0:
@@ -187,7 +187,7 @@ class Walk:
     def check_box(self, link, parts):
         lower, upper = self.box(parts)
         theirs = np.array(p.getAABB(*link, self.client))
-        # Of the links of a body of more than 128, pybullet does not tell the boxes either.
+        # pybullet does not return the boxes of bodies of more than 128 links either.
         if not (np.isfinite(lower).all() and np.isfinite(upper).all()) or not self.pose(link):
             return
         if (lower < theirs[0] - 1e-6).any() or (upper > theirs[1] + 1e-6).any():
@@ -195,7 +195,7 @@ class Walk:
 
 
 def examine(path, clients):
-    """What a model has and what is wrong with what is made of it; no more than that if pybullet cannot load it."""
+    """A dict of the counts of a model and its problems. If pybullet cannot load the model, only its error."""
     try:
         walk = Walk(path, clients)
     except p.error as error:

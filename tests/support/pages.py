@@ -87,7 +87,7 @@ def commands(page: Path) -> list[dict]:
 
 
 def drawings(page: Path) -> dict[str, dict]:
-    """What is drawn at each path of the tree, in three.js's object format."""
+    """A dict from each path of the scene tree to the object drawn there, in the object format of three.js."""
     return {each["path"]: each["object"] for each in commands(page) if each["type"] == "set_object"}
 
 
@@ -212,7 +212,7 @@ def panel(browser: Browser, name: str | None) -> None:
 
 
 def scene(browser: Browser) -> np.ndarray:
-    """What is seen between the heading, the panels and the bar with the time."""
+    """The pixels (rows, columns, channels) between the heading, the panels and the time bar."""
     image = browser.picture()
     left, top, right, bottom = sides(browser, "#stage")
     return image[top + 1 : bottom - 50, left:right]  # above the legend

@@ -58,7 +58,7 @@ def sixteenths(rng: Random, low: int, high: int) -> np.ndarray:
 
 
 def quaternion(rng: Random) -> tuple[int, ...]:
-    """Of small whole numbers, and of any length."""
+    """A quaternion of small whole numbers. Its length is arbitrary."""
     return (*(rng.randint(-9, 9) for _ in range(3)), rng.randint(1, 9))
 
 
@@ -286,7 +286,7 @@ def narrow_tip(way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def by_the_article(rng: Random) -> Iterator[PlainCase]:
-    """What the article's method says, also where the common point is on a boundary and has to be shifted."""
+    """Cases for the article's method. In some, the common point is on a boundary and has to be shifted."""
     for i in range(16):
         bodies = [posed(rng, SHAPES[rng.choice(["box", "hull", "ball", "half-space"])](rng)) for _ in range(2)]
         bodies[0] = posed(rng, SHAPES["hull"](rng))

@@ -1,4 +1,4 @@
-"""What a ball, a cylinder or a capsule shares with a polyhedron, to twenty digits, by another route than the core's.
+"""Measures of a ball, a cylinder or a capsule cut by a polyhedron, to twenty digits, by another route than the core's.
 
 Slices are orthogonal to the round body's own axis, so that each is a polygon cut by a disc about the origin; its area,
 moments and borders have closed forms. These are integrated between all values at which a corner of the common part
@@ -99,7 +99,7 @@ class Piece:
         return edges
 
     def slice(self, z: arb) -> Sums:
-        """What a slice adds per unit of z."""
+        """The sums that a slice at height z adds per unit of z."""
         sums, rho = Sums(), self.rho(z)
         edges = self.outline(z)
         if not edges or rho == 0:
@@ -174,7 +174,7 @@ class Piece:
         sums.second[0] += rho**4 / 4 * (turn / 2 + double)
         sums.second[1] += rho**4 / 4 * (turn / 2 - double)
         sums.second[5] += rho**4 / 4 * (square(end.sin()) - square(start.sin())) / 2
-        # Of a ball, a strip between two slices is as wide as it is high times the radius over rho.
+        # On a ball, the width of a strip between two slices is its height times radius / rho.
         sums.area += self.radius * turn
         force = [rho * cosine, rho * sine, z * turn if self.ball else ZERO]
         for k in range(3):
@@ -342,7 +342,7 @@ def exactly(round_body: Placed, polyhedron: Placed) -> Exact:
 
 
 def about_body(sums: list[arb], along: arb) -> list[arb]:
-    """Of what counts from a point of the axis, about the centre of the body."""
+    """Moments about the centre of the body, from moments about the axis point `along` away from it."""
     volume, area, x, y, z, xx, yy, zz, yz, zx, xy, fx, fy, fz, mx, my, mz = sums
     return [
         *(volume, area, x, y, z + along * volume, xx, yy, zz + 2 * along * z + square(along) * volume),

@@ -1,4 +1,4 @@
-"""What round bodies share with others, to some thirteen digits, by another route than the core's: over rays.
+"""Measures of overlaps of round bodies to about thirteen digits, by integration over rays instead of the core's slices.
 
 Bodies are taken as the doubles that describe them, a quaternion as the rotation that it stands for at any length. From
 a point inside, every ray leaves the common part through one plane, cylinder or ball, at the root of an equation of
@@ -178,7 +178,7 @@ class Surfaces:
                     from_centre = plus(from_centre, axis, -dot(from_centre, axis))
                     across = [plus(c, axis, -dot(c, axis)) for c in columns]
                 distance = dot(from_centre, from_centre).sqrt()
-                # In orthogonal axes of which one is the way from the centre, so that no product cancels.
+                # One of the orthogonal axes is the direction from the centre, so that no product cancels.
                 basis = orthogonal(from_centre)
                 quadric = (
                     np.array([doubles(dot(e, c) for c in across) for e in basis]),
@@ -309,7 +309,7 @@ class Rays:
     def terms(self, phi: np.ndarray, z: float) -> np.ndarray:
         u, s, ids, g = self.exits(phi, z)
         second = u[:, [0, 1, 2, 1, 2, 0]] * u[:, [0, 1, 2, 2, 0, 1]]
-        # Of the area vector in these coordinates: s² du g / (g · u).
+        # The area vector in these coordinates: s² du g / (g · u).
         vector_area = (s * s / np.einsum("ij,ij->i", g, u))[:, None] * g
         place = s[:, None] * u
         first = (ids < 100000)[:, None]
@@ -346,7 +346,7 @@ def over(f: Callable[[float], tuple[tuple, np.ndarray]], low: float, high: float
 
 
 def truth(a: Placed, b: Placed, found: Overlap) -> Truth:
-    """Of two bodies that overlap; where and of what shape their common part is about, `found` tells."""
+    """The measures of the overlap of two bodies. `found` gives the approximate place and shape of the common part."""
     inside = np.array(found.centroid)
     second = np.trace(found.inertia) / 2 * np.eye(3) - found.inertia
     values, turn = np.linalg.eigh(second / found.volume)

@@ -26,7 +26,7 @@ def bodies(rng: np.random.Generator, count: int) -> list[tuple[Hull, RoundedHull
 
 
 def false_statuses(seed: int, count: int) -> Iterator[str]:
-    """Of so many pairs, those whose status is not what the distance of their cores says, beyond rounding."""
+    """Describes each of `count` random pairs whose status contradicts the distance of their cores, beyond rounding."""
     rng = np.random.default_rng(seed)
     made = bodies(rng, 400)
     for _ in range(0, count, 8):

@@ -94,7 +94,7 @@ PROBE = 1e-4
 
 
 def bullet_distance(client, id, link, point):
-    """What Bullet says is the distance of a point from a link, asked with a tiny ball."""
+    """Bullet's distance in m of a point from a link, asked with a tiny ball."""
     ball = p.createCollisionShape(p.GEOM_SPHERE, radius=PROBE, physicsClientId=client)
     nearest = p.getClosestPoints(
         id, -1, 100.0, linkIndexA=link, collisionShapeB=ball, collisionShapePositionB=point, physicsClientId=client

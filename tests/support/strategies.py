@@ -136,7 +136,7 @@ cylinders = st.builds(Cylinder, lengths, lengths)
 ellipsoids = st.builds(Ellipsoid, st.tuples(lengths, lengths, lengths))
 
 
-# What is drawn is printed as the calls that make it again, which must therefore hold all that there is to know.
+# Hypothesis prints a drawn example as the calls that make it again, so these calls must hold all its data.
 
 
 @st.composite

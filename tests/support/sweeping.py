@@ -42,7 +42,7 @@ def build(client, *, apart=0.15, seed=0, fate="good", seconds=0.0):
         os.kill(os.getpid(), 9)
 '''
 
-# Sixty tasks of which a kill comes in the middle.
+# Sixty tasks, slow enough that a kill comes in the middle of them.
 SLOW = ["apart=0.05:0.25:20", "seed=0,1,2", "seconds=0.06"]
 
 
@@ -58,7 +58,7 @@ def sweep_of(grids, kept=0, steps=3):
 
 
 def swept(folder, grids, workers=2, kept=0, steps=3, limit=None, retry=False, engine=None):
-    """What became of it in that folder."""
+    """The outcome of a sweep that runs in the folder."""
     from overlapper.jobs.processes import Processes
 
     sweep = sweep_of(grids, kept, steps)

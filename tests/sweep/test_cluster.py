@@ -24,7 +24,7 @@ def test_a_cluster_finds_the_same_bits_while_a_node_is_killed(undisturbed):
     with subprocess.Popen(nodes, text=True, **pipes) as cluster:
         address = cluster.stdout.readline().strip()
         process = begun("runs", address)
-        # What a node runs that is killed goes with it: its hands, too.
+        # The processes of a killed node die with it, the workers too.
         hands = [each for each in psutil.Process(cluster.pid).children(True) if "serve" in " ".join(each.cmdline())]
         cluster.stdin.write("kill\n")
         cluster.stdin.flush()
@@ -32,7 +32,7 @@ def test_a_cluster_finds_the_same_bits_while_a_node_is_killed(undisturbed):
         assert 0 < len(parts("runs")) < 60
         assert process.wait(60) == 0
         assert parts("runs") == undisturbed
-        # What fails of a task is as on one machine, on what is left of the cluster.
+        # The rest of the cluster reports the same failures of tasks as one machine.
         words = ["sweep", "balls.py", "--grid", "fate=good,raises,hangs in C,dies", "--limit", "3", "--out", "fates"]
         words += ["--engine", "ray", "--address", address, "--json"]
         done = subprocess.run([sys.executable, "-m", "overlapper", *words], capture_output=True, text=True, timeout=120)

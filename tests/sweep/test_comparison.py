@@ -32,7 +32,7 @@ def recorded(tmp_path_factory):
 
 @pytest.fixture
 def other(recorded, balls):
-    """A copy of it of which rows can be edited."""
+    """A function that edits rows in a copy of the recorded sweep."""
     shutil.copytree(recorded, "other")
     return edit
 

@@ -20,7 +20,7 @@ IDENTITY = {"scene": "balls", "scene file": "abc", "steps": "3", "overlapper": "
 
 
 def whole(words=b""):
-    """What begins and ends as a Parquet file does."""
+    """Bytes that begin and end as a Parquet file does."""
     return b"PAR1" + words + b"PAR1PAR1"
 
 

@@ -1,4 +1,4 @@
-"""Tables, expected files and shapes of which bytes are changed are read, or refused in one sentence."""
+"""Tables, expected files and shapes with changed bytes are read, or refused in one sentence."""
 
 import base64
 import json

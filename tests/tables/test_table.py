@@ -24,7 +24,7 @@ ENDINGS = sorted(TABLES)
 BLANK = "," * (len(NEEDED) - 1)
 METADATA = {"overlapper": "1.2.3", "tolerance": "0.001"}
 
-# What the README says, a line each.
+# The readers that the README shows, a line each.
 READERS = {
     ".csv": [
         lambda path: pandas.read_csv(path, comment="#"),
@@ -39,7 +39,7 @@ READERS = {
 
 
 class Cubes:
-    """A cube and three more that reach into it, of which the last only touches."""
+    """A cube and three more cubes: two overlap it and the last only touches it."""
 
     def __init__(self):
         self.keys = [(body, -1, 0) for body in range(4)]

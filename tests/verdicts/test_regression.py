@@ -186,7 +186,7 @@ def test_a_failing_recording_leaves_what_was_expected(recorded, scene_file):
 
 
 def without_rows(text, kept):
-    """An expected file of which only the first rows are left."""
+    """The text of an expected file with only the first `kept` rows."""
     lines = text.splitlines(keepends=True)
     rows = [line for line in lines if line[0].isdigit()]
     return "".join(line for line in lines if line not in rows[kept:])

@@ -125,7 +125,7 @@ def test_friction_is_the_force_component_perpendicular_to_the_pressures():
 
 
 def told(browser, name):
-    """What the numbers of the chosen pair say."""
+    """The texts beside a name in the numbers of the chosen pair."""
     rows = browser.ask("[...document.querySelectorAll('#numbers tr')].map(row => [...row.cells].map(c => c.innerText))")
     return dict(rows)[name]
 

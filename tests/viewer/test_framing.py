@@ -188,7 +188,7 @@ def test_a_picture_is_framed_as_a_page_is(tmp_path):
 
     green, orange = seen(tmp_path / "moves.png", at(0.3), at(0.08))
     assert green > 30_000 and orange > 1000
-    # Of one moment, nothing is known to move: the bodies that share something are seen.
+    # A single frame shows no motion, so the overlapping bodies are framed.
     assert seen(tmp_path / "still.png", at(0.08))[1] > orange
 
 

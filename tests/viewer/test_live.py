@@ -75,7 +75,7 @@ def test_a_live_view_draws_every_facet_once_in_the_colour_of_its_owner():
 
 @dataclass
 class Push:
-    """30 N on the cup, by the hand beside it, of which some is friction."""
+    """A force of 30 N on the cup from the hand beside it. A part of the force is friction."""
 
     pairs = np.array([[*CUP, *HAND]])
     force = np.array([[-30.0, 0.0, 3.0]])

@@ -1,4 +1,4 @@
-"""What a notebook shows: an overlap as a picture that turns, contacts as a table, a recording as its page."""
+"""Display in a notebook: an overlap is a picture that turns, contacts are a table, a recording is its page."""
 
 import base64
 import re

@@ -1,4 +1,4 @@
-"""What is seen of a recording, and done with it, in headless Chromium; and what the page carries."""
+"""The page of a recording in headless Chromium: its picture, its controls and its contents."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def test_a_live_view_looks_like_a_recording(browser, reach, tmp_path):
     browser.open(page.as_uri(), until="document.querySelector('canvas')")
     live = next(each for each in (browser.picture() for _ in range(100)) if coloured(each, "orange"))
     for colour in ("orange", "sky blue", "green"):
-        # The live view has the whole height, of which the recording leaves some.
+        # The live view has the whole height. The recording leaves some height to its panels.
         assert_allclose(coloured(live, colour) * (height / 800) ** 2, coloured(recording, colour), rtol=0.25)
 
 

@@ -357,7 +357,7 @@ def test_the_page_fits_a_desk_a_tablet_and_a_phone(browser, piled, sized, width,
     )
     assert browser.ask("document.querySelector('#overlaps').hidden") == phone
     assert browser.ask("document.querySelector('#legend').open") == (width == DESK[0])
-    # What is framed is in sight, with nothing over it; the scene has most of the room.
+    # The framed bodies are in sight and nothing covers them. The scene has most of the room.
     left, top, right, bottom = sides(browser, "#meshcat-pane")
     assert (right - left) * (bottom - top) > 0.4 * width * height
     canvas = sides(browser, "#meshcat-pane canvas")

@@ -1,4 +1,4 @@
-"""What a recording holds is read back from its file."""
+"""Recordings are read back from their files."""
 
 from __future__ import annotations
 

@@ -248,7 +248,7 @@ def test_shallow_contacts_keep_every_digit_of_a_closed_form(depth):
 
 
 def ball_at_side(r: Any, s: Any, distance: Any) -> Any:
-    """Of a ball of radius s and a cylinder about z, by lenses of discs."""
+    """Measures of the part common to a ball of radius s and a cylinder about z. Each slice is a lens of two discs."""
 
     def slice_at(z: Any) -> Any:
         q = mp.sqrt(s * s - z * z)
@@ -273,7 +273,7 @@ def test_shallow_contacts_at_sides_keep_every_digit(depth):
     with mpmath.workdps(60):
         r, s, distance = exactly(0.5), exactly(0.75), exactly(place)
         ball = ball_at_side(r, s, distance), Placed(Sphere(0.75), (place, 0, 0.25))
-        # About x by a turn of twice the angle of which 3 / 4 is the cotangent: a sine of 24 / 25.
+        # The quaternion (3, 0, 0, 4) turns by twice the angle whose cotangent is 3 / 4: its sine is 24 / 25.
         other = [Placed(solid, (place, 0.125, 0.25), (3, 0, 0, 4)) for solid in (Capsule(0.75, 6), Cylinder(0.75, 6))]
         crossing = cylinders_crossing(r, s, distance, exactly(24) / 25)
         for solid in (Capsule(radii[0], 8), Cylinder(radii[0], 8)):

@@ -1,4 +1,4 @@
-"""Bodies of which plain doubles can tell neither that they are apart nor that they overlap."""
+"""Pairs of bodies for which plain doubles prove neither separation nor overlap."""
 
 from fractions import Fraction
 from itertools import permutations

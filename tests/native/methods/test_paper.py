@@ -79,7 +79,7 @@ def test_smooth_shapes_are_tessellated_to_the_tolerance(shapes):
     truth = overlap(*shapes, tolerance=1e-4)
     paper = overlap(*shapes, tolerance=tolerance, method="paper")
     assert abs(paper.volume - truth.volume) <= paper.volume_error + truth.volume_error
-    # Each smooth body has lost up to the tolerance of its volume, all of which may have been common.
+    # Each smooth body has lost up to the tolerance of its volume. The lost volume may all have been common.
     assert paper.volume_error <= tolerance * sum(body.volume for body in paper.shapes if np.isfinite(body.volume))
 
 

@@ -79,7 +79,7 @@ def assert_all_is_exact(a, b, found, far=0.0):
     assert_allclose(found.gradient[0, :3], true.gradient[:3], rtol=0, atol=1e-10 * force)
     assert_allclose(found.gradient[0, 3:], true.gradient[3:], rtol=0, atol=1e-10 * force * arm)
     assert_allclose(found.gradient[1, :3], -true.gradient[:3], rtol=0, atol=1e-10 * force)
-    # What is stated holds; the truth is in doubles, too.
+    # The stated errors hold. The truth is rounded to doubles, too.
     errors, last = found.errors, 4e-16
     assert abs(found.area - true.area) <= errors.area + last * true.area
     assert np.linalg.norm(found.centroid - true.centroid) <= errors.centroid
@@ -189,7 +189,7 @@ def test_parts_of_a_box_add_up_where_surfaces_pass_through_axes_or_along_each_ot
                 assert_allclose(whole.volume * whole.centroid, moments, atol=1e-12 * whole.volume)
                 # A strip between a plane and a cylinder that it touches is as wide as the root of how deep it is.
                 open_ = 1e-8 if place == "face along the surface" else 1e-11
-                # Of faces in one plane either may be the outer one, and that is stated.
+                # Either of two coplanar faces may own the facet. The stated error includes this.
                 open_ += sum(p.errors.gradient[0].max() for p in (whole, *parts) if p)
                 assert_allclose(whole.gradient[0], sum(p.gradient[0] for p in parts), atol=open_)
 
@@ -465,7 +465,7 @@ def test_surfaces_separated_only_by_rounding_are_measured_correctly(first_seed):
 
 
 def carried(body, turn, shift):
-    """What is turned about the origin, then moved."""
+    """The body turned about the origin, then moved by the shift."""
     return Placed(body.shape, rotation(turn) @ body.position + shift, product(turn, body.given_orientation))
 
 
@@ -511,7 +511,7 @@ def assert_motion_changes_nothing(a, b, rng):
 
 @pytest.mark.parametrize(("points", "margin"), [(250, 0.05), (500, 0.05), (500, 0)])
 def test_meshes_of_many_facets_deep_in_each_other_are_sliced(points, margin):
-    """Of more walls than slices have lines, few bound a piece, and pieces lie far from the deepest point."""
+    """The hulls have more walls than a slice has lines. Pieces have few walls and lie far from the deepest point."""
     clouds = [np.random.default_rng(seed).normal(size=(points, 3)) for seed in (0, 1)]
     one, other = (cloud / np.linalg.norm(cloud, axis=1)[:, None] for cloud in clouds)
     second = RoundedHull(other, margin) if margin else Hull(other)
@@ -577,7 +577,7 @@ def test_a_plane_or_a_piece_that_slices_have_missed_is_found(which):
 
 @pytest.mark.parametrize("first_seed", range(0, 600, 300))
 def test_special_poses_are_measured_correctly_far_from_the_origin_too(first_seed):
-    """Of those that overlap, most are sliced; what is left to polytopes and what is open are counted."""
+    """Most overlapping pairs are sliced. Pairs left to polytopes and pairs with a wide error bound are counted."""
     found = []
     for seed in range(first_seed, first_seed + 300):
         a, b = make("special_poses", seed).bodies
@@ -682,7 +682,7 @@ def test_meshes_with_margins_deep_in_each_other_are_measured_of_their_round_shap
 
 
 def test_a_wedge_shorter_than_its_radius_by_millions_is_not_lost():
-    """Of the ends of its cylinder, heights are known to a rounding of the radius."""
+    """The heights of the cylinder's ends are known to a rounding error of the radius."""
     plate = RoundedHull(CORNERS * [2.5e-7, 0.025, 0.25], 1 / 3)
     around = RoundedHull([[2, 0, 0], [0, 2, 0], [0, 0, 2], [0, 0, 0]], 0.5**0.5)
     place = (0.7203718892643154, -0.29703967267297204, -0.6220036169108314)
@@ -738,7 +738,7 @@ def test_no_slice_is_missed_where_a_wall_goes_through_the_point_inside(digits):
 
 @pytest.mark.parametrize(("sides", "sure"), [(4, 1e-11), (12, 1e-11), (30, 1e-11), (80, 1e-3)])
 def test_lids_that_are_flat_but_for_rounding_are_as_many_planes_as_they_have_triangles(sides, sure):
-    # Of so many that slices have no lines for all, one plane stands for them, and the error says so.
+    # If a lid has more planes than a slice has lines, one plane stands for all. The error bound includes that.
     rng = np.random.default_rng(sides)
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     angles = 2 * np.pi * np.arange(sides) / sides
@@ -761,7 +761,7 @@ def test_the_nearer_of_two_parallel_planes_bounds_a_slice(seed):
 
 @pytest.mark.parametrize("seed", [3000461, 2000219])
 def test_the_fold_of_a_facet_bent_by_rounding_is_known_beyond_double_precision(seed):
-    """Of 1e-12 deep caps, the angle of 1e-16 between the two triangles of a facet is a trillionth."""
+    """In caps 1e-12 deep, an angle of 1e-16 between two triangles changes the volume by a trillionth."""
     found = overlap(*make("round_contacts", seed).placed)
     lower, upper = found.certificate().verify()
     assert max(abs(found.volume - lower), abs(found.volume - upper)) <= found.volume_error <= 1e-13 * found.volume

@@ -156,7 +156,7 @@ def test_eight_threads_may_ask_one_overlap_for_everything(method):
 
 
 def in_another_process(start, function, *arguments):
-    """What the function returns there. A process that hangs or dies fails the test."""
+    """The value that the function returns in another process. A process that hangs or dies fails the test."""
     with multiprocessing.get_context(start).Pool(1) as pool:
         return pool.apply_async(function, arguments).get(timeout=HANG)
 
@@ -276,7 +276,7 @@ def resident():
 
 
 def growth_over(pairs):
-    """How much memory is left behind by that many pairs with a new hull each, of which every part is built."""
+    """Growth of memory over `pairs` overlaps. Each pair has a new hull, and every attribute is read."""
     rng = np.random.default_rng(0)
     bodies = random_bodies(rng, 97)
     points = [hull_points(rng, 8) for _ in range(89)]

@@ -498,7 +498,7 @@ def test_patch_is_the_closed_border_between_owners(bodies):
         assert len(loop) >= 3
         ring = [index[tuple(v)] for v in loop]
         walked += [(min(u, v), max(u, v)) for u, v in zip(ring, np.roll(ring, -1), strict=True)]
-    # Of a pair there is one loop around what the first body owns; of more, one around what each of them owns.
+    # A pair has one loop around the facets of the first body. Three or more bodies have a loop around those of each.
     assert sorted(walked) == sorted([*borders] if len(bodies) == 2 else [*borders, *borders])
 
 

@@ -79,7 +79,7 @@ SCENES = {
 
 
 def report(name: str) -> Counter:
-    """What came of a scene, and of its repetition, with each request refused; in a process that can refuse them."""
+    """Counts the outcomes of a scene and of its repetition, with each request for memory refused in turn."""
     refuse_allocation = ctypes.PyDLL(None).refuse_allocation
     refuse_allocation.argtypes, refuse_allocation.restype = [ctypes.c_long], ctypes.c_long
     scene, number, came = SCENES[name], 0, Counter()

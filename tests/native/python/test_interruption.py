@@ -222,7 +222,7 @@ def coarsely_rounded_hulls():
 
 
 def handled(long, short):
-    """What a long answer is if a signal handler computes something meanwhile, and what both are alone."""
+    """Answers of a long computation and of a signal handler that interrupts it, and the answers of both alone."""
     found, compute, meanwhile = [], long(), short()
     alone = meanwhile()
     signal.signal(signal.SIGALRM, lambda *_: found.append(meanwhile()))

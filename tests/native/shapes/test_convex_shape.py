@@ -1,4 +1,4 @@
-"""What a kind of shape is asked, the compiler asks; and nobody else asks which kind a shape is."""
+"""The compiler checks that a shape answers every question. No other file asks which kind a shape is."""
 
 import re
 import shutil
@@ -14,7 +14,7 @@ CONE = Path(__file__).with_name("cone.h")
 # Questions about two given kinds, and lanes that hold all sides of a box.
 MAY_ASK_FOR_A_KIND = {"distance/box_axes.cpp", "methods/clipping/wide_corners.cpp"}
 
-# What is left of a shape without these is refused by whoever uses them: the class in Python, constructors.
+# The concept does not ask for these. Their users do not compile without them: the class in Python, constructors.
 NOT_IN_THE_CONCEPT = re.compile(r"fields\(\)|make\(|^Cone\(|^double radius = 0")
 
 

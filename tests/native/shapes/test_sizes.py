@@ -1,4 +1,4 @@
-"""What is let in is answered within a finite, true bound; what is not is refused in a sentence."""
+"""Bodies within the limits of size get an answer with a finite, true bound. Others are refused in one sentence."""
 
 from fractions import Fraction
 from itertools import combinations_with_replacement

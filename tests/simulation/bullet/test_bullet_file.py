@@ -1,4 +1,4 @@
-"""What the reader finds in .bullet files is what pybullet was given."""
+"""The reader of .bullet files finds the shapes that pybullet was given."""
 
 import re
 import struct
@@ -223,7 +223,7 @@ def whole(tmp_path_factory):
 
 
 def read_all(path):
-    """What all that is in a file is made of."""
+    """A list of leaves for every collider in a file."""
     file = BulletFile(path)
     return [file.leaves(each.shape) for saved in file.bodies for each in saved.colliders.values()]
 

@@ -1,4 +1,4 @@
-"""What `Bodies` models is what pybullet collides with, where it collides with it; what it does not model it names."""
+"""`Bodies` models the shapes that pybullet collides with, at their places. It names the shapes that it skips."""
 
 import ctypes
 from pathlib import Path
@@ -87,7 +87,7 @@ def test_hulls_have_the_vertices_of_bullet_in_the_world(client, tmp_path):
 def test_links_that_mix_hulls_and_primitives_print_nothing(client, capfd):
     p.loadURDF("quadruped/microtaur/microtaur.urdf", physicsClientId=client)
     bodies = Bodies(client)
-    # What pybullet prints may wait in a buffer of C's.
+    # Output of pybullet may still be in a buffer of the C library.
     ctypes.CDLL(None).fflush(None)
     assert sum(isinstance(shape, Box) for shape in bodies.shapes) == 34
     assert sum(isinstance(shape, Hull) for shape in bodies.shapes) == 4

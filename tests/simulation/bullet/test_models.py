@@ -14,7 +14,7 @@ SHARES = 6  # of the models, walked side by side where there are cores
 PYBULLET_DATA = Path(pybullet_data.getDataPath())
 ROBOTS = Path(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots"))
 
-# What pybullet itself cannot load: files that name others which are not there, a soft body, and a crash.
+# Files that pybullet cannot load: they name missing files, have a soft body, or crash pybullet.
 NOT_LOADABLE = {
     "kuka_iiwa/kuka_world.sdf",
     "kuka_iiwa/model2.sdf",
@@ -31,7 +31,7 @@ NOT_LOADABLE = {
 }
 KILLS_PYBULLET = "gripper/wsg50_one_motor_gripper_free_base.sdf"
 
-# What is not modelled, and says so.
+# Models with shapes that are skipped, and the reason in the warning.
 SKIPPED = {
     "random_urdfs/168/168.urdf": "four points, not 1",
     "samurai.urdf": "concave mesh",
@@ -52,7 +52,7 @@ def models():
 
 
 def walk(paths, results):
-    """What became of each model, in a process that may die; None for the one of which it died."""
+    """The findings for each model, from a process that may die. The key None stands for the model that killed it."""
     command = [sys.executable, WALK, results, *paths]
     run = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=600, check=False)
     found = dict(map(json.loads, results.read_text().splitlines()))
