@@ -264,7 +264,7 @@ FrameAbout<PointOf<Body>> round_frame(std::span<const Body> bodies, std::span<co
     const double reach = safe_slack / (safe_slack - slack);
     centre.restart(safe + reach / 2 * (frame.origin - safe));
   }
-  // The axes stay, about the point known to be inside. No test has reached this.
+  // The axes stay, about the point known to be inside. No known input gets here.
   return {safe, centre.frame().axes};
 }
 

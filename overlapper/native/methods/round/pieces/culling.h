@@ -8,8 +8,8 @@
 
 namespace overlapper::pieces {
 
-/// Tells which pieces of two bodies may share something, and which of their walls matter there: by what encloses them
-/// within a polytope around the common set.
+/// Finds the pairs of pieces of two bodies that may share something, and the walls that matter for each pair. It
+/// compares polytopes that enclose the pieces within a polytope around the common set.
 class Culling {
  public:
   void look_at(const Pieces& a, const Pieces& b, const EnclosingPolytope& common);
@@ -20,22 +20,22 @@ class Culling {
   /// A piece of a and one of b that are near each other.
   struct Meeting {
     int p = 0, q = 0;
-    std::vector<Wall> walls;      ///< those that matter: where no other does, the common set ends sooner
-    std::vector<int> of_p, of_q;  ///< their numbers
+    std::vector<Wall> walls;      ///< the relevant walls; no other wall bounds the common set
+    std::vector<int> of_p, of_q;  ///< the numbers of these walls
   };
-  /// Fills in the walls of what pieces p of a and q of b may share; false if that is nothing. Where it is but nothing
-  /// shows it, what these walls leave lies outside of the polytope around the common set.
+  /// Fills in the walls of the common part of piece p of a and piece q of b; false if that part is empty. If it is
+  /// empty but not proved so, the walls leave a set outside the polytope around the common set.
   bool meet(int p, int q, Meeting& meeting) const;
 
-  /// The polytope that the walls leave of what encloses the common set, every face with the number of its wall among
-  /// `meeting.walls`, or kNoWall; false if that is nothing.
+  /// The polytope that the walls cut from the polytope around the common set; false if it is empty. Each face has the
+  /// number of its wall among `meeting.walls`, or kNoWall.
   bool share(const Meeting& meeting, EnclosingPolytope& polytope) const;
 
-  /// Whether such a polytope lies outside of a round.
+  /// Whether that polytope lies outside one of the rounds.
   bool outside(const EnclosingPolytope& polytope, const Meeting& meeting) const;
 
  private:
-  /// A ball, or a cylinder by the point of its axis that is nearest to the origin; nothing without a radius.
+  /// A ball, or a cylinder with the point of its axis nearest to the origin. Not used if the radius is 0.
   struct PlainRound {
     Vec3 centre, axis;
     double radius = 0;
@@ -50,31 +50,31 @@ class Culling {
     EnclosingPolytope around;
     PlainRound round;
     Vec3 middle;
-    double reach = 0;  ///< no corner is farther from the middle
+    double reach = 0;  ///< upper bound of the distance of a corner from the middle
     Bounds box;
-    std::vector<int> walls;     ///< those of which something is left, and
-    std::vector<int> uncut;     ///< those that it has not been cut with, though they may matter; both sorted
-    std::vector<Plane> planes;  ///< of the former
+    std::vector<int> walls;     ///< walls with a remaining face, sorted
+    std::vector<int> uncut;     ///< walls that were not used for a cut, though they may matter; sorted
+    std::vector<Plane> planes;  ///< the planes of `walls`
     bool empty = false;
   };
   struct EnclosedBody {
     const Pieces* pieces = nullptr;
     std::vector<EnclosedPiece> parts;
   };
-  /// A wall that a piece may be cut with, and by how much it would be.
+  /// A wall for a cut of a piece, and how deep it would cut.
   struct WallCut {
     EnclosingPolytope::Face face;
     double depth;
   };
   void enclose(const Pieces& pieces, const EnclosingPolytope& common, EnclosedBody& side);
-  /// Cuts around_ with the walls of a piece; false if that leaves nothing. Those that it was not cut with, and that may
-  /// matter, are left in uncut_.
+  /// Cuts around_ with the walls of a piece; false if nothing is left. uncut_ gets the relevant walls that were not
+  /// used.
   bool cut_around(const Pieces& pieces, const Piece& piece);
   bool keep_walls(const EnclosedBody& side, int piece, const EnclosedPiece& other, std::vector<int>& kept,
                   std::vector<Wall>& walls) const;
   bool beyond(const PlainRound& round, const EnclosingPolytope& other, Vec3 middle) const;
 
-  /// A piece along the axis along which all are swept.
+  /// The interval of a piece along the axis of the sweep.
   struct Swept {
     double low, high;
     int piece;
@@ -83,9 +83,9 @@ class Culling {
 
   EnclosedBody a_, b_;
   std::vector<Swept> swept_a_, swept_b_;
-  EnclosingPolytope around_;  ///< what a piece leaves of the polytope around the common set
+  EnclosingPolytope around_;  ///< the part of the polytope around the common set that a piece leaves
   std::vector<WallCut> uncut_;
-  double margin_ = 0;  ///< m: of rounding
+  double margin_ = 0;  ///< m: for rounding
 };
 
 }  // namespace overlapper::pieces

@@ -9,10 +9,10 @@
 
 namespace overlapper::pieces {
 
-/// A convex polytope in doubles, by its corners, each with three edges and three faces. Planes cut it after Powell and
-/// Abel (2015), who place every new corner on an edge, so that none is farther out than rounding.
+/// A convex polytope in doubles. Each corner has three edges and three faces. Planes cut it as in Powell and Abel
+/// (2015). They place every new corner on an edge, so no corner is farther out than rounding.
 struct EnclosingPolytope {
-  /// { X : dot(normal, X) <= slack }, and the number of the wall that it stands for, or none.
+  /// { X : dot(normal, X) <= slack }, and the number of its wall, or kNoWall.
   struct Face {
     Vec3 normal;
     double slack;
@@ -23,37 +23,37 @@ struct EnclosingPolytope {
     std::array<int, 3> beside;  ///< the corners at the other ends of its edges, counter-clockwise from outside
     std::array<int, 3> face;    ///< between an edge and the next
 
-    /// Which of its edges leads to another corner.
+    /// The number of its edge to another corner.
     int edge_to(int other) const { return beside[0] == other ? 0 : beside[1] == other ? 1 : 2; }
   };
-  std::vector<Face> faces;  ///< all that have cut it; of some, further ones may have left nothing
+  std::vector<Face> faces;  ///< all faces that have cut it; later cuts may have left nothing of some
   std::vector<Corner> corners;
 
   void become(const Bounds& box);
-  /// False if the face leaves nothing, and then the polytope is as it was.
+  /// False if the face leaves nothing; the polytope is then unchanged.
   bool cut(const Face& face);
-  /// Leaves out the faces of which nothing is left.
+  /// Removes the faces without a remaining part.
   void drop_faces();
 
-  /// Calls use(face, ring) for each face that is left, with its corners, counter-clockwise from outside.
+  /// Calls use(face, ring) for each remaining face, with its corners counter-clockwise from outside.
   template <class Use>
   void for_faces(Use use) const;
   /// Calls use(corner, edge) around the face to the left of a corner's edge, beginning with these.
   template <class Use>
   void for_ring(int corner, int edge, Use use) const;
 
-  /// Numbers what is left of faces, of which one may be left in two places by rounding: `number[i][k]` of a corner
-  /// between its edge k and the next, and `left` the face that each number is of.
+  /// Numbers the remaining parts of faces. By rounding, a face may have two parts. `number[i][k]` is the part at corner
+  /// i between its edges k and k + 1. `left` gives the face of each part.
   void number_faces(std::vector<std::array<int, 3>>& number, std::vector<int>& left) const;
 
-  /// Whether it is surely not inside: what is no number may be.
+  /// Whether the point is certainly outside. NaN counts as not certain.
   bool excludes(Vec3 point) const;
   Bounds bounds() const;
   /// The least and the largest dot(direction, X) over the polytope.
   std::pair<double, double> range(Vec3 direction) const;
   double least(Vec3 direction) const { return range(direction).first; }
   Vec3 middle() const;
-  double reach(Vec3 point) const;  ///< no corner is farther from it
+  double reach(Vec3 point) const;  ///< upper bound of the distance of a corner
   double extent() const { return reach({}); }
   double surface() const;  ///< its area
 };
@@ -64,7 +64,7 @@ template <class Use>
 void EnclosingPolytope::for_faces(Use use) const {
   thread_local std::pair<std::vector<int>, std::vector<std::array<bool, 3>>> of_thread;
   of_thread.first.resize(corners.size()), of_thread.second.assign(corners.size(), {});
-  // By pointers: every use of what is a thread's own looks for it.
+  // Pointers, because each access to a thread_local variable looks it up.
   int* const ring = of_thread.first.data();
   std::array<bool, 3>* const seen = of_thread.second.data();
   for (size_t first = 0; first < corners.size(); ++first)

@@ -4,29 +4,30 @@
 
 namespace overlapper::pieces {
 
-/// Adds what walls leave of at most two rounds. `around` holds all of that, if known. False if slices give up.
+/// Adds the part of at most two rounds inside the walls. `around` contains that part, if known. False if slices give
+/// up.
 bool add_piece(std::span<const Round> rounds, std::span<const Wall> walls, const EnclosingPolytope* around,
                const PieceSetting& setting, Sums& sums);
 
-/// Adds a ball, or what one wall leaves of it, in closed form about the point of the cap that is farthest from the
-/// wall.
+/// Adds a ball, or the part of it inside one wall, in closed form about the cap's point that is farthest from the wall.
 void add_cap(const Round& ball, const Wall* wall, const PieceSetting& setting, Sums& sums);
 
-/// Adds, in closed form, what a polytope and at most one round share. Faces of the polytope tell which of the walls
-/// they are. False, and nothing is added, if doubles are not sure of it to a fraction of the whole that matters.
+/// Adds, in closed form, the common part of a polytope and at most one round. Faces of the polytope have the numbers of
+/// their walls. False if doubles are not accurate to the relevant fraction of the whole; nothing is then added.
 bool add_in_polytope(const Round* round, const EnclosingPolytope& polytope, const DistinctWalls& distinct,
                      const PieceSetting& setting, Sums& sums);
 
-/// The part of at most two rounds, not both of them balls, that walls leave. Coordinates count from a point of its own.
+/// The part of at most two rounds inside the walls. The rounds are not both balls. Coordinates are relative to an own
+/// point.
 struct SlicedPiece {
   std::vector<Round> rounds;
   std::vector<Wall> walls;
-  double extent = 0;                          ///< m: no point is farther from the point that coordinates count from
-  const EnclosingPolytope* around = nullptr;  ///< a polytope that holds the piece, about the point inside, if known
-  Vec3 offset{};                              ///< of the own point, from the point inside
+  double extent = 0;                          ///< m: upper bound of the distance of its points from the own point
+  const EnclosingPolytope* around = nullptr;  ///< polytope around the piece, relative to the inner point, if known
+  Vec3 offset{};                              ///< of the own point from the inner point
   bool near = false;                          ///< the own point is near the piece
 
-  /// The same, about a point that is `step` away.
+  /// The same piece, relative to a point that is `step` away.
   SlicedPiece moved(Vec3 step) const;
 };
 

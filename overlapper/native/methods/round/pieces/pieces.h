@@ -12,39 +12,39 @@ namespace overlapper::pieces {
 using slicing::Round;
 using slicing::Wall;
 
-/// The part of at most one round that planes leave.
+/// The part of at most one round inside planes.
 struct Piece {
   int round = -1;
   int first_wall = 0, walls = 0;
 };
 
-/// A body as pieces with nothing in common but their borders.
+/// A body as pieces with disjoint interiors.
 struct Pieces {
   std::vector<Piece> pieces;
   std::vector<Round> rounds;
   std::vector<Wall> walls;
-  double flatness = 0;  ///< m: by how much facets miss the corners that they are spanned by
+  double flatness = 0;  ///< m: largest distance of a facet's plane from its corners
 
   void clear() { pieces.clear(), rounds.clear(), walls.clear(), flatness = 0; }
 };
 
-/// How far from a point a body reaches at most.
+/// Upper bound of the distance of a body's points from a point.
 double extent(const Placed& body, Vec3 point);
 
-/// A polytope around the common set of two bodies of which one is bounded, about the point `inside`: what those planes
-/// of both that are nearest to that point leave of a box, and a little more.
+/// A polytope around the common set of two bodies, one of them bounded, relative to `inside`. It is a box cut by the
+/// planes of both bodies nearest to `inside`, and a little larger.
 void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& result);
 
-/// Cuts a body; pieces and walls that `other` does not reach are left out, and so are pieces outside of what encloses
-/// the common set, if that is known. Bodies about a reference, which lies at `reference` in the world; what is cut is
-/// about the point `inside`, of the same coordinates as the bodies.
+/// Cuts a body into pieces. Pieces and walls that `other` does not reach are left out, and so are pieces outside
+/// `common`, the polytope around the common set, if known. Bodies are about a reference, at `reference` in the world.
+/// Pieces are relative to the point `inside`, in the same coordinates as the bodies.
 ///
-/// A capsule is a cylinder and two half balls; a rounded hull is its core, a prism on every facet, a wedge of a
+/// A capsule is a cylinder and two half balls. A rounded hull is its core, a prism on every facet, a wedge of a
 /// cylinder along every edge, and a wedge of a ball at every vertex.
 void cut(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
          const WideVector& inside, Pieces& result);
 
-/// Moves the surface of a body out, but not the cuts through it; false if that leaves nothing of something round.
+/// Moves the surface of a body out, but not the cuts through the body; false if nothing of a round shape is left.
 bool grow(Pieces& pieces, double outwards);
 
 }  // namespace overlapper::pieces

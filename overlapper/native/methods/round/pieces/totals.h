@@ -13,13 +13,13 @@
 
 namespace overlapper::pieces {
 
-/// Integrals over pieces in the axes of the world, about the point inside.
+/// Integrals over pieces in the axes of the world, relative to the inner point.
 struct Totals : Moments {
   double error = 0, area = 0, area_error = 0;
-  double first_area = 0;  ///< m²: of the first body's surface
-  double border = 0;      ///< m²: the area of all that area vectors are the sums of
-  double open = 0;        ///< m³: what may be missing of pieces whose area vectors do not sum to zero
-  Moments sizes;          ///< of the terms of an ellipsoid's moments
+  double first_area = 0;  ///< m²: area of the first body's part of the surface
+  double border = 0;      ///< m²: area of all surface that is in the sums of area vectors
+  double open = 0;        ///< m³: possibly missing volume of pieces whose area vectors do not sum to zero
+  Moments sizes;          ///< sizes of the terms of an ellipsoid's moments
   Vec3 pull, moment;
   Vec3 unbalanced;  ///< the sum of both bodies' area vectors: zero if no piece is missing
 
@@ -30,15 +30,15 @@ struct Totals : Moments {
     pull += piece.pull, moment += piece.moment, unbalanced += piece.unbalanced;
   }
 
-  /// Adds to the area what belongs to a body, and not to a cut.
+  /// Adds to the area if the surface belongs to a body, and not to a cut.
   void add_area(int owner, double more) {
     if (owner != slicing::kCut) area += more;
     if (owner == 0) first_area += more;
   }
 };
 
-/// m³: what may be missing if the area vectors of the whole surface do not sum to zero: they, times the size along
-/// them.
+/// m³: bound of the missing volume if the area vectors of the whole surface do not sum to zero: their sum times the
+/// extent along it.
 inline double missing(const Totals& totals) {
   const Vec3 u = totals.unbalanced, s = totals.squares, p = totals.products;
   const double square =
@@ -47,25 +47,25 @@ inline double missing(const Totals& totals) {
   return std::max(0.0, std::sqrt(std::max(0.0, square / totals.volume)) - rounding);
 }
 
-/// m³: what may be missing of all pieces.
+/// m³: bound of the missing volume of all pieces.
 inline double open_volume(const Totals& totals) { return 2 * std::max(totals.open, missing(totals)); }
 
-/// m²: at least as much is missing of a surface whose area vectors do not sum to zero, beyond rounding.
+/// m²: lower bound of the missing area of a surface whose area vectors do not sum to zero, beyond rounding.
 inline double missing_area(Vec3 unbalanced, double border) {
   return std::max(0.0, norm(unbalanced) - slicing::kSummation * border);
 }
 
-/// All that is summed over pieces.
+/// All sums over pieces.
 struct Sums {
   Totals totals;
   std::optional<PatchSums> patch;  ///< if wanted
 };
 
-/// How a patch is seen in the coordinates of pieces: u and v there, and what an area vector adds.
+/// A patch in the coordinates of pieces: its u and v, and the contribution of an area vector.
 struct PatchView {
   double u0 = 0, v0 = 0;
   Vec3 u, v, normal;
-  int owner = 0;  ///< whose surface counts
+  int owner = 0;  ///< the body whose surface counts
 
   PatchView() = default;
   PatchView(const PatchSums& patch, int owner_)
@@ -77,31 +77,31 @@ struct PatchView {
         owner(owner_) {}
 };
 
-/// Settings that are the same for all pieces of a pair.
+/// Settings for all pieces of a pair.
 struct PieceSetting {
-  double extent = 0;                          ///< m: no point of the common set is farther from the one inside
-  const quadric::Stretch* stretch = nullptr;  ///< of an ellipsoid: from the ball and the planes that are added
-  const EnclosingPolytope* common = nullptr;  ///< what lies outside of it belongs to no piece
+  double extent = 0;                          ///< m: upper bound of the distance of common points from the inner point
+  const quadric::Stretch* stretch = nullptr;  ///< for an ellipsoid: maps the ball and its planes to the world
+  const EnclosingPolytope* common = nullptr;  ///< no piece lies outside of it
   PatchView view;                             ///< of the patch, if one is summed
-  bool closely = false;                       ///< all of every interval is looked at
-  double layer = 0;                           ///< m: planes no farther from each other are one
-  double surface = 0;                         ///< m²: of the common set, where there are such layers
+  bool closely = false;                       ///< sample all of every interval
+  double layer = 0;                           ///< m: planes at most this far apart count as one
+  double surface = 0;                         ///< m²: of the common set, if there are such layers
 };
 
-/// The fraction of a volume up to which the rounding of a polytope's corners does not matter.
+/// Below this fraction of the volume, the rounding of a polytope's corners does not matter.
 inline constexpr double kSure = 5e-13;
 
-/// Whether slices are to have so many walls: of more, they take long, by the cube of their number.
+/// Whether slices suit so many walls: their time grows with the cube of the number of walls.
 inline bool sliceable(size_t walls) { return walls <= 28; }
 
-/// Beyond that fraction of a volume, something is wrong. Polytopes of tangent planes take seconds to be as good.
+/// A larger relative error of the volume means a failure. Polytopes of tangent planes take seconds for this accuracy.
 inline constexpr double kMostError = 1e-8;
-/// The fraction of a volume that may stay open before slices are looked at more closely, or others are.
+/// If a larger fraction of the volume is missing, slices are sampled more closely, or placed otherwise.
 inline constexpr double kMostOpen = 1e-11;
 
-/// m: how far rounding may move surfaces whose coordinates, about the point inside, reach as far as the common set. If
-/// `mean_square` is the mean square of the distance of a convex set from the point, no point is farther than five times
-/// its root: ∫ |x|² dV about the centroid is at least 2 V R² / 45.
+/// m: bound of the movement of surfaces by rounding, for coordinates relative to the inner point up to the extent of
+/// the common set. `mean_square` is the mean squared distance of a convex set from that point. No point is farther than
+/// five times its root: ∫ |x|² dV about the centroid is at least 2 V R² / 45.
 inline double rounding_of_surfaces(double mean_square) { return 8 * DBL_EPSILON * 5 * std::sqrt(mean_square); }
 
 inline double sum_of(Vec3 v) { return v.x + v.y + v.z; }

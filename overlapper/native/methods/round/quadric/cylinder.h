@@ -9,18 +9,19 @@
 
 namespace overlapper::quadric {
 
-/// The common part of a polyhedron and a cylinder without ends about the z axis, about the origin.
+/// The common part of a polyhedron and an infinite cylinder about the z axis, about the origin.
 struct CylinderPart : Moments {
-  double error = 0;  ///< of the volume: what rounding may have done to it, that of the arguments not counted
-  /// ∫ n dA and ∫ x × n dA over the curved part, and over the polyhedron's faces without cuts.
+  double error = 0;  ///< error of the volume by rounding, without the error of the arguments
+  /// ∫ n dA and ∫ x × n dA: over the curved part, and over the polyhedron's faces without cuts.
   Pull curved, flat;
   double area = 0;                    ///< m², of the surface without cuts
-  double whole_area = 0;              ///< with them
-  int faces = 0;                      ///< that take part
-  std::span<const Section> sections;  ///< of each of the polyhedron's planes; good until the next part is measured
+  double whole_area = 0;              ///< m², with cuts
+  int faces = 0;                      ///< number of faces in the common part
+  std::span<const Section> sections;  ///< per plane of the polyhedron; valid until the next part is measured
 };
 
-/// In closed form; nothing where rounding leaves open which way round a face's border goes, or how wide it is.
+/// The common part in closed form. No value if rounding leaves the direction of a face's border, or its width,
+/// uncertain.
 std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius);
 
 }  // namespace overlapper::quadric

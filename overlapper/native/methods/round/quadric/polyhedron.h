@@ -9,28 +9,28 @@
 
 namespace overlapper::quadric {
 
-/// A convex polyhedron whose inside a quadric shares.
+/// A convex polyhedron to be intersected with a quadric.
 struct Polyhedron {
   std::span<const Vec3> corners;
   std::span<const Plane> planes;
   std::span<const Edge> edges;
-  size_t faces = 0;      ///< the first of the planes; where others have cut it, its surface goes on in the next piece
-  double misplaced = 0;  ///< m: how far rounding may have moved corners, beyond that of their own numbers
+  size_t faces = 0;  ///< number of faces, the first planes; at the others, cuts, the surface goes on in the next piece
+  double misplaced = 0;  ///< m: movement of corners by rounding, beyond that of their own numbers
 };
 
 /// The part of a polyhedron's face inside a quadric.
 struct Section {
   double area = 0;
   Vec3 first;              ///< ∫ x dA
-  Vec3 squares, products;  ///< of a cylinder ∫ x², y², z² dA and ∫ yz, zx, xy dA
+  Vec3 squares, products;  ///< for a cylinder: ∫ x², y², z² dA and ∫ yz, zx, xy dA
 };
 
-/// A convex polyhedron by the corners around each of its faces, counter-clockwise from outside, which planes cut.
+/// A convex polyhedron as the corners around each of its faces, counter-clockwise from outside. Planes can cut it.
 class Rings {
  public:
-  /// Those of a box or a hull, placed; false if there are none.
+  /// Becomes a placed box or hull; false for other shapes.
   bool become(const Shape& shape, const Pose& pose);
-  /// Another, face by face.
+  /// Starts another polyhedron, to be added face by face.
   void clear() { corners_.clear(), planes_.clear(), ring_.clear(), start_.assign(1, 0), cuts_ = 0; }
   void add_corner(Vec3 at) { corners_.push_back(at); }
   void add_face(const Plane& plane, std::span<const int> ring) {
@@ -38,7 +38,7 @@ class Rings {
     ring_.insert(ring_.end(), ring.begin(), ring.end());
     start_.push_back(static_cast<int>(ring_.size()));
   }
-  /// Keeps what is not above the height, or not below it; false if a face is not convex, by rounding.
+  /// Keeps the part below the height, or the part above it; false if rounding has made a face non-convex.
   bool cut(double height, bool keep_below);
 
   bool empty() const { return planes_.empty(); }
@@ -47,9 +47,9 @@ class Rings {
   std::span<const int> ring(size_t face) const {
     return std::span(ring_).subspan(start_[face], start_[face + 1] - start_[face]);
   }
-  /// Whether that is a face, and not a cut.
+  /// Whether a plane is a face, and not a cut.
   bool face(size_t plane) const { return plane < planes_.size() - cuts_; }
-  /// With edges; good until it changes.
+  /// The polyhedron with its edges; valid until the rings change.
   Polyhedron polyhedron();
 
  private:
@@ -64,10 +64,10 @@ class Rings {
   size_t cuts_ = 0;
   std::vector<Edge> edges_;
   std::vector<Vec3> left_;
-  // To work in.
+  // Work space.
   std::vector<Plane> kept_;
   std::vector<int> kept_ring_, kept_start_, after_, number_;
-  std::map<std::pair<int, int>, int> crossed_;  ///< corners, by the upper and the lower end of the edges cut
+  std::map<std::pair<int, int>, int> crossed_;  ///< corners, by the upper and the lower end of each cut edge
 };
 
 }  // namespace overlapper::quadric

@@ -6,13 +6,13 @@
 
 namespace overlapper::quadric {
 
-/// The closed forms of narrower half angles of an arc are mostly rounding: their terms cancel.
+/// For narrower half angles of an arc, the terms of the closed forms cancel and leave mostly rounding.
 inline constexpr double kNarrow = 0.4;
 
 /// Taylor series in the half angle x of an arc of the unit circle. Each member holds the coefficients of x³ (x²)ᵏ of
-/// one function: rational numbers whose numerators doubles hold. The first six are integrals over the segment between
-/// the arc and its chord, about the middle of the chord, of powers of a across the chord, towards the arc, and b along
-/// it.
+/// one function. They are rational numbers with numerators that doubles hold exactly. The first six are integrals over
+/// the segment between the arc and its chord, about the middle of the chord. Coordinate a is across the chord, towards
+/// the arc; b is along the chord.
 struct SegmentSeries {
   static constexpr size_t kTerms = 12;
   using Coefficients = std::array<double, kTerms>;
@@ -45,8 +45,8 @@ struct SegmentSeries {
 };
 inline constexpr SegmentSeries kSegmentSeries;
 
-/// The polynomial of the first terms of a series, without the factor x³. It is unrolled, so that compilers take several
-/// angles at a time.
+/// The polynomial of the first terms of a series, without the factor x³. It is unrolled, so that compilers process
+/// several angles at once.
 template <size_t kTerms = SegmentSeries::kTerms>
 inline double series(const SegmentSeries::Coefficients& coefficients, double square) {
   return [&]<size_t... kIndex>(std::index_sequence<kIndex...>) {

@@ -6,12 +6,12 @@
 
 namespace overlapper::quadric {
 
-/// An ellipsoid, as what makes it of the unit ball about its centre: x, y and z times a half axis each. An area vector
-/// of the ball, or of a plane, becomes one of the ellipsoid by the cofactors, and the size of the element of its
-/// surface, √(b²c² u² + c²a² v² + a²b² w²) per solid angle at (u, v, w), has no integral in closed form.
+/// An ellipsoid as a stretch of the unit ball about its centre: x, y and z times a half axis each. Cofactors map area
+/// vectors of the ball, or of a plane, to area vectors of the ellipsoid. The area element per solid angle at (u, v, w)
+/// is √(b²c² u² + c²a² v² + a²b² w²), which has no integral in closed form.
 struct Stretch {
-  /// The relative difference of two rules up to which the finer rule is believed. The rule of fifteen nodes is the
-  /// better by far, unless the two agree by chance.
+  /// If the relative difference of two rules is at most this, the finer rule is accepted. The rule of fifteen nodes is
+  /// far more accurate, unless the two agree by chance.
   static constexpr double kApart = 1e-11;
 
   explicit Stretch(Vec3 half_axes_)
@@ -22,8 +22,8 @@ struct Stretch {
   Vec3 half_axes, cofactors;
   double volume;  ///< the determinant
 
-  /// The relative error of the surface's area. In a body more than a thousand times as long as thick, the element
-  /// changes within a part of the ball so small that rules may not notice it.
+  /// The relative error of the surface's area. In a body over a thousand times as long as thick, the element changes
+  /// within so small a part of the ball that rules may miss it.
   double open() const {
     const double shortest = std::min({half_axes.x, half_axes.y, half_axes.z});
     const double slender = std::max(1.0, max_component(half_axes) / shortest / 1e3);
@@ -36,14 +36,14 @@ struct Stretch {
   /// place × normal, in the world along the axes.
   Vec3 moment(Vec3 place, Vec3 n) const { return cross(scaled(half_axes, place), normal(n)); }
 
-  /// Per height of the strip, the surface between two parallel planes along the arc level + cos φ across + sin φ along
+  /// The surface between two parallel planes, per height of the strip, along the arc level + cos φ across + sin φ along
   /// of the unit ball, |φ| <= half_angle.
   double arc(Vec3 level, Vec3 across, Vec3 along, double half_angle) const;
 
   struct Cap {
     double area, error;
   };
-  /// The surface beyond a plane orthogonal to the unit normal, of a cap of the unit ball up to 2 high.
+  /// The surface of a cap of the unit ball, up to 2 high, beyond a plane orthogonal to the unit normal.
   Cap cap(Vec3 normal, double height) const;
 };
 

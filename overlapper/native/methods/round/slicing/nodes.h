@@ -8,7 +8,7 @@ namespace overlapper::slicing {
 
 inline constexpr int kMostNodes = 24;
 
-/// A number for each of eight slices, which compilers take two or four at a time.
+/// One number for each of eight slices; compilers process two or four at once.
 inline constexpr int kRow = 8;
 using Row = std::array<double, kRow>;
 
@@ -17,13 +17,14 @@ struct Sides {
   std::array<Row, 2> half, upper, lower;
   Row centre_x, centre_y, slack;  ///< of the disc; |centre|² − radius²
 };
-/// Each t has a tail, as in double-double: at the ends of a round, half a chord is the root of how far t is from there.
+/// Each t has a tail, as in double-double. Near the ends of a round, half a chord is the square root of the distance of
+/// t from the end.
 void find_sides(const Stack& stack, const Row& t, const Row& tail, Sides& sides);
 
-/// Where a rule looks at slices, and what each of them counts.
+/// The nodes of a rule, and their weights.
 struct Nodes {
   int size = 0;
-  std::array<double, kMostNodes> t, tail, weight;  ///< the tail is what a double cannot hold of t
+  std::array<double, kMostNodes> t, tail, weight;  ///< the tail is the part of t that a double cannot hold
 
   void append(double at, double counts) { t[size] = at, tail[size] = 0, weight[size] = counts, ++size; }
 };
@@ -33,13 +34,13 @@ struct Slices {
   std::array<double, kMostNodes> volume, area;
 };
 
-/// The weighted sum over slices that all have that outline.
+/// The weighted sum over slices that all have this outline.
 Integrals measure(const Stack& stack, const Outline& outline, const Nodes& nodes, Slices& slices);
 
 /// The integrals of a single slice per unit of t.
 Integrals measure(const Stack& stack, const Outline& outline, double t);
 
-/// The face in a plane parallel to the slices, which the slice beside it, at `t`, fills.
+/// Adds the face in a plane parallel to the slices. It has the outline of the slice beside it, at `t`.
 void add_face(const Line& plane, const Stack& stack, const Outline& outline, double t, Integrals& sum);
 
 }  // namespace overlapper::slicing

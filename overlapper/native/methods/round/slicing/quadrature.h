@@ -15,26 +15,26 @@ struct Sample {
 struct Sum {
   Integrals integrals;
   double about = 0;             ///< m³: the volume by the first rules
-  double error = 0;             ///< of the volume, beside rounding
-  double area_error = 0;        ///< likewise of the area
-  int rules = 0;                ///< how many were applied
+  double error = 0;             ///< error of the volume, beside rounding
+  double area_error = 0;        ///< error of the area, beside rounding
+  int rules = 0;                ///< number of rules applied
   std::vector<Sample> samples;  ///< in the order of t
 };
 
-/// Integrates over intervals. At the ends of one a slice is a series in the square root of what t is away from them, so
-/// that with t = m − h cos θ it is analytic in θ, and rules of Gauss and Legendre converge geometrically. The last
-/// terms of the Legendre series that the nodes give tell whether a rule will do; where it will not, one of more nodes
-/// is taken, or the interval is halved. `volume` and `area` are those of what has been measured before, to which and to
-/// what the first rules give errors are small; false if they do not become so. The first rules have eight nodes, or
-/// unless `few` as many as there are. `strictness` is what to divide the usual limits of the last terms by; if 0, terms
-/// in the middle of the series tell how much smaller those beyond its end are.
+/// Integrates over intervals. Near an end of an interval, a slice is a series in the square root of the distance of t
+/// from the end. With t = m − h cos θ it is analytic in θ, and Gauss-Legendre rules converge geometrically. The last
+/// terms of the Legendre series of the nodes tell whether a rule is accurate enough. If not, a rule with more nodes
+/// follows, or the interval is halved. `volume` and `area` were measured before. Errors are small relative to these
+/// plus the result of the first rules; false if they stay larger. The first rules have eight nodes with `few`,
+/// otherwise the most. `strictness` divides the usual limits of the last terms. If it is 0, terms in the middle of the
+/// series bound the terms beyond its end.
 bool integrate(const Stack& stack, std::span<const Interval> intervals, double volume, double area, bool few,
                double strictness, Sum& sum);
 
-/// Whether the volume between two values of t agrees with the samples. The root of the area of slices of a convex set
-/// is concave (Brunn and Minkowski), so that chords between samples bound the volume from below, and chords drawn out
-/// beyond them from above: no wrong outline and no value of t missed passes unless what it makes is smaller than the
-/// gap, about a hundredth. Uses the samples up.
+/// Whether the volume between two values of t agrees with the samples. The square root of the area of slices of a
+/// convex set is concave (Brunn and Minkowski). Chords between samples therefore bound the volume from below, and
+/// extended chords from above. A wrong outline or a missed value of t passes only if its effect is below the gap, about
+/// a hundredth. Consumes the samples.
 bool within_chords(double begin, double end, Sum& sum);
 
 }  // namespace overlapper::slicing

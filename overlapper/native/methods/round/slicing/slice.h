@@ -22,31 +22,31 @@ inline double dot(Point a, Point b) { return a.x * b.x + a.y * b.y; }
 inline double norm(Point a) { return std::sqrt(dot(a, a)); }
 inline double cross(Point a, Point b) { return a.x * b.y - a.y * b.x; }
 
-/// How many lines may bound a slice; bodies with more planes than that where no cut leaves fewer have another way.
+/// The largest number of lines around a slice. Bodies with more planes, where no cut leaves fewer, have another way.
 inline constexpr int kMostLines = 72;
 
-/// A quadric in coordinates (x, y, t) about a point of the common set, X = x l + y m + t T, where T · n = 1, so that
-/// slices are t apart, and T may be oblique: a ball, or a cylinder whose axis lies in the slices. Seen along
-/// that axis, a cylinder is a disc with the one coordinate `across` · (x, y).
+/// A quadric in coordinates (x, y, t) about a point of the common set: a ball, or a cylinder with its axis in the
+/// slices. X = x l + y m + t T with T · n = 1, so t is the distance between slices, and T may be oblique. Seen along
+/// its axis, a cylinder is a disc with the one coordinate `across` · (x, y).
 struct Quadric {
   bool ball = false;
   int owner = 0;
   double radius = 0;
-  Point across;                          ///< of a cylinder: the unit vector orthogonal to the axis
-  Point shear;                           ///< what T has along l and m; of a cylinder in x alone, along `across`
-  Point centre;                          ///< of a ball at t = 0; of a cylinder in x alone, along `across`
+  Point across;                          ///< for a cylinder: the unit vector orthogonal to the axis
+  Point shear;                           ///< components of T along l and m; for a cylinder only x, along `across`
+  Point centre;                          ///< of a ball at t = 0; for a cylinder only x, along `across`
   double along = 0;                      ///< dot(T, centre), in the plane orthogonal to the axis
-  double slack = 0;                      ///< |centre|² − radius²: not positive where the origin is inside
-  double low = 0, high = 0;              ///< the values of t between which there are slices
-  double level = 0;                      ///< that of its centre
-  static constexpr double kPole = 1e-6;  ///< of the terms, the square of a side that is as well known by a difference
+  double slack = 0;                      ///< |centre|² − radius²: not positive if the origin is inside
+  double low = 0, high = 0;              ///< slices exist between these values of t
+  double level = 0;                      ///< t of its centre
+  static constexpr double kPole = 1e-6;  ///< relative to the terms: a squared side as accurate by a difference
 
   double half_chord2(double t) const { return (t - low) * (high - t); }
   /// The part of value() that does not depend on x and y, and the size of its terms.
   double constant(double t) const { return (1 + dot(shear, shear)) * t * t - 2 * along * t + slack; }
   double terms(double t) const { return (1 + dot(shear, shear)) * t * t + std::abs(2 * along * t) + std::abs(slack); }
-  /// The root of y² − 2 middle y + constant that is nearer to zero, from the other root. It is no difference, except
-  /// near an end of the quadric, where it is smaller than the rounding of the constant.
+  /// The root of y² − 2 middle y + constant nearer to zero, from the other root, without a difference. Near an end of
+  /// the quadric, where the root is smaller than the rounding of the constant, it is a difference.
   double nearer(double far, double middle, double constant, double t) const {
     return far * far > kPole * terms(t) ? constant / far : 2 * middle - far;
   }
@@ -57,22 +57,22 @@ struct Quadric {
   }
 };
 
-/// A line of the slices: dot(normal, x) <= side(t). Of a plane, side(t) = offset − rate t.
+/// A line of the slices: dot(normal, x) <= side(t). For a plane, side(t) = offset − rate t.
 struct Line {
   Point normal;
   double length = 1;  ///< of the normal
   double offset = 0, rate = 0;
-  int quadric = -1;   ///< the cylinder that it is a side of
-  bool upper = true;  ///< along `across` of that, or against it
+  int quadric = -1;   ///< the cylinder, if the line is a side of one
+  bool upper = true;  ///< along `across` of the cylinder, or against it
   int owner = kCut;   ///< the body
   Vec3 face;          ///< the plane's unit normal in the world
-  Point normal_tail;  ///< what rounding to doubles has taken from the plane
+  Point normal_tail;  ///< the rounding error of the plane's normal as a double
   double offset_tail = 0, rate_tail = 0;
 };
 
-/// The points where two lines cross, from their sides: the foot of the nearer line, and as far along that as the other
-/// says. So the point lies on both but for the rounding of their sides, however nearly parallel the two are, and
-/// however much farther one of them is.
+/// The crossing of two lines, from their sides: the foot of the nearer line, and a step along that line to the other
+/// one. The point lies on both lines but for the rounding of their sides. This also holds if the lines are nearly
+/// parallel, or if one is much farther away.
 struct LineCorner {
   struct Base {
     Point foot, way;
@@ -104,9 +104,9 @@ struct LineCorner {
 /// A surface seen along a direction, in coordinates u and v across it.
 struct View {
   int owner = 0;      ///< of the surface
-  bool rest = false;  ///< instead of it, all other surfaces are seen, from behind: these have no arcs, if it has
+  bool rest = false;  ///< shows all other surfaces from behind instead; if the owner has arcs, these have none
   double u0 = 0, v0 = 0;
-  Vec3 u, v;    ///< what u and v grow by along x, y and t
+  Vec3 u, v;    ///< gradients of u and v along x, y and t
   Vec3 normal;  ///< against the direction, along l, m and n
 
   bool sees(int of_owner) const { return (of_owner == owner) != rest; }
@@ -118,17 +118,17 @@ struct Stack {
   int lines = 0;
   std::array<Quadric, 2> quadric;
   int quadrics = 0;
-  int ball = -1;                              ///< which of the quadrics is one
-  double low = 0, high = 0;                   ///< slices lie between, if there are any
-  std::optional<Line> low_plane, high_plane;  ///< planes parallel to the slices, if such end the stack
+  int ball = -1;                              ///< number of the ball among the quadrics, or -1
+  double low = 0, high = 0;                   ///< slices lie between these values of t, if there are any
+  std::optional<Line> low_plane, high_plane;  ///< planes parallel to the slices that end the stack, if any
   Vec3 l, m, n, t;                            ///< the axes, in the world
-  Point shear;                                ///< what t has along l and m
-  std::optional<View> view;                   ///< if anything is looked at
-  const quadric::Stretch* stretch = nullptr;  ///< of an ellipsoid: what makes the ball and all else out of the world
+  Point shear;                                ///< components of t along l and m
+  std::optional<View> view;                   ///< set if a surface is viewed
+  const quadric::Stretch* stretch = nullptr;  ///< for an ellipsoid: maps the ball and all else to the world
 
-  /// The stretched area of a plane's part whose area vector, along l, m and n, is `normal`.
+  /// The stretched area of a part of a plane with the area vector `normal` along l, m and n.
   double area(Vec3 normal) const { return stretch->area(normal.x * l + normal.y * m + normal.z * n); }
-  /// place × normal, all along l, m and n; in the world, if that is stretched.
+  /// place × normal, all along l, m and n; in the world if stretched.
   Vec3 moment(Vec3 place, Vec3 normal) const {
     if (!stretch) return cross(place, normal);
     const auto in_world = [&](Vec3 v) { return v.x * l + v.y * m + v.z * n; };
@@ -143,7 +143,7 @@ struct Slice {
 
   const Stack& stack;
   double t;
-  std::array<double, 2> half_chord{}, upper{}, lower{};  ///< per quadric; the sides only of cylinders
+  std::array<double, 2> half_chord{}, upper{}, lower{};  ///< per quadric; upper and lower only for cylinders
   Point centre;                                          ///< of the disc
   double slack = 0, radius = 0;                          ///< |centre|² − radius²
 
@@ -183,21 +183,21 @@ struct Outline {
 };
 Outline outline(const Slice& slice);
 
-/// Whether a slice surely has that outline, which is found sooner than the outline itself.
+/// Whether a slice certainly has that outline; faster than finding the outline.
 bool is_outline(const Slice& slice, const Outline& outline);
 
-/// Integrals over a slice, or over slices, in coordinates x, y and t: the volume's, and those of the surfaces.
+/// Integrals over a slice, or over slices, in coordinates x, y and t: of the volume and of the surfaces.
 struct Integrals : Moments {
-  double area = 0;        ///< of what the bodies own of the surface
-  double first_area = 0;  ///< of that, the first body's
-  /// ∫ N dA and ∫ X × N dA along l, m and n: per body of its surface, and of the cuts through bodies.
+  double area = 0;        ///< of the bodies' parts of the surface, without cuts
+  double first_area = 0;  ///< the first body's part of `area`
+  /// ∫ N dA and ∫ X × N dA along l, m and n: for each body's surface, and for the cuts through bodies.
   std::array<Vec3, 3> pull{}, moment{};
-  double across = 0;             ///< ∫ t N dA along n, over all of the surface: the volume, by other integrals
-  double terms = 0;              ///< the size of the terms of that
+  double across = 0;             ///< ∫ t N dA along n over all of the surface: the volume, by other integrals
+  double terms = 0;              ///< the size of the terms of `across`
   double border = 0;             ///< ∫ dA over all of the surface
-  double correction = 0;         ///< of the volume: what the tails of planes add to first order
-  double blur = 0;               ///< of the volume: the size of terms that lines are the sums of
-  std::array<double, 6> seen{};  ///< ∫ 1, u, v, u², uv and v² over what a view shows
+  double correction = 0;         ///< of the volume: first-order effect of the tails of planes
+  double blur = 0;               ///< of the volume: the size of the terms in the sums for lines
+  std::array<double, 6> seen{};  ///< ∫ 1, u, v, u², uv and v² over the viewed surface
 
   void add(double weight, const Integrals& other);
 };

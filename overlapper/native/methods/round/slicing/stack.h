@@ -8,21 +8,21 @@
 
 namespace overlapper::slicing {
 
-/// How many ways there are to lay slices at most.
+/// The largest number of directions for slices.
 inline constexpr int kAxes = 5;
 
-/// The slices of what walls leave of at most two rounds, not both of them balls, orthogonal to every cylinder's axis.
-/// No point of them is farther from the origin than `extent`. Of the ways to lay them, `way` 0 is the one that suits
-/// best. Nothing where there are too many walls, or not so many ways.
+/// The slices, orthogonal to every cylinder's axis, of the part of at most two rounds inside walls. The rounds are not
+/// both balls. `extent` is an upper bound of the distance of the part's points from the origin. `way` 0 is the most
+/// suitable direction of slices. No value if there are too many walls, or fewer directions.
 std::optional<Stack> stack_of(std::span<const Round> rounds, std::span<const Wall> walls, double extent, int way);
 
-/// A plane that is nearly parallel to the slices of two cylinders, which may not be turned, but not quite, so that its
-/// line rushes across them.
+/// A plane that is nearly, but not quite, parallel to the slices of two cylinders. Such slices cannot be turned, so the
+/// plane's line moves quickly across them.
 struct Rushing {
   double level;  ///< across the slices
-  Vec3 beside;   ///< a point of it beside another: from there, doubles tell those slices
+  Vec3 beside;   ///< a point of the plane beside another point; about it, doubles resolve these slices
 };
-/// All of these by level, each with its point beside `point`.
+/// All such planes by level, each with its point beside `point`.
 std::vector<Rushing> rushing(std::span<const Round> rounds, std::span<const Wall> walls, Vec3 point);
 
 }  // namespace overlapper::slicing

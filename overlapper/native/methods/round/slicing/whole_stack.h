@@ -6,18 +6,18 @@
 
 namespace overlapper::slicing {
 
-/// Intervals of a stack. Where they end within rounding of a plane or a quadric that ends the stack, they are drawn out
-/// to it: the face there, or what is as wide as the root of how thin it is, belongs to them.
+/// The intervals of a stack. Intervals that end within rounding of a plane or a quadric that ends the stack are
+/// extended to it. They then include the end face, whose width is the square root of the missing thickness.
 struct DrawnIntervals {
   std::vector<Interval> intervals;
-  int drawn_low = -1, drawn_high = -1;  ///< the owners of quadrics to whose ends they are drawn out
+  int drawn_low = -1, drawn_high = -1;  ///< owners of the quadrics to whose ends intervals were extended
 };
 
-/// False if the intervals cannot be told.
+/// False if the intervals cannot be determined.
 bool find_drawn_intervals(const Stack& stack, bool closely, DrawnIntervals& drawn);
 
-/// Integrates over a whole stack, its end faces included, with arguments as for integrate(). Returns how much of the
-/// volume may be missing. What is no convex set by the sums is worth its size as an error.
+/// Integrates over a whole stack with its end faces; arguments as for integrate(). Returns a bound of the missing
+/// volume. If the sums are not those of a convex set, the error is its size.
 double integrate_whole(const Stack& stack, const DrawnIntervals& drawn, double volume, double area, bool few,
                        double strictness, Sum& sum);
 
