@@ -83,7 +83,7 @@ def read_source(app, docname, source):
 
 
 def commands():
-    """What every command says with --help, as Markdown below the title of a page."""
+    """The --help text of every command, as Markdown below the title of a page."""
     command = [sys.executable, "-m", "typer", "overlapper.cli.app", "utils", "docs", "--name", "overlapper"]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     said = re.sub(r'<span style="font-weight: bold">(.*?)</span>', r"`\1`", said)

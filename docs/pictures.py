@@ -1,4 +1,4 @@
-"""Makes the pictures of README and docs again: those of which something has changed that they are made from.
+"""Makes the pictures of README and docs again if one of their sources has changed.
 
 python docs/pictures.py [--all | --check]
 
@@ -91,7 +91,7 @@ def main() -> None:
 
 
 def check() -> Iterator[str]:
-    """What is to be said of pictures that are not as they would be made."""
+    """A sentence for every picture that is missing, changed or older than its sources."""
     known = read()
     for maker in MAKERS:
         for picture in maker.pictures:
@@ -105,7 +105,7 @@ def check() -> Iterator[str]:
 
 
 def digests(maker: Maker, picture: str) -> tuple[str, str]:
-    """Of the picture, empty if there is none, and of what it is made from."""
+    """The digest of the picture (empty if the file is missing) and the digest of its sources."""
     path = ROOT / "docs" / picture
     made = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
     return made, _digest(sorted(_sources(maker)))
@@ -121,7 +121,7 @@ def _sources(maker: Maker) -> Iterator[Path]:
 
 
 def _digest(paths: list[Path]) -> str:
-    """Of names and texts; line ends are those of the repository whatever the checkout has."""
+    """The digest of the names and texts of files. Line ends are read as LF, as in the repository."""
     digest = hashlib.sha256()
     for path in paths:
         text = path.read_bytes().replace(b"\r\n", b"\n")

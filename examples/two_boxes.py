@@ -1,4 +1,4 @@
-"""What two overlapping boxes share: volume, centroid, depth, and the way to push them apart."""
+"""The overlap of two boxes: volume, centroid, depth, and the direction that pushes them apart."""
 
 import numpy as np
 

@@ -1,7 +1,7 @@
 """The README and the docs run as they are pasted: the blocks of a page one after the other, in an empty folder.
 
-Python shares one namespace and one process per page. A command in `sh` ends well, or with 1 where that is an answer;
-what `console` shows below one is what it prints, `...` standing for what differs from run to run. `text` is no code.
+Python shares one namespace and one process per page. A command in `sh` exits with 0, or with 1 where that is an answer.
+A `console` block shows a command and its output; `...` stands for text that differs between runs. `text` is no code.
 """
 
 import contextlib

@@ -1,4 +1,4 @@
-"""FCL beside ours: it agrees where it can, its crashes are answers, and disagreements go to whoever is right."""
+"""FCL beside ours: it agrees where it can, its crashes are answers, and the arbiter decides disagreements."""
 
 import itertools
 import os

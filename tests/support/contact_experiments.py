@@ -346,10 +346,10 @@ def roll(shape: str, law="volumetric", stiffness=1e7, substeps: Any = 4, dissipa
 
 
 def simbenchmark(angle: float, law="volumetric", seconds=0.5) -> tuple[np.ndarray, np.ndarray]:
-    """What velocities (x, y) of box and balls gain, over what is foretold, in SimBenchmark's test of rolling.
+    """Gains of velocity (x, y) of box and balls in SimBenchmark's test of rolling, divided by the predicted gains.
 
     A box of 10 kg is pushed by 150 N over the ground, in any direction; 25 balls of 1 kg lie on it, and roll. They are
-    as stiff as that they do not sink in by a hundredth of their radius.
+    so stiff that they sink in by less than a hundredth of their radius.
     """
     with World(step=1e-3) as world:
         p.changeDynamics(world.plane, -1, lateralFriction=0.5, physicsClientId=world.client)

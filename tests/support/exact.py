@@ -1,9 +1,11 @@
 """The common part of convex polytopes in rational arithmetic: the truth that doubles are measured against.
 
-A double is a rational number, so hulls of doubles, their intersections and the integrals over them are rational too and
-come out here without any rounding. A point is a tuple of integers (x, y, z, w), w > 0, standing for (x/w, y/w, z/w); a
-plane is a tuple of integers (a, b, c, d) with a x + b y + c z + d w <= 0 inside. Both are divided by their greatest
-common divisor, so that equal things are equal tuples.
+A double is a rational number. Hulls of doubles, their intersections and the integrals over them are therefore rational
+too, and are computed here without any rounding.
+
+A point is a tuple of integers (x, y, z, w), w > 0, that stands for (x/w, y/w, z/w). A plane is a tuple of integers
+(a, b, c, d) with a x + b y + c z + d w <= 0 inside. Both are divided by their greatest common divisor, so that equal
+points and equal planes are equal tuples.
 """
 
 from __future__ import annotations

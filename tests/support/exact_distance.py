@@ -130,9 +130,9 @@ def foot(face: Sequence[Integers]) -> list[Fraction] | None:
 def depth_squared(a: Core, b: Core) -> Fraction:
     """The squared penetration depth of two hulls that have a common point.
 
-    The nearest face of their difference is upright on a facet of either body, or on an edge of each. Doubles say of
-    each such direction how near it may be, with an allowance for their rounding, and the nearest are then done exactly
-    until no other can be nearer. A difference that has no such direction is flat, and has no inside.
+    The normal of the nearest face of their difference is the normal of a facet of either body, or the cross product of
+    an edge of each. Doubles bound the distance along each such direction from below. The nearest directions are then
+    computed exactly until no other can be nearer. A difference without such a direction is flat and has no inside.
     """
     (p, q), scale = integers(a.points, b.points)
     least, bound = None, None

@@ -180,7 +180,7 @@ def sheared(rng):
 
 
 def mapped(points, matrix):
-    """Every point by the same few roundings, wherever in the array it is and whatever machine multiplies."""
+    """The points (n, 3) times the transposed matrix. Every point has the same roundings on every machine."""
     return points[:, :1] * matrix[:, 0] + points[:, 1:2] * matrix[:, 1] + points[:, 2:] * matrix[:, 2]
 
 
@@ -493,8 +493,8 @@ def prisms(rng):
 
 
 def pole_slivers(rng):
-    """Spheres of meridians and parallels, whose poles are fans of `parameter` slender triangles, against themselves
-    turned, against a box that ends at the pole, or pole to pole."""
+    """Globes of meridians and parallels. Each pole is a fan of `parameter` slender triangles. The second body is the
+    turned globe, a box that ends at the pole, or another globe that meets it pole to pole."""
     meridians = int(rng.choice([8, 16, 32]))
     ball = globe(meridians, 6)
     way = str(rng.choice(["turned", "boxed", "poles"]))
@@ -508,8 +508,8 @@ def pole_slivers(rng):
 
 
 def published(rng):
-    """One of the pairs on which GJK or EPA of another library fell (see published.py), turned or moved by a little in
-    two of three cases; `parameter` is that movement."""
+    """A pair on which GJK or EPA of another library failed (see published.py). Two of three cases are turned or moved
+    a little; `parameter` is that movement."""
     pair = PUBLISHED[int(rng.integers(len(PUBLISHED)))]
     change = float(rng.choice([0, 1e-15, 1e-9]))
     a, b = pair.bodies()
@@ -606,8 +606,8 @@ def gathered(rng, count):
 
 
 def empty_triples(rng):
-    """Three or four bodies around a hole, any of them but one in common; `parameter` is the size of the hole, and of
-    the common part where it is negative."""
+    """Three or four bodies around a hole. All but any one of them have a common part. `parameter` is the size of the
+    hole; if it is negative, all bodies have a common part of that size."""
     hole = float(rng.choice([0, 0, 1e-1, 1e-3, 1e-6, 1e-9, 1e-12, ULP]) * rng.choice([-1, 1]))
     x, y, z = np.eye(3)
     if rng.random() < 0.5:
@@ -694,10 +694,10 @@ def posed_round(rng):
 
 
 def round_contacts(rng):
-    """An upright ball, capsule or cylinder sunk by `parameter` into a facet, an edge or a corner of a turned box of
-    another size, or into a ball or capsule; or held apart by as much.
+    """An upright ball, capsule or cylinder sunk by `parameter` into another body, or held apart by as much. The other
+    body is a ball, a capsule, or a turned box of another size that is met on a facet, an edge or a corner.
 
-    A capsule that is met beside its end is not as deep, or is farther apart. Only the box is turned, by its vertices.
+    A capsule that is met beside its end is less deep, or farther apart. Only the box is turned, by its vertices.
     """
     depth, size = power(rng, -12, -1) * float(rng.choice([1, 1, -1])), power(rng, 0, 4)
     r, s = rng.integers(4, 17, 2) / 8
@@ -719,8 +719,8 @@ def round_contacts(rng):
 
 
 def rounded_hulls(rng):
-    """A rounded box sunk by `parameter` of its radius or of its height into a half-space or into a rounded box of its
-    own size, turned about the common axis by whole quarters; or all inside of a box."""
+    """A rounded box sunk into a half-space or into a rounded box of its own size, or inside a box. `parameter` is the
+    depth as a fraction of its radius or of its height. Turns about the common axis are whole quarters."""
     depth = float(rng.choice([0.5, 0.1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10]))
     sides, r = rng.integers(4, 17, 3) / 8, float(rng.choice([2.0**-10, 0.125, 1.0]))
     where = str(rng.choice(["in a half-space", "in another", "inside"]))
@@ -753,8 +753,8 @@ def rounded_meshes(rng):
 
 
 def folded_hulls(rng):
-    """A round body, or a box, and a rounded hull of which two facets are within `parameter` of one plane, so that the
-    wedge between them is as narrow."""
+    """A round body or a box, and a rounded hull with two nearly coplanar facets. `parameter` bounds their distance from
+    one plane, so the wedge between the facets is as narrow."""
     fold, margin, r = power(rng, -12, -2), float(rng.choice([1e-3, 0.1])), rng.uniform(0.2, 0.4)
     shape = [Sphere(r), Capsule(r, 1.5 * r), Cylinder(r, 2 * r), Box([r, r, r])][int(rng.integers(4))]
     folded = RoundedHull([[-0.5, 0, 0], [0.5, 0, 0], [0, 0.5, -fold], [0, -0.5, -fold], [0, 0, -0.5]], margin)
@@ -763,8 +763,8 @@ def folded_hulls(rng):
 
 
 def tilted_round(rng):
-    """A rounded box and a cylinder or another, turned by quarters and by about `parameter`, so that planes of the one
-    are nearly parallel to planes and axes of the other."""
+    """A rounded box and a cylinder or another rounded box, turned by quarters and by about `parameter`. Planes of the
+    first are nearly parallel to planes and axes of the second."""
     tilt = power(rng, -11, -4)
     quarter = [(0, 0, 0, 1), (0, 0, 1, 1), (1, 0, 0, 1), (0, 1, 0, 1), (1, 1, 1, 1)][int(rng.integers(5))]
     turned = turned_by(np.append(tilt * rng.normal(size=3), 1.0), np.array(quarter, float))
@@ -775,8 +775,8 @@ def tilted_round(rng):
 
 
 def flush_round(rng):
-    """Two bodies about one axis, one of them round, that share surfaces, or do but for rounding. What they have in
-    common is the smaller, or the part of it up to a plane in which a capsule becomes a half ball."""
+    """Two bodies about one axis, one of them round, that share surfaces up to rounding. Their common part is the
+    smaller body, or the part of it up to a plane at which a capsule becomes a half ball."""
     r, h = rng.integers(4, 49, 2) / 32 if rng.random() < 0.5 else rng.uniform(0.1, 1.5, 2)
     sides = rng.uniform(0.2, 2, 3)
     cylinder, ball = pi * r * r * 2 * h, 4 / 3 * pi * r**3
@@ -856,8 +856,8 @@ def special_poses(rng):
 
 
 def ellipsoids(rng):
-    """An ellipsoid, up to 1000 times as long as thick, into which a half-space or a box reaches by `parameter` of a
-    half axis, so that their common part is a stretched cap; or of which a box has so many octants; or all."""
+    """An ellipsoid, up to 1000 times as long as thick, and a half-space or a box. The common part is a stretched cap of
+    depth `parameter` times a half axis, or a number of octants, or the whole ellipsoid."""
     axes = 2.0 ** (rng.integers(0, 11, 3) + int(rng.integers(-15, 6)))
     depth = float(rng.choice([1.0, 0.5, 1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10]))
     where = str(rng.choice(["in a half-space", "askew", "on a box", "octants", "inside"]))

@@ -121,8 +121,8 @@ class Links:
 
 @dataclass(frozen=True)
 class Patch:
-    """Four springs that have the area, the centre and the second moments of what two shapes share, seen along its area
-    vector; none where that has no direction."""
+    """Four springs that stand for the patch between two shapes, seen along its area vector. They have the area, the
+    centre and the second moments of the patch. There are no springs if the area vector has no direction."""
 
     found: Overlap
     stiffness: float

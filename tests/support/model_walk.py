@@ -1,7 +1,7 @@
 """Loads models into pybullet and compares what `Bodies` makes of them with what pybullet says of itself.
 
-`python model_walk.py RESULTS MODEL...` appends to RESULTS a line for each model when it begins and one when it is done,
-as the process may die of a model.
+`python model_walk.py RESULTS MODEL...` appends a line to RESULTS when it begins a model and another when it is done. A
+model may kill the process: then only its first line is there.
 """
 
 import json

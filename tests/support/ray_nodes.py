@@ -1,7 +1,7 @@
 """A Ray cluster of two nodes of one CPU each on this machine: python ray_nodes.py
 
-It prints its address. A line "kill" on standard input kills the node that is not the head with all that runs on it, and
-is answered; the end of the input ends the cluster.
+It prints its address. A line "kill" on standard input kills the node that is not the head, with all its processes; the
+answer is the line "killed". The end of the input ends the cluster.
 """
 
 import os

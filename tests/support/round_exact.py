@@ -1,8 +1,8 @@
 """Measures of a ball, a cylinder or a capsule cut by a polyhedron, to twenty digits, by another route than the core's.
 
-Slices are orthogonal to the round body's own axis, so that each is a polygon cut by a disc about the origin; its area,
-moments and borders have closed forms. These are integrated between all values at which a corner of the common part
-lies, in sixty digits, by rules of Gauss and Legendre that are compared with finer ones.
+Slices are orthogonal to the round body's own axis. Each slice is a polygon cut by a disc about the origin; its area,
+moments and borders have closed forms. Gauss-Legendre rules integrate them in sixty digits between the heights of all
+corners of the common part. Finer rules check the results.
 """
 
 from __future__ import annotations

@@ -1,11 +1,14 @@
 """Measures of overlaps of round bodies to about thirteen digits, by integration over rays instead of the core's slices.
 
-Bodies are taken as the doubles that describe them, a quaternion as the rotation that it stands for at any length. From
-a point inside, every ray leaves the common part through one plane, cylinder or ball, at the root of an equation of
-degree two at most; a third of the cube of that is integrated over all directions, in coordinates in which the common
-part is about round. The equations' coefficients are found in sixty digits. In doubles, the roots then keep their
-relative accuracy however thin the common part is, and are analytic in the direction wherever the ray leaves through one
-surface; the borders between these are found by bisection, and Gauss-Legendre rules follow.
+The doubles that describe a body are taken as exact. A quaternion of any length stands for its rotation.
+
+Every ray from a point inside leaves the common part through one plane, cylinder or ball. The length of the ray is a
+root of an equation of degree two at most. The volume is the integral of a third of its cube over all directions. The
+coordinates are chosen so that the common part is nearly round. The coefficients of the equations have sixty digits, so
+the roots in doubles keep their relative accuracy however thin the common part is.
+
+The root is an analytic function of the direction as long as the ray leaves through one surface. Bisection finds the
+borders between surfaces, and Gauss-Legendre rules integrate between the borders.
 """
 
 from __future__ import annotations

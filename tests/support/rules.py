@@ -175,9 +175,9 @@ def volume_of_hulls_is_right_to_twelve_digits(case: Case, found: Overlap) -> str
 
 
 def volume_of_round_pairs_is_known_to_eleven_digits(case: Case, found: Overlap) -> str:
-    """But of ellipsoids with other round bodies, which planes enclose. Of special and nearly parallel poses to eight,
-    as what lies between surfaces that are one but for rounding, or that slices nearly lie in, may stay open; and of
-    special ones, planes enclose what slices give up."""
+    """Ellipsoids with other round bodies are exempt: tangent planes enclose their common part. Special and nearly
+    parallel poses have eight digits, as the volume between nearly equal surfaces, or near the plane of a slice, may
+    stay open. In special poses, planes enclose the parts that slices give up."""
     kinds = [type(body.shape) for body in found.shapes]
     enclosed = Ellipsoid in kinds and not {Box, Hull, HalfSpace} & {*kinds}
     given_up = case.family == "special_poses" and "dual" in found.way
@@ -331,8 +331,8 @@ def length(given: np.ndarray, truth: exact.Vector) -> float:
 
 
 def errors_of_measures_are_as_small_as_that_of_the_volume(case: Case, found: Overlap) -> str:
-    """But for the last bits of coordinates in the world, a drawing, whose vertices become one where 512 roundings may
-    part them, and the gradient where bodies may share a facet."""
+    """Three errors may be larger. Coordinates in the world have a rounding of their last bits. Vertices of a drawing
+    become one if 512 roundings may separate them. The gradient is open where bodies may share a facet."""
     if not measured(case, found):
         return ""
     errors, size, volume = found.errors, diameter(case.truth), float(case.truth.volume)
@@ -437,8 +437,8 @@ def the_volume_moves_no_faster_than_the_bodies(case: Case, found: Overlap) -> st
 
 
 def a_turn_keeps_the_measures_of_round_bodies(case: Case, found: Overlap) -> str:
-    """Within the sum of both errors. Bodies are moved a little first, so that they can be turned to the last bit, and
-    are given in the other order; slices then lie across other axes, and what they miss is elsewhere."""
+    """Both answers agree within the sum of their errors. Bodies are moved a little first, so that the turn is exact,
+    and their order is swapped. Slices then lie across other axes and miss other parts."""
     if not case.round or len(case.bodies) != 2:
         return ""
     (one, other), (one_again, other_again), turn = turned_pairs(found.shapes, TURNS[case.seed % len(TURNS)])

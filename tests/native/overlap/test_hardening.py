@@ -276,7 +276,7 @@ def resident():
 
 
 def growth_over(pairs):
-    """Growth of memory over `pairs` overlaps. Each pair has a new hull, and every attribute is read."""
+    """Growth of memory over `pairs` overlaps. Each pair has a new hull, and its measures are read."""
     rng = np.random.default_rng(0)
     bodies = random_bodies(rng, 97)
     points = [hull_points(rng, 8) for _ in range(89)]
