@@ -1,4 +1,4 @@
-"""Pictures of README and docs are as they would be made today, and what says so notices when they are not."""
+"""Pictures of README and docs are up to date, and the check notices pictures that are not."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""The reference has every public name, with an example each, and words for all that belongs to it."""
+"""The reference has every public name with an example, and every member has a docstring."""
 
 import ast
 import inspect

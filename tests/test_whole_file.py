@@ -1,4 +1,4 @@
-"""Whatever call to the system fails, the earlier file is whole, and the answer names the cause."""
+"""If any system call fails, the earlier file stays whole, and the error names the cause."""
 
 import builtins
 import errno

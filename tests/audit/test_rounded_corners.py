@@ -1,4 +1,4 @@
-"""How much of what two meshes share the rounding of their corners explains."""
+"""Bounds the part of an overlap of two meshes that the rounding of their corners explains."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Which configurations are looked at: rest, corners, and any between the limits; the same however they are asked."""
+"""Sampled configurations: rest, corners, and random ones between the limits, the same in any order of asking."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""`overlapper audit FOLDER`: what loads, what is closed, what is left out, and what overlaps in itself at rest."""
+"""`overlapper audit FOLDER`: models that load, closed meshes, skipped shapes, and self-overlaps at rest."""
 
 import json
 import subprocess

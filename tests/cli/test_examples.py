@@ -1,4 +1,4 @@
-"""The examples run as a user runs them, stay short, and print what is true."""
+"""The examples run as a user runs them, stay short, and print true figures."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""A pybullet script is watched as it is: what it says and how it ends are its own, and what is shared is told."""
+"""A pybullet script is watched unchanged: its output and its exit code are its own, and its overlaps are reported."""
 
 import json
 import os

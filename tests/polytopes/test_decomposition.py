@@ -1,4 +1,4 @@
-"""Concave meshes become convex parts once, whatever befalls CoACD and its files."""
+"""Concave meshes are decomposed into convex parts once, also if CoACD or its files fail."""
 
 import concurrent.futures
 import os

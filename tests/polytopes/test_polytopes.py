@@ -1,4 +1,4 @@
-"""Polytopes from elsewhere: random ones, and those of a database."""
+"""Random polytopes, and polytopes of a database."""
 
 import sqlite3
 import subprocess

@@ -1,4 +1,4 @@
-"""The scenes: what they promise is what happens. That they are as recorded is tested by `pytest scenes`."""
+"""The scenes do what their docstrings promise. `pytest scenes` tests that they are as recorded."""
 
 from functools import lru_cache
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A client is watched from inside a script or a notebook, by whatever steps it."""
+"""A client is watched from inside a script or a notebook. Any step is noticed."""
 
 import re
 import signal

@@ -1,4 +1,4 @@
-"""Volumetric contact where it is hard: what is light, fast or stiff, and what scripts do in the middle of it."""
+"""Hard cases of volumetric contact: light, fast or stiff bodies, and scripts that change a simulation between steps."""
 
 import numpy as np
 import pybullet

@@ -1,4 +1,4 @@
-"""Volumetric contact beside textbooks: each experiment beside the formula that foretells it."""
+"""Volumetric contact against textbooks: each experiment is compared with the formula that predicts it."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Per pair of links, what overlaps is counted once; concave meshes of a simulation are unions of convex parts."""
+"""The overlap of a pair of links counts every volume once. Concave meshes are unions of convex parts."""
 
 import pybullet as p
 import pytest

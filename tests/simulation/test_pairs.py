@@ -1,4 +1,4 @@
-"""The pairs that are looked at are those that pybullet makes contacts of, or those of the user's list."""
+"""`Bodies` examines the pairs for which pybullet makes contacts, or the pairs of the user's list."""
 
 import sys
 import warnings

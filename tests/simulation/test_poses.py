@@ -1,4 +1,4 @@
-"""Where bodies are, step by step; and those that are nowhere."""
+"""Poses of bodies, step by step, and bodies without a finite pose."""
 
 import numpy as np
 import pybullet as p

@@ -1,4 +1,4 @@
-"""Volumetric contact: forces from what bodies share, in place of Bullet's contact points."""
+"""Volumetric contact: forces from overlaps, in place of Bullet's contact points."""
 
 import numpy as np
 import pybullet

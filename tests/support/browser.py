@@ -1,4 +1,4 @@
-"""Headless Chromium through DevTools: a page is asked for what it shows, and is clicked upon."""
+"""Headless Chromium through DevTools: evaluates scripts in a page, takes its picture, and clicks on it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Experiments with contact whose outcome textbooks foretell, by volumetric contact and by Bullet's own.
+"""Experiments with contact, by volumetric contact and by Bullet's own. Textbooks predict their outcome.
 
 Tests compare what comes out with the formula; `python benchmarks physics` does the same for docs/forces.md.
 """

@@ -1,4 +1,4 @@
-"""Jobs for the engines of sweeps: what is done with an item is what the item says."""
+"""Jobs for the engines of sweeps. Each item names the action that the job takes."""
 
 import ctypes
 import os

@@ -1,4 +1,4 @@
-"""Bytes that somebody has changed, and what is said of them."""
+"""Bytes with random changes, and the answers of a reader to them."""
 
 from hypothesis import strategies as st
 

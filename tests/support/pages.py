@@ -1,4 +1,4 @@
-"""A hand that reaches into a cup, recorded as a page; what the page holds, and what is seen of it in Chromium."""
+"""Records a hand that reaches into a cup as a page, reads the page, and takes pictures of it in Chromium."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pairs of polytopes on which other libraries threw, hung, or gave a wrong answer, with the thread that tells of it.
+"""Pairs of polytopes on which other libraries threw, hung, or gave a wrong answer, with the address of the report.
 
 Where a thread gives several poses, one is here. The numbers are those printed there, or in FCL's test of the thread.
 """

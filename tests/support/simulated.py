@@ -1,4 +1,4 @@
-"""Bodies to put into a simulation, and how far Bullet and we say that a point is from one."""
+"""Makes bodies in a simulation, and compares Bullet's and our distances of a point from a body."""
 
 from pathlib import Path
 

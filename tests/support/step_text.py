@@ -1,4 +1,4 @@
-"""STEP files of polyhedra, as text: what trimesh cannot write."""
+"""STEP files of polyhedra, as text, since trimesh cannot write them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The engine of a Ray cluster: the same bits as on one machine, whatever becomes of a node."""
+"""The engine of a Ray cluster: the same bits as on one machine, also if a node is killed."""
 
 import json
 import subprocess

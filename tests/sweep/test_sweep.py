@@ -1,4 +1,4 @@
-"""A sweep does what is missing, tells what fails, and is killed without a loss."""
+"""A sweep does the missing tasks, reports failures, and can be killed without a loss."""
 
 import random
 import signal

@@ -1,4 +1,4 @@
-"""A loop of one's own is written as the table that `overlapper run` writes."""
+"""`Log` writes a user's own loop as the table that `overlapper run` writes."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Where a formula gives the measures, they are right to rounding, whatever the tolerance."""
+"""Measures from closed forms are right to rounding at any tolerance."""
 
 from collections.abc import Callable, Iterator
 from functools import partial

@@ -1,4 +1,4 @@
-"""Bounds of the errors of all measures. That they hold of polyhedra, the rules of the families say."""
+"""Bounds of the errors of all measures. The rules of the families test the bounds for polyhedra."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The status of rounded hulls; `python benchmarks stress --rounded` asks of a million."""
+"""The status of rounded hulls; `python benchmarks stress --rounded` tests a million pairs."""
 
 import rounded_pairs
 

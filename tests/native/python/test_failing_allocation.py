@@ -1,4 +1,4 @@
-"""Whichever request for memory is refused costs a MemoryError: no process, and no answer is wrong, then or later."""
+"""A refused request for memory is a MemoryError. The process goes on, and no answer is wrong, then or later."""
 
 import ctypes
 import json

@@ -1,4 +1,4 @@
-"""Ctrl-C ends whatever takes long within a second, and the next answer is right."""
+"""Ctrl-C ends any long computation within a second, and the next answer is right."""
 
 import multiprocessing
 import os

@@ -1,4 +1,4 @@
-"""When memory runs out in the middle of an answer, that is a MemoryError, and the answer can be had later."""
+"""An answer that runs out of memory raises a MemoryError. The same question can be asked again later."""
 
 import multiprocessing
 import resource

@@ -1,4 +1,4 @@
-"""Bodies that come, go, and take over each other's ids, and the marks by which they are told apart."""
+"""Bodies that are added, removed or reuse an id, and the marks that tell them apart."""
 
 import gc
 import os

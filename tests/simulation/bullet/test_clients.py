@@ -1,4 +1,4 @@
-"""Clients and servers: several, remote, gone, and such as cannot hand over what they have."""
+"""Clients and servers: several at once, remote, disconnected, and unable to write their files."""
 
 import os
 import subprocess

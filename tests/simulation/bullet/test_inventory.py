@@ -1,4 +1,4 @@
-"""`overlapper shapes` says what is modelled of a file, and lives longer than pybullet."""
+"""`overlapper shapes` lists the modelled shapes of a file, also if pybullet crashes."""
 
 import json
 import os
