@@ -9,10 +9,10 @@ GROWTH := --rounds 50 --seed 0
 # A kind of shape that joins the sanitized core alone, to show that one header is enough.
 CONE := tests/native/shapes/cone.h
 NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
-# Shares in percent that tests are to reach: of the lines and branches of Python, and of the lines of the core.
+# Least coverage in percent: lines and branches of Python; lines of the core.
 LEAST_OF_PYTHON := 86
 LEAST_OF_CORE := 90
-# The core as it is counted, by which tests, and those that hold a build with counters for one that leaks or is released.
+# Coverage of the core: its object files, its tests, and tests that fail in a build with counters.
 COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_out_of_memory python/test_stub
@@ -28,7 +28,7 @@ run: $(VENV)/run ## build, run SCENE=franka_grasp, write out/franka_grasp.csv an
 test: $(VENV)/dev ## build, pass all tests
 	@$(PYTEST) --numprocesses=auto --dist=worksteal
 
-# Of any Python that the package is for. What the core needs of this machine's libraries is told by the wheel's name.
+# For any Python that the package supports. auditwheel writes the required version of libc into the wheel's name.
 wheel: ## build a wheel for PYTHON=python3, to be installed without a compiler, to dist/
 	@rm -rf build/wheel
 	@$(or $(PYTHON),python3) -m venv build/wheel/venv
@@ -46,12 +46,12 @@ docs: $(VENV)/dev ## write the site of the documentation to build/docs
 
 coverage: coverage-python coverage-core ## report what the tests reach of Python and of the core
 
-# Processes that tests start are not counted: one that is interrupted while it counts may wait for itself for ever.
+# Subprocesses of tests are not counted: a signal during counting may cause a deadlock.
 coverage-python: $(VENV)/dev ## pass all tests, report the branches of Python that they reach
 	@$(MAKE) --no-print-directory test PYTEST="$(PYTEST) --cov --cov-report=term-missing:skip-covered \
 	  --cov-fail-under=$(LEAST_OF_PYTHON)"
 
-# Counts of the run before would be added to, and what a killed process leaves half written is not worth a failure.
+# Deletes the counts of the last run, which would be added. A killed process may leave a broken file, which is ignored.
 coverage-core: build/coverage/dev ## report the lines of the core that its own tests reach
 	@find build/coverage/native -name '*.gcda' -delete
 	@build/coverage/venv/bin/python -m pytest --numprocesses=auto --dist=worksteal --quiet $(UNCOUNTED:%=--ignore=tests/native/%.py) \
@@ -65,7 +65,7 @@ mutants: $(VENV)/dev ## change one operator of the core at a time, report which 
 growth: $(VENV)/dev ## look for inputs that take time out of proportion to their size, with GROWTH="--rounds 50 --seed 0"
 	@$(VENV)/bin/python benchmarks growth $(GROWTH)
 
-# Inputs that reach something new stay in build/fuzz/corpus; one that breaks something is left beside it, by name.
+# Inputs that reach new code are kept in build/fuzz/corpus. A failing input is written to build/fuzz.
 fuzz: build/sanitized/dev ## give the sanitized core inputs that reach new places, for FUZZ=-max_total_time=60 seconds
 	@mkdir -p build/fuzz/corpus
 	@build/sanitized/native/fuzz_overlap $(FUZZ) -timeout=20 -max_len=600 -len_control=0 -print_final_stats=1 \
@@ -93,7 +93,7 @@ ci: ## all that a change must pass (a quarter of an hour on 2 cores)
 clean: ## remove environments, builds and what was written to out/
 	@rm -rf $(VENV) build out
 
-# The package is installed as editable, so only the native sources and what it depends on need it built again.
+# The installation is editable: only changes of native sources or dependencies need a new build.
 $(VENV)/built: pyproject.toml $(NATIVE) | $(VENV)/bin/python
 	@echo "Building overlapper in $(VENV) (some minutes the first time, seconds after a change)"
 	@start=$$(date +%s); \
@@ -101,7 +101,7 @@ $(VENV)/built: pyproject.toml $(NATIVE) | $(VENV)/bin/python
 	  echo "Built in $$(($$(date +%s) - start)) s"
 	@touch $@
 
-# What it needs beside numpy, by the package's extras: pip finds it installed, and builds nothing.
+# Installs the dependencies of the package's extras. The package is already installed, so pip builds nothing.
 $(VENV)/run: EXTRAS := sim,check,view,cli,frames
 $(VENV)/dev: EXTRAS := dev
 $(VENV)/run $(VENV)/dev: pyproject.toml | $(VENV)/built
@@ -111,9 +111,9 @@ $(VENV)/run $(VENV)/dev: pyproject.toml | $(VENV)/built
 	  echo "Installed in $$(($$(date +%s) - start)) s"
 	@touch $@
 
-# Another build of the core in an environment of its own, by the name of its CMake option. All but the package is that of
-# $(VENV): what a .pth names is on the path, but its own .pth, of which one is for the package, are not read. Only clang
-# makes fuzzers.
+# Another build of the core in its own environment, by the name of its CMake option. A .pth file adds the packages of
+# $(VENV). Python does not read .pth files in that folder, so the package itself is not found there. Only clang has
+# libFuzzer.
 build/coverage/dev: OPTION := OVERLAPPER_COVERAGE
 build/sanitized/dev: OPTION := OVERLAPPER_MORE_SHAPES=$(CURDIR)/$(CONE);OVERLAPPER_SANITIZE
 build/sanitized/dev: COMPILER := CC=clang CXX=clang++
@@ -127,7 +127,7 @@ build/coverage/dev build/sanitized/dev: build/%/dev: $(VENV)/dev $(VENV)/built
 	  --no-deps --editable .
 	@touch $@
 
-# Every Python on PATH is asked, as the first may be a pyenv shim that does not run.
+# Tries each Python on PATH, as the first may be a pyenv shim that does not run.
 PYTHONS = $(PYTHON) $(wildcard $(foreach name,python3.11 python3.10 python3,$(addsuffix /$(name),$(subst :, ,$(PATH)))))
 
 define FITNESS

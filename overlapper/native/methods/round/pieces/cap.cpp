@@ -7,8 +7,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// A cap, with integrals about its tip: over the volume along the normal n of its disc, which leads from the tip, and
-/// across.
+/// A cap, with integrals about its tip: along the normal n of its disc, which leads from the tip, and across.
 struct Cap {
   double height, volume, disc;
   Vec3 n, tip;

@@ -7,11 +7,11 @@
 namespace overlapper::pieces {
 namespace {
 
-/// Walls that a piece is cut with in the order in which they come. Every cut looks at all corners, so that of more,
-/// those that cut the deepest go first, a few at a time, and those that do not reach what is left are dropped.
+/// Up to so many walls, a piece is cut in their order. Every cut visits all corners. With more walls, the deepest cuts
+/// come first, a few at a time, and walls that do not reach the rest are dropped.
 constexpr size_t kMostInOrder = 128;
 constexpr size_t kDeepest = 16;
-/// Corners beyond which a piece of many walls is cut no more: all that may matter stay.
+/// With more corners, a piece of many walls is cut no further: all walls that may matter stay.
 constexpr size_t kMostCorners = 512;
 
 }  // namespace

@@ -6,13 +6,13 @@
 namespace overlapper::pieces {
 namespace {
 
-/// The sine between two walls up to which lines in doubles leave too much open of where the walls cross.
+/// Below this sine between two walls, lines in doubles do not place their crossing well enough.
 constexpr double kFolded = 1e-10;
-/// The number of pairs of such walls up to which pieces are cut there: each pair makes two pieces of one.
+/// Up to so many pairs of such walls, pieces are cut there: each pair makes two pieces of one.
 constexpr size_t kMostFolds = 3;
 
-/// Whether two planes are one within the extent. Their slacks are `apart`, and the difference of their normals is
-/// `tilt` long. The volume between two planes that differ and are taken for one is an error.
+/// Whether two planes count as one within the extent. `apart` is the difference of their slacks, `tilt` the length of
+/// the difference of their normals. The volume between two different planes that count as one is an error.
 bool coincide(double apart, double tilt, const PieceSetting& setting, double& error) {
   if (apart <= 1e-24 * setting.extent && tilt <= 1e-24) return true;
   const double gap = apart + tilt * setting.extent;
@@ -21,13 +21,13 @@ bool coincide(double apart, double tilt, const PieceSetting& setting, double& er
   return true;
 }
 
-/// Calls use(i, j) with every two different walls whose normals may be opposite, for `side` -1, or equal, for 1. Pairs
-/// come both ways round, until a call returns true. Such normals are equally long along a line that no body prefers: of
-/// many walls, only those next to each other along that line are looked at.
+/// Calls use(i, j) for any two different walls whose normals may be opposite (`side` -1) or equal (`side` 1). Pairs
+/// come in both orders, until a call returns true. Such normals have equal lengths along an arbitrary line. With many
+/// walls, only neighbours in the order of that length are compared.
 template <class Walls, class Use>
 bool any_two(Walls&& walls, double side, const PieceSetting& setting, Use use) {
   thread_local std::vector<std::pair<double, int>> of_thread;
-  std::vector<std::pair<double, int>>& by_length = of_thread;  // every use of what is a thread's own looks for it
+  std::vector<std::pair<double, int>>& by_length = of_thread;  // avoids repeated lookups of thread_local
   constexpr Vec3 kAcross{0.3141, 0.5926, 0.7417};
   const double equal = std::max(1e-12, 2 * setting.layer / setting.extent);  // beyond the rounding of these lengths
   constexpr size_t kMany = 24;
@@ -46,7 +46,7 @@ bool any_two(Walls&& walls, double side, const PieceSetting& setting, Use use) {
   return false;
 }
 
-/// 1 if the first of two walls is the nearer all over what it leaves, -1 if nowhere, 0 if that is not sure.
+/// 1 if the first of two walls is nearer everywhere, -1 if nowhere, 0 if uncertain.
 int nearer_all_over(const Fold& fold, std::span<const Wall> walls, std::span<const Round> rounds, double extent) {
   const Vec3 g = rounded(fold.nearer.normal), n = rounded(walls[fold.first].normal);
   const double slack = fold.nearer.slack.head;

@@ -27,7 +27,7 @@ bool EnclosingPolytope::cut(const Face& face) {
   thread_local std::pair<std::vector<double>, std::vector<int>> of_thread;
   const int before = static_cast<int>(corners.size());
   of_thread.first.resize(before), of_thread.second.resize(before);
-  // By pointers: every use of what is a thread's own looks for it.
+  // Pointers, because each access to a thread_local variable looks it up.
   double* const left = of_thread.first.data();
   int* const removed = of_thread.second.data();
   int gone = 0;
@@ -63,7 +63,7 @@ bool EnclosingPolytope::cut(const Face& face) {
     corners[start].beside[2] = to;
     corners[to].beside[1] = start;
   }
-  // The last corners take the places of those that are gone.
+  // The last corners replace the removed ones.
   const int kept = all - gone;
   size_t place = 0;
   for (int last = all - 1; last >= kept; --last) {
@@ -78,7 +78,7 @@ bool EnclosingPolytope::cut(const Face& face) {
 
 void EnclosingPolytope::drop_faces() {
   thread_local std::vector<int> of_thread;
-  std::vector<int>& place = of_thread;  // every use of what is a thread's own looks for it
+  std::vector<int>& place = of_thread;  // avoids repeated lookups of thread_local
   place.assign(faces.size(), -1);
   for (const Corner& corner : corners)
     for (const int face : corner.face) place[face] = 0;

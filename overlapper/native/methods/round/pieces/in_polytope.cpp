@@ -9,11 +9,11 @@
 namespace overlapper::pieces {
 namespace {
 
-/// The fraction of a volume up to which rounding does not matter where there are more walls than slices may have.
+/// Negligible rounding, relative to the volume, for more walls than suit slices.
 constexpr double kSureOfMany = 5e-12;
-/// The same of all that is measured in closed form: each of many pieces would be sure enough.
+/// Negligible rounding of all pieces in closed form together, relative to the volume: the errors of many pieces add up.
 constexpr double kSureOfAll = 8e-12;
-/// The same of second moments about the centroid.
+/// Negligible rounding of second moments about the centroid, relative to these.
 constexpr double kSureOfMoments = 5e-11;
 
 using Face = EnclosingPolytope::Face;
@@ -23,7 +23,7 @@ double rounding_of(const EnclosingPolytope& polytope, double border) {
   return 16 * DBL_EPSILON * polytope.extent() * border;
 }
 
-/// The fraction of a volume up to which rounding does not matter, for a piece with so many faces.
+/// Negligible rounding, relative to the volume, for a piece with so many faces.
 double limit(size_t faces) { return sliceable(faces) ? kSure : kSureOfMany; }
 
 bool sure(const Totals& piece, size_t faces, const Totals& totals) {
@@ -107,7 +107,7 @@ struct RoundPart {
   Vec3 centre;
 };
 
-/// Adds forces and areas of the curved part and of the sections. False if a section belongs to nobody.
+/// Adds forces and areas of the curved part and of the sections. False if a section has no owner.
 bool add_surface(const RoundPart& part, Totals& piece) {
   piece.area = piece.border = part.whole_area;
   const auto turned = [&](Vec3 v) { return apply_transposed(part.turn, v); };
@@ -141,7 +141,7 @@ bool add_round_part(const RoundPart& part, const EnclosingPolytope& polytope, To
   const Moments about_centre = piece.along({part.turn.row0, part.turn.row1, part.turn.row2});
   const Vec3 mean = piece.first / piece.volume;
   static_cast<Moments&>(piece) = about_centre.seen_from(part.centre);
-  // Second moments lose more digits the farther the part is from the centre, compared with how wide all pieces are.
+  // Second moments lose more digits the farther the part is from the centre, relative to the width of all pieces.
   const Vec3 s = totals.squares + piece.squares, first = totals.first + piece.first;
   const double about_mean = s.x + s.y + s.z - norm2(first) / (totals.volume + piece.volume);
   if (!(piece.error * norm2(mean) <= kSureOfMoments * about_mean)) return false;
@@ -205,7 +205,7 @@ struct AboutBall {
   std::vector<Plane> planes;
   std::vector<Edge> edges;
   std::vector<int> owners;
-  double misplaced = 0;  ///< m: by how much corners miss their planes
+  double misplaced = 0;  ///< m: distance of corners from their planes
   std::vector<std::array<int, 3>> number;
   std::vector<int> left;
 
@@ -242,7 +242,7 @@ struct AboutBall {
   }
 };
 
-/// True if there is nothing, too.
+/// True also if the common part is empty.
 bool add_ball(const Round& ball, const EnclosingPolytope& polytope, const DistinctWalls& distinct, Sums& sums) {
   if (sums.patch) return false;
   const Scratch<AboutBall> about;

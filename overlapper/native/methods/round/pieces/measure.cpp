@@ -14,7 +14,7 @@
 namespace overlapper::pieces {
 namespace {
 
-/// The fraction of a volume that may lie between planes that are taken for one, and where nothing else closes.
+/// Largest fraction of a volume between planes that count as one; the second if nothing else closes the surface.
 constexpr double kLayer = 1e-12, kWideLayer = 1e-9;
 
 double least_radius(const Pieces& pieces) {
@@ -35,7 +35,7 @@ struct BothPieces {
     return pair.outwards == 0 || grow(least_radius(a) > least_radius(b) ? a : b, pair.outwards);
   }
 
-  /// How many rounds a piece of each have.
+  /// The number of rounds of a pair of pieces.
   int rounds_of(int i, int j) const { return (a.pieces[i].round >= 0) + (b.pieces[j].round >= 0); }
   void get_rounds(int i, int j, std::vector<Round>& rounds) const {
     rounds.clear();
@@ -46,7 +46,8 @@ struct BothPieces {
 
 double off(const Totals& totals) { return totals.error + open_volume(totals); }
 
-/// Calls add(setting, sums) with the settings that leave the least open. Nothing if there is no volume.
+/// Calls add(setting, sums) with several settings and keeps the sums with the least missing volume. No value if there
+/// is no volume.
 template <class Add>
 std::optional<Sums> best_sums(PieceSetting setting, const Sums& none, Add add) {
   Sums best = none;
@@ -56,10 +57,10 @@ std::optional<Sums> best_sums(PieceSetting setting, const Sums& none, Add add) {
     if (add(setting, again) && off(again.totals) < off(best.totals)) best = again;
   };
   const auto is_open = [&] { return !(open_volume(best.totals) <= kMostOpen * best.totals.volume); };
-  // If the surface does not close, something is hidden in an interval of which the middle alone was looked at.
+  // If the surface does not close, something is hidden in an interval of which only the middle was sampled.
   setting.closely = true;
   if (is_open()) try_again();
-  // Or faces and cuts lie so near each other that rounding tells which of them is where. Then they are one.
+  // Or faces and cuts lie so near each other that only rounding orders them. They then count as one.
   const auto try_layer = [&](double part) {
     setting.layer = part * best.totals.volume / best.totals.area, setting.surface = best.totals.area;
     try_again();
@@ -80,7 +81,7 @@ std::optional<RoundMeasures> measures_of(const Totals& totals, const BothPieces&
   result.rounding = rounding_of_surfaces(sum_of(totals.squares) / totals.volume);
   result.centroid = inside + totals.first / totals.volume;
   result.inertia = totals.inertia_about_centroid();
-  // If a body is inside the other, what sums to zero is rounding.
+  // If a body is inside the other, the sum is zero but for rounding.
   const Vec3 pull = norm(totals.pull) <= slicing::kSummation * totals.border ? Vec3{} : totals.pull;
   result.pull = about(Pull{pull, totals.moment}, inside, {});
   for (const Pieces* pieces : {&both.a, &both.b})
@@ -97,7 +98,7 @@ PieceSetting setting_of(const SlicedPair& pair) {
   return setting;
 }
 
-/// The measures by add(setting, sums), which adds all pieces. The patch becomes that of the pair.
+/// The measures by add(setting, sums), which adds all pieces. Also sets the patch of the pair.
 template <class Add>
 std::optional<RoundMeasures> measure_both(const SlicedPair& pair, const PieceSetting& setting, const BothPieces& both,
                                           Add add) {
@@ -115,7 +116,7 @@ struct FewPieces {
   std::vector<Round> rounds;
   std::vector<Wall> walls;
 
-  /// Adds what every piece of a shares with every piece of b, those without rounds first.
+  /// Adds the common part of every piece of a and every piece of b, pairs without rounds first.
   bool add_all(const PieceSetting& setting, Sums& sums) {
     for (const int round_ones : {0, 1, 2})
       for (int i = 0; i < static_cast<int>(both.a.pieces.size()); ++i)
@@ -145,40 +146,41 @@ struct ManyPieces {
 
   bool add_all(const PieceSetting& setting, Sums& sums) {
     rest_.clear();
-    // Pieces without rounds first: others then need to be exact only to a fraction of what these hold.
+    // Pieces without rounds first: the error of other pieces then only needs to be small relative to these.
     for (const int round_ones : {0, 1, 2})
       for (const auto& [i, j] : near) {
         cancellation_point();
         if (both.rounds_of(i, j) != round_ones) continue;
         if (round_ones == 2 || (meet(i, j) && !add_in_closed_form(setting, sums))) rest_.push_back({i, j});
       }
-    // A piece that was not sure to a fraction of the pieces before it may be sure to a fraction of all.
+    // A piece that was too inaccurate relative to the pieces before it may be accurate enough relative to all.
     for (const auto& [i, j] : rest_)
       if (meet(i, j) && !add_in_closed_form(setting, sums) && !add_sliced(setting, sums)) return false;
     return sums.totals.volume > 0;
   }
 
  private:
-  /// Fills in what two pieces may share; false if that is nothing.
+  /// Fills in the data of two pieces; false if their common part is empty.
   bool meet(int i, int j) {
     both.get_rounds(i, j, rounds_);
     return culling.meet(i, j, meeting_);
   }
 
-  /// True if that is nothing, or is added.
+  /// True if the common part is empty or was added.
   bool add_in_closed_form(const PieceSetting& setting, Sums& sums) {
     if (!culling.share(meeting_, polytope_)) return true;
     distinct_.walls.assign(meeting_.walls.begin(), meeting_.walls.end());
     if (is_flat(distinct_.walls, setting, sums.totals.error)) return true;
     find_repeated(distinct_, setting, sums.totals.error);
-    // Where the surface of the whole is open, slices look at all of it, until what is but a layer is nothing.
+    // If the surface of the whole does not close, slices measure the round pieces, too, until planes near each other
+    // count as one.
     const Round* round = rounds_.empty() ? nullptr : &rounds_[0];
     const bool sliced = rounds_.size() > 1 || (round && setting.closely && setting.layer == 0);
     if (!sliced && add_in_polytope(round, polytope_, distinct_, setting, sums)) return true;
     return culling.outside(polytope_, meeting_);
   }
 
-  /// In parts of which slices are to have the walls; false if that gives up.
+  /// Adds a piece by slices, in parts whose walls suit slices; false if slices give up.
   bool add_sliced(const PieceSetting& setting, Sums& sums) {
     parts_.resize(1);
     std::swap(parts_[0].polytope, polytope_);
@@ -188,7 +190,7 @@ struct ManyPieces {
         parts_, [&](const SlicedPart& part) { return add_piece(rounds_, part.walls, &part.polytope, setting, sums); });
   }
 
-  std::vector<Numbers> rest_;  ///< such as are not measured in closed form
+  std::vector<Numbers> rest_;  ///< not measured in closed form
   // For the two pieces that meet.
   std::vector<Round> rounds_;
   Culling::Meeting meeting_;

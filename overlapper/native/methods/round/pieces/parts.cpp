@@ -9,7 +9,7 @@ namespace overlapper::pieces {
 
 void find_walls(const DistinctWalls& distinct, std::span<const Wall> walls, SlicedPart& part) {
   thread_local std::vector<char> of_thread;
-  std::vector<char>& has_face = of_thread;  // every use of what is a thread's own looks for it
+  std::vector<char>& has_face = of_thread;  // avoids repeated lookups of thread_local
   has_face.assign(walls.size(), false);
   for (const EnclosingPolytope::Corner& corner : part.polytope.corners)
     for (const int f : corner.face)
@@ -21,7 +21,7 @@ void find_walls(const DistinctWalls& distinct, std::span<const Wall> walls, Slic
 
 namespace {
 
-/// Halves of a part on either side of its middle along an axis, and the walls of the half that has more.
+/// The halves of a part on either side of its middle along an axis, and the larger number of walls of a half.
 struct Halves {
   std::array<SlicedPart, 2> half;
   size_t most = 0;
@@ -39,7 +39,7 @@ struct Halves {
   }
 };
 
-/// The halves of which neither has as many walls as the part; nothing where no axis leaves fewer.
+/// The halves with the fewest walls; no value if along no axis both halves have fewer walls than the part.
 std::optional<std::array<SlicedPart, 2>> fewest_walls(const DistinctWalls& distinct, const SlicedPart& part,
                                                       std::vector<Wall>& walls) {
   if (sliceable(part.walls.size())) return std::nullopt;
