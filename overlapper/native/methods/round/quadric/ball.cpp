@@ -16,8 +16,8 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr DoubleDouble kWidePi{kPi, 1.2246467991473532e-16};
 constexpr double kUnit = 0x1p-53;  ///< of rounding
-/// Lengths are right to this fraction of how far the numbers reach that they are made of: a unit vector to 4 roundings,
-/// a difference to one, their product to 3.
+/// Relative error of a length: 4 roundings for a unit vector, one for a difference, 3 for their product. Relative to
+/// the size of the numbers.
 constexpr double kPlacing = 8 * kUnit;
 constexpr double kOpen = 1e-9;  ///< of the radius' square: areas are right to less, without a wrong turn
 
@@ -36,8 +36,8 @@ class SumRoundedOnce {
   DoubleDouble sum_;
 };
 
-/// A disc that the plane of a face cuts from the ball, and what is known of the face's part of it, from edge to edge:
-/// a polygon seen from the middle, as angles and triangles, and sectors for what the angles leave of the whole turn.
+/// The disc that a face's plane cuts from the ball, with sums over the face's part of the disc, edge by edge. Seen from
+/// the middle, that part is a polygon of triangles, and sectors for the remaining angles.
 struct Disc {
   double height = 0;     ///< of the plane over the centre
   double square = 0;     ///< of the radius ρ; 0 if the plane does not reach the ball
@@ -55,8 +55,8 @@ struct Disc {
   Vec3 comes, goes;
 };
 
-/// The part of an edge inside the ball, as the middle of a disc sees it. Lengths along the edge count from the point
-/// that is nearest to the centre.
+/// The part of an edge inside the ball, seen from the middle of a disc. Lengths along the edge are relative to its
+/// nearest point to the centre.
 struct DiscChord {
   Vec3 out, along;  ///< unit, in the disc's plane: from the face across the edge, and along that
   double height;    ///< of the edge's line over the middle, positive if that is on the side of the face
@@ -94,15 +94,14 @@ double add(const DiscChord& chord, Disc& disc) {
   return std::abs(angle);
 }
 
-/// How far the border of the curved part turns where it leaves a plane for another. It does so on the edge between
-/// them, `t` along from the point that is nearest to the centre. The turn is negative, or more than half a turn, if t
-/// is negative.
+/// The angle by which the border of the curved part turns on the edge between two planes, at `t` along the edge from
+/// its nearest point to the centre. The turn is negative, or more than half a turn, if t is negative.
 double turn_at(double t, double radius, double cosine, double sine, double heights) {
   const double x = cosine * t * t - heights, turn = std::atan2(radius * sine * t, x);
   return turn < 0 && x < 0 ? turn + 2 * kPi : turn;
 }
 
-/// A ball and a polyhedron, with what is decided once for all sums.
+/// A ball and a polyhedron, with all decisions that the sums share.
 struct BallAndPolyhedron {
   const Polyhedron& polyhedron;
   Vec3 centre;

@@ -207,7 +207,7 @@ std::optional<HighestFace> highest_face(const Polyhedron& polyhedron, Vec3 centr
   return highest.over > 0 ? std::optional(highest) : std::nullopt;
 }
 
-/// The polyhedron's point that is nearest to the centre, as doubles see it: any near it would do.
+/// The polyhedron's nearest point to the centre, in doubles: any point near it is good, too.
 struct NearestPoint {
   bool above = true;  ///< it is in the highest face
   int edge = -1;      ///< else it is on that edge

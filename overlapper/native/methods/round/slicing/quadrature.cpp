@@ -59,14 +59,14 @@ using Rule = std::span<const Node>;
 constexpr std::array<Rule, 3> kRules{kNodes8, kNodes16, kNodes24};
 static_assert(2 * kNodes24.size() == kMostNodes);
 
-/// The relative errors of a rule that are not worth another one, at first.
+/// At first, smaller relative errors of a rule do not justify another rule.
 constexpr double kVolumeError = 1e-14, kAreaError = 1e-12;
 /// The same of the area of a stretched ball, by the worst that its terms may do.
 constexpr double kStretchedAreaError = 1e-11;
 /// The relative size at which the last coefficients of the series leave no error worth halving for: a rule of n nodes
 /// integrates the first 2 n terms, so that its error is as small as the square of the n-th.
 constexpr double kVolumeTail = 2e-9, kAreaTail = 1e-7;
-/// Nodes that no rule has, nor will half an interval do with much fewer.
+/// More missing nodes than any rule has, in half rules. Half the interval would need hardly fewer.
 constexpr double kHopeless = 30;
 constexpr int kMostHalvings = 48;
 /// Rules after which halving goes on for ever: where two surfaces touch along a line.
@@ -185,7 +185,7 @@ class Integrating {
     return std::max(volume, of(part.area, part.integrals.area, area_, kAreaError, kAreaTail));
   }
 
-  /// The rule of more nodes that will do, or the one of most. Nothing where halves will do with fewer.
+  /// The rule with enough more nodes, or the largest one. No value if halves need fewer nodes.
   std::optional<Rule> finer(const RulePart& part, double lacking) const {
     // In a series of few nodes, terms in the middle have not begun to fall; later terms fall twice as fast.
     const double nodes = static_cast<double>(part.rule.size()) * (2 + lacking / 2);
