@@ -15,7 +15,7 @@ from overlapper.audit.pairs import LinkPair
 from overlapper.audit.robot import Robot, shape_keys
 from overlapper.audit.sampling import Sampling
 from overlapper.audit.tally import Array, Tally
-from overlapper.jobs.engines import Engine
+from overlapper.jobs.executor import Executor
 from overlapper.jobs.hand import Failed, Job
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.links import LinkContact, link_contacts
@@ -76,7 +76,7 @@ def audit(
     seed: int = 0,
     tolerance: float = 1e-3,
     least_depth: float = 0.0,
-    engine: Engine | None = None,
+    engine: Executor | None = None,
     progress: Callable[[Iterator[Tally], int], Iterable[Tally]] = lambda blocks, count: blocks,
 ) -> Audit:
     """Audit a robot in so many configurations. The answer does not depend on the engine.
@@ -111,7 +111,7 @@ def wilson(met: int, asked: int) -> tuple[float, float, float]:
     return fraction, lower if met else 0.0, upper if met < asked else 1.0  # which rounding would miss
 
 
-def _tallies(examiner: Examiner, engine: Engine | None) -> Iterator[Tally]:
+def _tallies(examiner: Examiner, engine: Executor | None) -> Iterator[Tally]:
     """The tally of each block, in any order."""
     blocks = range(len(examiner.sampling.blocks))
     if engine is None or len(blocks) <= FEW:

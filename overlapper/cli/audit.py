@@ -32,7 +32,7 @@ from overlapper.simulation.settings import Modelling, settings_of
 
 if TYPE_CHECKING:
     from overlapper.audit.audit import Audit, PairAudit
-    from overlapper.jobs.engines import Engine
+    from overlapper.jobs.executor import Executor
 
 LISTED = 20  # pairs at most
 CAPTION = (
@@ -60,7 +60,7 @@ def audit(
     srdf: Annotated[Path | None, typer.Option(help="SRDF file to write, for a planner.")] = None,
     out: Annotated[Path | None, typer.Option(help="Table of all pairs of links: .csv, .parquet, .sqlite.")] = None,
     html: HtmlOption = None,
-    engine: AbstractContextManager[Engine],
+    engine: AbstractContextManager[Executor],
     tolerance: ToleranceOption = 1e-3,
     modelled: Modelling,
     units: Annotated[

@@ -11,7 +11,7 @@ import typer
 from overlapper.cli.refusals import Refused
 
 if TYPE_CHECKING:
-    from overlapper.jobs.engines import Engine
+    from overlapper.jobs.executor import Executor
 
 EngineOption = Annotated[
     Literal["processes", "ray"], typer.Option(help="Who does it: processes of this machine, or a Ray cluster.")
@@ -28,15 +28,15 @@ WorkersOption = Annotated[
 
 def working(
     workers: WorkersOption = None, engine: EngineOption = "processes", address: AddressOption = None
-) -> AbstractContextManager[Engine]:
-    """The engine, for a block. To enter raises NotStarted if there is no cluster, ImportError without Ray."""
+) -> AbstractContextManager[Executor]:
+    """The executor, for a block. To enter raises NotStarted if there is no cluster, ImportError without Ray."""
     if address and engine != "ray":
         raise Refused("--address is for --engine ray")
     return _engine(engine, address, workers)
 
 
 @contextmanager
-def _engine(name: str, address: str | None, workers: int | None) -> Iterator[Engine]:
+def _engine(name: str, address: str | None, workers: int | None) -> Iterator[Executor]:
     if name == "processes":
         from overlapper.jobs.processes import Processes
 

@@ -27,7 +27,7 @@ from overlapper.cli.refusals import Refused, import_engine, input_refusals, quie
 from overlapper.simulation.settings import Asking, Modelling
 
 if TYPE_CHECKING:
-    from overlapper.jobs.engines import Engine
+    from overlapper.jobs.executor import Executor
     from overlapper.sweep.comparison import Comparison
     from overlapper.sweep.points import Point, Space
     from overlapper.sweep.store import Store
@@ -108,7 +108,7 @@ def sweep(
         float | None, typer.Option(min=0.001, help="Seconds that a task may take; then it has failed.")
     ] = None,
     retry: Annotated[bool, typer.Option("--retry", help="Do tasks again that have failed.")] = False,
-    engine: AbstractContextManager[Engine],
+    engine: AbstractContextManager[Executor],
     check: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="A recorded sweep: say what has moved since.", show_default=False),
@@ -185,7 +185,7 @@ def _kept(text: str) -> int:
     raise Refused(f"--steps-kept must be summary, 'every N' or all, not {text!r}")
 
 
-def _run(todo: Sweep, store: Store, engine: Engine, limit: float | None, retry: bool) -> tuple[Reached, bool]:
+def _run(todo: Sweep, store: Store, engine: Executor, limit: float | None, retry: bool) -> tuple[Reached, bool]:
     """How far it came; False if it was interrupted."""
     from overlapper.sweep.sweep import Progress as Reached
 

@@ -1,4 +1,4 @@
-"""The engine of many machines: shares of items as tasks of Ray, each done by a hand beside Ray's own process.
+"""The executor of many machines: shares of items as tasks of Ray, each done by a hand beside Ray's own process.
 
 What raises, hangs or dies of an item is the hand's business, as on one machine. A node that is lost loses the shares
 that were under way there, and these are sent once more.
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from overlapper.install import hint
-from overlapper.jobs.engines import Found
+from overlapper.jobs.executor import Found
 from overlapper.jobs.hand import Done, Hand, Job, Outcome
 from overlapper.jobs.shares import Shares
 from overlapper.jobs.worker import NotStarted
@@ -50,7 +50,7 @@ class Cluster:
         return self._asked or max(int(self._ray.cluster_resources().get("CPU", 1)), 1)
 
     def outcomes(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Found:
-        """See Engine."""
+        """See Executor."""
         ray = self._ray
         # Those that are lost are sent anew by us, who know what has arrived.
         remote = ray.remote(num_cpus=1, max_retries=0)(_work)

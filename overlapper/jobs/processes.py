@@ -1,4 +1,4 @@
-"""The engine of one machine: a hand for each core, and a thread for each hand."""
+"""The executor of one machine: a hand for each core, and a thread for each hand."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from overlapper.jobs.engines import Found
+from overlapper.jobs.executor import Found
 from overlapper.jobs.hand import Done, Hand, Job, Outcome
 from overlapper.jobs.shares import Shares
 from overlapper.jobs.worker import NotStarted
@@ -39,7 +39,7 @@ class Processes:
         return self._workers
 
     def outcomes(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Found:
-        """See Engine."""
+        """See Executor."""
         hands = [Hand(job, limit) for _ in range(min(self.workers, len(items)))]
         reports: queue.Queue[Report] = queue.Queue(WAITING)
         shares = Shares(len(items), len(hands), SHARE)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from overlapper.jobs.engines import Engine
+from overlapper.jobs.executor import Executor
 from overlapper.jobs.hand import Done, Failed, Job
 from overlapper.scenes.parameters import Parameter
 from overlapper.sweep import tasks
@@ -53,7 +53,7 @@ class Sweep:
     def run(
         self,
         store: Store,
-        engine: Engine,
+        engine: Executor,
         limit: float | None = None,
         retry: bool = False,
         heard: Callable[[Progress], object] = lambda progress: None,

@@ -1,4 +1,4 @@
-"""Who does the items of a job: processes of this machine, or a cluster."""
+"""The protocol of executors, which do the items of a job: processes of this machine, or a cluster."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from overlapper.jobs.hand import Job, Outcome
 Found = Generator[tuple[int, Outcome], None, None]
 
 
-class Engine(Protocol):
+class Executor(Protocol):
     """Does items, several at a time."""
 
     @property
