@@ -19,7 +19,7 @@ from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.ground import Grounds
 from overlapper.simulation.layout import Layout
 from overlapper.simulation.mechanics import Mechanics
-from overlapper.simulation.model import BASE, Array, Color, Decomposed, Link, ModelledBody, Skipped
+from overlapper.simulation.model import BASE, Array, Color, Decomposed, LinkKey, ModelledBody, Skipped
 from overlapper.simulation.naming import labels, link_names
 from overlapper.simulation.report import Report
 from overlapper.simulation.source import Source
@@ -123,7 +123,7 @@ class AnyBodies:
             pairs_within_margins=self._source.within_margins(*self._last) if self._last else 0,
         )
 
-    def link_pairs(self, among: Among = "simulated") -> list[tuple[Link, Link]]:
+    def link_pairs(self, among: Among = "simulated") -> list[tuple[LinkKey, LinkKey]]:
         """The pairs of links ((body, link), (body, link)) whose shapes `pairs` looks at, wherever they are; sorted."""
         asked: Numbered = among if isinstance(among, str) else self._asked_for(among)
         links = [*self._layout.collider_rows]

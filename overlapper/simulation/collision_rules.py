@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.simulation.model import Link
+from overlapper.simulation.model import LinkKey
 
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -33,13 +33,13 @@ class Colliders:
     those of its collision filter.
     """
 
-    rows: Mapping[Link, int]
+    rows: Mapping[LinkKey, int]
     body: Indices
     group: Indices
     mask: Indices
 
     @classmethod
-    def of(cls, rows: Mapping[Link, int], filters: Mapping[Link, tuple[int, int]]) -> Colliders:
+    def of(cls, rows: Mapping[LinkKey, int], filters: Mapping[LinkKey, tuple[int, int]]) -> Colliders:
         """With group and mask by link; a link without a filter is of group 1 and meets all."""
         group, mask = np.array([filters.get(each, (1, -1)) for each in rows], dtype=int).reshape(-1, 2).T
         return cls(rows, np.array([body for body, _ in rows], dtype=int), group, mask)
@@ -52,8 +52,8 @@ class CollisionRules:
         self,
         colliders: Colliders,
         both: bool = False,
-        filters: Mapping[tuple[Link, Link], bool] | None = None,
-        within: Iterable[tuple[Link, Link]] = (),
+        filters: Mapping[tuple[LinkKey, LinkKey], bool] | None = None,
+        within: Iterable[tuple[LinkKey, LinkKey]] = (),
     ) -> None:
         """`both` masks must admit the other's group, or one is enough; `filters` say of pairs whether they may collide.
 
@@ -120,9 +120,9 @@ def _places(codes: Indices, wanted: Indices) -> tuple[Indices, Mask]:
     return place, found
 
 
-def partners(rules: Rules, links: Sequence[Link], rows: Indices) -> dict[Link, list[Link]]:
+def partners(rules: Rules, links: Sequence[LinkKey], rows: Indices) -> dict[LinkKey, list[LinkKey]]:
     """With whom each of the colliders in these rows, sorted, may collide; `links` are those of all rows."""
-    found: dict[Link, list[Link]] = {links[row]: [] for row in rows}
+    found: dict[LinkKey, list[LinkKey]] = {links[row]: [] for row in rows}
     first, second = (rows[each] for each in np.triu_indices(len(rows), 1))
     allowed = rules.allow(first, second)
     for a, b in zip(first[allowed], second[allowed]):

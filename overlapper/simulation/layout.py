@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from overlapper import Batch, Shape, _core
 from overlapper.shapes.table import facts
-from overlapper.simulation.model import BASE, Array, Link, ModelledBody
+from overlapper.simulation.model import BASE, Array, LinkKey, ModelledBody
 
 Pose = Sequence[Sequence[float]]
 """Begins with a position in m and a quaternion xyzw."""
@@ -21,7 +21,7 @@ class Poses(Protocol):
     """The frames of some bases and links, which shapes are fixed to."""
 
     @property
-    def colliders(self) -> Sequence[Link]:
+    def colliders(self) -> Sequence[LinkKey]:
         """(body, link) of each frame, in the order of `read`."""
 
     def read(self) -> Sequence[Pose]:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from overlapper._core import ContactSolver
 from overlapper.simulation.layout import Pose
-from overlapper.simulation.model import Array, Link
+from overlapper.simulation.model import Array, LinkKey
 
 
 class Dynamics(Protocol):
@@ -18,11 +18,11 @@ class Dynamics(Protocol):
         """Knows masses and joints."""
 
     @property
-    def links(self) -> Sequence[Link]:
+    def links(self) -> Sequence[LinkKey]:
         """(body, link) in the solver's order."""
 
     @property
-    def place(self) -> Mapping[Link, int]:
+    def place(self) -> Mapping[LinkKey, int]:
         """The place of each in `links`."""
 
     @property
@@ -56,10 +56,10 @@ class Mechanics(Protocol):
     def dynamics(self, bodies: Sequence[int]) -> Dynamics:
         """The masses and joints of these bodies."""
 
-    def enter(self, pairs: Iterable[tuple[Link, Link]]) -> None:
+    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
         """Turn the simulator's own response to these pairs off. RuntimeError if the simulation is within another."""
 
-    def turn_off(self, pairs: Iterable[tuple[Link, Link]]) -> None:
+    def turn_off(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
         """Turn it off for these pairs, too."""
 
     def leave(self) -> None:

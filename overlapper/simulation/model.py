@@ -15,8 +15,8 @@ from overlapper.simulation.height_field import HeightField
 Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]
 
-Link = tuple[int, int]
-"""Body and link, -1 for the base."""
+LinkKey = tuple[int, int]
+"""Body and link as numbers, -1 for the base."""
 
 BASE = -1
 

@@ -10,7 +10,7 @@ from pathlib import PurePath
 import numpy as np
 
 from overlapper.printable import printable
-from overlapper.simulation.model import Link, ModelledBody
+from overlapper.simulation.model import LinkKey, ModelledBody
 
 ENDINGS = (".urdf", ".sdf", ".xml", ".obj", ".stl", ".dae")
 
@@ -73,7 +73,7 @@ def labels(bodies: Mapping[int, ModelledBody]) -> dict[int, str]:
     return _distinct({id: body.name for id, body in bodies.items()})
 
 
-def link_names(bodies: Mapping[int, ModelledBody]) -> dict[Link, str]:
+def link_names(bodies: Mapping[int, ModelledBody]) -> dict[LinkKey, str]:
     """Label and name of each link; those that several links would share end in "#" and the number of the link."""
     return {
         (id, link): f"{label}/{name}"

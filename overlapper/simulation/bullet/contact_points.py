@@ -13,7 +13,7 @@ from overlapper.shapes.table import facts
 from overlapper.simulation.collision_rules import Mask
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.layout import Layout
-from overlapper.simulation.model import Link
+from overlapper.simulation.model import LinkKey
 
 DISTANCE = 8  # of a contact point
 
@@ -49,7 +49,7 @@ def touching_within_margins(
     return len(np.unique(np.array(number, dtype=int)[asked]))
 
 
-def _touching(client: int) -> set[tuple[Link, Link]]:
+def _touching(client: int) -> set[tuple[LinkKey, LinkKey]]:
     """The links between which Bullet has contact points at which they touch, the lesser first."""
     points = pybullet.getContactPoints(physicsClientId=client)
     pairs = (sorted([(each[1], each[3]), (each[2], each[4])]) for each in points if each[DISTANCE] <= 0)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from overlapper.simulation.bullet.calls import Arguments, listen, unlisten
 from overlapper.simulation.bullet.commands import Commands
 from overlapper.simulation.height_field import HeightField
-from overlapper.simulation.model import Link
+from overlapper.simulation.model import LinkKey
 
 # Calls that are heard and do not change who collides.
 UNNOTED = frozenset(
@@ -63,7 +63,7 @@ class Recorder:
         listen(self._hear)
 
     def _forget(self) -> None:
-        self.pair_filters: dict[tuple[Link, Link], bool] = {}
+        self.pair_filters: dict[tuple[LinkKey, LinkKey], bool] = {}
         """Whether setCollisionFilterPair lets two links collide; the lesser link first."""
         self.both_masks_must_agree = False
         """collisionFilterMode 0; by default one mask that admits the other's group is enough."""

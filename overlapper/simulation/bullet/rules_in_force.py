@@ -13,7 +13,7 @@ from overlapper.simulation.bullet.known_bodies import KnownBodies
 from overlapper.simulation.bullet.recorder import Recorder
 from overlapper.simulation.collision_rules import Colliders, CollisionRules
 from overlapper.simulation.layout import Layout
-from overlapper.simulation.model import Link
+from overlapper.simulation.model import LinkKey
 
 
 class RulesInForce:
@@ -62,7 +62,9 @@ class RulesInForce:
         return CollisionRules(colliders, recorder.both_masks_must_agree, recorder.pair_filters, within)
 
 
-def _within(body: int, flags: int, parents: Mapping[int, int], rows: Iterable[Link]) -> Iterator[tuple[Link, Link]]:
+def _within(
+    body: int, flags: int, parents: Mapping[int, int], rows: Iterable[LinkKey]
+) -> Iterator[tuple[LinkKey, LinkKey]]:
     """The pairs of links of a body that its flags let collide, as btMultiBodyLinkCollider sees them."""
     links = sorted(link for id, link in rows if id == body)
     apart_from: dict[int, set[int | None]]

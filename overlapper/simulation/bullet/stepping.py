@@ -11,7 +11,7 @@ from overlapper.simulation.bullet.calls import listen, tell, unheard, unlisten
 from overlapper.simulation.bullet.commands import Commands
 from overlapper.simulation.bullet.dynamics import BulletDynamics
 from overlapper.simulation.bullet.recorder import Recorder
-from overlapper.simulation.model import Link
+from overlapper.simulation.model import LinkKey
 
 
 def time_step(client: int) -> float:
@@ -38,7 +38,7 @@ class Stepping:
     def dynamics(self, bodies: Sequence[int]) -> BulletDynamics:
         return BulletDynamics(self._client, bodies)
 
-    def enter(self, pairs: Iterable[tuple[Link, Link]]) -> None:
+    def enter(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
         if self._client in _INSIDE:
             raise RuntimeError(f"physicsClientId {self._client} is within a `with` of a VolumetricContact already")
         _INSIDE[self._client] = self
@@ -47,7 +47,7 @@ class Stepping:
             self._commands.learn()
             listen(self._commands.hear)
 
-    def turn_off(self, pairs: Iterable[tuple[Link, Link]]) -> None:
+    def turn_off(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
         self._response.turn_off(pairs)
 
     def leave(self) -> None:
@@ -82,9 +82,9 @@ class Response:
 
     def __init__(self, client: int) -> None:
         self._client = client
-        self._off: set[tuple[Link, Link]] = set()
+        self._off: set[tuple[LinkKey, LinkKey]] = set()
 
-    def turn_off(self, pairs: Iterable[tuple[Link, Link]]) -> None:
+    def turn_off(self, pairs: Iterable[tuple[LinkKey, LinkKey]]) -> None:
         """Turn the response to those pairs off, too."""
         for pair in pairs:
             self._set(pair, 0)
@@ -98,6 +98,6 @@ class Response:
                 self._set(pair, 1)
         self._off.clear()
 
-    def _set(self, pair: tuple[Link, Link], enabled: int) -> None:
+    def _set(self, pair: tuple[LinkKey, LinkKey], enabled: int) -> None:
         (a, link_a), (b, link_b) = pair
         unheard("setCollisionFilterPair")(a, b, link_a, link_b, enabled, self._client)

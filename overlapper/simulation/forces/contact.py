@@ -17,7 +17,7 @@ from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.forces.forces import Forces
 from overlapper.simulation.forces.parameter import OfPair, Parameter
-from overlapper.simulation.model import Array, Link
+from overlapper.simulation.model import Array, LinkKey
 
 # A swing that turns by more than so many radians in a step is followed by backward Euler.
 COARSE = 2.0
@@ -112,7 +112,7 @@ class VolumetricContact:
         self._inside = False
         self._parts: list[tuple[float, Forces]] = []  # of a step, the parts that substeps are, and their forces
         self._after: Array | None = None  # the velocity that the last step left
-        self._warned: set[tuple[str, Link, Link]] = set()
+        self._warned: set[tuple[str, LinkKey, LinkKey]] = set()
         self._model()
         none = np.empty((0, 3))
         self._found = Forces(bodies.overlaps(pairs=[]), none, none, none, none, np.empty(0, dtype=bool), np.empty(0))
@@ -395,7 +395,7 @@ class VolumetricContact:
                 return (velocity - before) / length - ours
         return self._other
 
-    def _pairs_of(self, rows: NDArray[np.bool_]) -> list[tuple[Link, Link]]:
+    def _pairs_of(self, rows: NDArray[np.bool_]) -> list[tuple[LinkKey, LinkKey]]:
         return [((a, la), (b, lb)) for a, la, _, b, lb, _ in self._contacts.keys[rows].tolist()]
 
     def _tell_of_substeps(self, damped: NDArray[np.bool_], frequency2: Array, duration: float) -> None:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.simulation.model import Array, Link
+from overlapper.simulation.model import Array, LinkKey
 
-OfPair = Callable[[Link, Link], float]
+OfPair = Callable[[LinkKey, LinkKey], float]
 """The value for a pair of links ((body, link), (body, link)), the lesser first."""
 
 
@@ -23,9 +23,9 @@ class Parameter:
         self._function = given if callable(given) else None
         self._number = 0.0 if callable(given) else self._checked(given, "")
         self._known: dict[tuple[int, int], float] = {}
-        self._links: Sequence[Link] = ()
+        self._links: Sequence[LinkKey] = ()
 
-    def of(self, pairs: NDArray[np.int64], links: Sequence[Link]) -> Array:
+    def of(self, pairs: NDArray[np.int64], links: Sequence[LinkKey]) -> Array:
         """(p,) of pairs (p, 2) of places in `links`."""
         if self._function is None:
             return np.full(len(pairs), self._number)
