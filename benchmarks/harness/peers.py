@@ -60,7 +60,7 @@ from overlapper import (
 
 Setting = float | int | str | None
 Asked = Callable[[], Any]
-Bodies = Sequence[Given]
+GivenBodies = Sequence[Given]
 Ring = list[int]
 
 MOST_IN_NUMPY = 200  # vertices of either body, for a peer that looks at all of them for every plane of the other
@@ -104,14 +104,14 @@ class Peer:
     by_clock: bool = False
     look: Look | None = Look()
 
-    def settings_for(self, bodies: Bodies) -> tuple[Setting, ...]:
+    def settings_for(self, bodies: GivenBodies) -> tuple[Setting, ...]:
         return self.round_settings if any(map(is_round, bodies)) else self.settings
 
 
 # This package
 
 
-def auto(bodies: Bodies, tolerance: float) -> Asked:
+def auto(bodies: GivenBodies, tolerance: float) -> Asked:
     if len(bodies) > 2:
         return lambda: overlap(*bodies, tolerance=tolerance).volume
     a, b = bodies  # two are a call without a star, which takes a tenth longer
@@ -122,7 +122,7 @@ class Cold:
     """Many pairs in one call of a batch that knows nothing of them, the shapes made before. Each call gives the pairs
     the other way round and quaternions of another length: other pairs and poses that have the same answers."""
 
-    def __init__(self, pairs: Iterable[Bodies]) -> None:
+    def __init__(self, pairs: Iterable[GivenBodies]) -> None:
         shapes, self.positions, orientations, rows = in_rows(pairs)
         self.batch = Batch(shapes)
         self.turns = cycle([(orientations, rows), (2 * orientations, rows[:, ::-1].copy())])
@@ -131,7 +131,7 @@ class Cold:
         return self.batch.overlaps(self.positions, *next(self.turns), **settings)
 
 
-def in_rows(pairs: Iterable[Bodies]) -> tuple[list, np.ndarray, np.ndarray, np.ndarray]:
+def in_rows(pairs: Iterable[GivenBodies]) -> tuple[list, np.ndarray, np.ndarray, np.ndarray]:
     """Shapes, positions, orientations, and rows of two that are a pair."""
     bodies = [body for pair in pairs for body in pair]
     rows = np.arange(len(bodies), dtype=np.int32).reshape(-1, 2)
@@ -140,19 +140,19 @@ def in_rows(pairs: Iterable[Bodies]) -> tuple[list, np.ndarray, np.ndarray, np.n
     return [body.shape for body in bodies], positions, orientations, rows
 
 
-def repeated(pairs: list[Bodies]) -> list[Bodies]:
+def repeated(pairs: list[GivenBodies]) -> list[GivenBodies]:
     """So often that a call is long enough to be timed."""
     large = any(is_round(body) or len(corners(body)) > 100 for body in pairs[0])
     return pairs * (4 if large else 32)
 
 
-def auto_batch(pairs: list[Bodies], tolerance: float) -> Asked:
+def auto_batch(pairs: list[GivenBodies], tolerance: float) -> Asked:
     """All measures of many pairs in one call."""
     ask = Cold(repeated(pairs))
     return lambda: ask(tolerance=tolerance).volume
 
 
-def auto_warm(pairs: list[Bodies], tolerance: float) -> Asked:
+def auto_warm(pairs: list[GivenBodies], tolerance: float) -> Asked:
     """The same pairs again and again while the second body of each moves to and fro, 1e-4 m a step."""
     shapes, positions, orientations, rows = in_rows(repeated(pairs))
     batch = Batch(shapes)
@@ -163,14 +163,14 @@ def auto_warm(pairs: list[Bodies], tolerance: float) -> Asked:
     return lambda: batch.overlaps(next(places), orientations, rows, tolerance=tolerance).volume
 
 
-def paper(bodies: Bodies, _: None) -> Asked:
+def paper(bodies: GivenBodies, _: None) -> Asked:
     """The article's method, as this package has it."""
     if has(bodies, RoundedHull):
         raise Unfit("rounded hulls")
     return lambda: overlap(*bodies, method="paper").volume
 
 
-def auto_distance(bodies: Bodies, way: str | None) -> Asked:
+def auto_distance(bodies: GivenBodies, way: str | None) -> Asked:
     """The depth alone is timed; hard cases are asked for whichever of depth and distance there is."""
     if way is None:
         a, b = bodies
@@ -186,7 +186,7 @@ def auto_distance(bodies: Bodies, way: str | None) -> Asked:
 # Volumes
 
 
-def clipping(bodies: Bodies, _: None) -> Asked:
+def clipping(bodies: GivenBodies, _: None) -> Asked:
     """The first body cut by the planes of the others in plain doubles, as r3d does it: the signs of the vertices decide
     what is kept, so that the mesh stays closed whatever the rounding. In numpy."""
     if any(map(is_round, bodies)):
@@ -254,7 +254,7 @@ def enclosed_volume(vertices: np.ndarray, rings: list[Ring]) -> float:
     return sum(float(crosses.sum(0) @ at) / 6 for at, crosses in fans)
 
 
-def scipy_volume(bodies: Bodies, way: str) -> Asked:
+def scipy_volume(bodies: GivenBodies, way: str) -> Asked:
     """Qhull's dual hull about the centre of the largest ball, which linear programming finds, or which is given."""
     from scipy.spatial import ConvexHull, HalfspaceIntersection
 
@@ -286,7 +286,7 @@ def largest_ball(walls: np.ndarray, slack: np.ndarray) -> Any:
     return linprog([0, 0, 0, -1], np.column_stack([walls[:, :3], slack]), -walls[:, 3], bounds=(None, None))
 
 
-def manifold(bodies: Bodies, setting: Setting) -> Asked:
+def manifold(bodies: GivenBodies, setting: Setting) -> Asked:
     """Meshes made before; with "moved" both are moved first, as at every step of a simulation."""
     from manifold3d import Error, Manifold, Mesh64
 
@@ -317,7 +317,7 @@ def manifold(bodies: Bodies, setting: Setting) -> Asked:
     return lambda: (one ^ other).volume()
 
 
-def trimesh_volume(bodies: Bodies, segments: int | None) -> Asked:
+def trimesh_volume(bodies: GivenBodies, segments: int | None) -> Asked:
     import manifold3d  # noqa: F401, the engine
     from trimesh import PointCloud, Trimesh
     from trimesh.boolean import intersection
@@ -341,7 +341,7 @@ def trimesh_volume(bodies: Bodies, segments: int | None) -> Asked:
 HEXAHEDRON = [0, 4, 6, 2, 1, 5, 7, 3]  # CORNERS, z fastest, in the order that is wanted: around z = -1, then z = 1
 
 
-def strobl(bodies: Bodies, _: None) -> Asked:
+def strobl(bodies: GivenBodies, _: None) -> Asked:
     """The package `overlap`: a ball and a hexahedron or a tetrahedron, both made before."""
     balls = [body for body in bodies if has([body], Sphere)]
     others = [b for b in bodies if has([b], Box) or (has([b], Hull) and len(corners(b)) == 4)]
@@ -359,7 +359,7 @@ def strobl(bodies: Bodies, _: None) -> Asked:
     return lambda: peer.overlap_volume(sphere, element)
 
 
-def monte_carlo(bodies: Bodies, samples: int) -> Asked:
+def monte_carlo(bodies: GivenBodies, samples: int) -> Asked:
     """The share of points, drawn in the box where both boxes meet, that are in both."""
     lower, upper = box_of_both(bodies)
     tests = [inside_test(body) for body in bodies]
@@ -375,7 +375,7 @@ def monte_carlo(bodies: Bodies, samples: int) -> Asked:
     return estimate
 
 
-def voxels(bodies: Bodies, across: int) -> Asked:
+def voxels(bodies: GivenBodies, across: int) -> Asked:
     """Cubes whose centres are in both, so many across the smaller body: what papers on data sets use."""
     lower, upper = box_of_both(bodies)
     pitch = min(float(np.ptp(body.bounds, axis=0).max()) for body in bodies) / across
@@ -399,14 +399,14 @@ def count_inside(where: np.ndarray, tests: list[Callable[[np.ndarray], np.ndarra
 # Yes or no, and distances
 
 
-def fcl_collide(bodies: Bodies, _: None) -> Asked:
+def fcl_collide(bodies: GivenBodies, _: None) -> Asked:
     import fcl
 
     one, other = map(of_fcl, pair_of(bodies))
     return lambda: fcl.collide(one, other, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
 
 
-def fcl_distance(bodies: Bodies, way: str) -> Asked:
+def fcl_distance(bodies: GivenBodies, way: str) -> Asked:
     """By the deepest contact, or by the signed distance, which is nearer to the truth."""
     import fcl
 
@@ -426,19 +426,19 @@ def fcl_distance(bodies: Bodies, way: str) -> Asked:
     return collide
 
 
-def fcl_distance_below_0(bodies: Bodies, _: None) -> Asked:
+def fcl_distance_below_0(bodies: GivenBodies, _: None) -> Asked:
     ask = fcl_distance(pair_of(bodies), "distance")
     return lambda: ask() < 0
 
 
-def coal_collide(bodies: Bodies, _: None) -> Asked:
+def coal_collide(bodies: GivenBodies, _: None) -> Asked:
     import coal
 
     (one, at), (other, there) = map(of_coal, pair_of(bodies))
     return lambda: coal.collide(one, at, other, there, coal.CollisionRequest(), coal.CollisionResult()) > 0
 
 
-def coal_distance(bodies: Bodies, tolerance: float | None) -> Asked:
+def coal_distance(bodies: GivenBodies, tolerance: float | None) -> Asked:
     """By the depth of a contact; with a tolerance, by the distance in coal's own number of iterations.
 
     The answer is OUT_OF_ITERATIONS if a hundred times as many iterations change it.
@@ -471,7 +471,7 @@ def coal_distance(bodies: Bodies, tolerance: float | None) -> Asked:
     return confirmed
 
 
-def pybullet_overlaps(bodies: Bodies, _: None) -> Asked:
+def pybullet_overlaps(bodies: GivenBodies, _: None) -> Asked:
     """True if the distance without the margins of both hulls is below zero."""
     ask = pybullet_distance(pair_of(bodies), 0.0)
 
@@ -482,7 +482,7 @@ def pybullet_overlaps(bodies: Bodies, _: None) -> Asked:
     return below_0
 
 
-def pybullet_distance(bodies: Bodies, reach: float | None) -> Asked:
+def pybullet_distance(bodies: GivenBodies, reach: float | None) -> Asked:
     """The margin by which pybullet grows hulls is taken off, and nothing else. It looks for points within `reach` m,
     or as far as the bodies go."""
     import pybullet
@@ -522,7 +522,7 @@ def pybullet_body(pybullet: Any, body: Placed) -> int:
     return pybullet.createMultiBody(0, model, **place)
 
 
-def pair_of(bodies: Bodies) -> Bodies:
+def pair_of(bodies: GivenBodies) -> GivenBodies:
     if len(bodies) != 2:
         raise Unfit("more than two bodies")
     return bodies

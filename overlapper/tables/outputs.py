@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from overlapper import Overlaps
 from overlapper.simulation.links import link_contacts
 from overlapper.tables.summary import Summary
-from overlapper.tables.table import COLUMNS, FORCES, Bodies, link_rows, rows
+from overlapper.tables.table import COLUMNS, FORCES, PosedBodies, link_rows, rows
 from overlapper.tables.table_file import TABLES, must_be_a_table, origin
 from overlapper.whole_file import must_be_writable, unfinished
 
@@ -63,7 +63,7 @@ class StepTable:
         self,
         step: int,
         time: float,
-        bodies: Bodies,
+        bodies: PosedBodies,
         contacts: Contacts,
         opinions: Sequence[Comparison] = (),
         forces: Forces | None = None,

@@ -43,8 +43,8 @@ COLUMNS: dict[str, type] = {
 FORCES: dict[str, type] = dict.fromkeys(FORCE_COLUMNS, float)
 
 
-class Bodies(Protocol):
-    """What a table asks of them: the shapes by (body, link, shape), their poses in that order, the links' names."""
+class PosedBodies(Protocol):
+    """The bodies of a table: shapes by (body, link, shape), their poses in the order of the shapes, names of links."""
 
     @property
     def keys(self) -> list[tuple[int, int, int]]: ...
@@ -73,7 +73,7 @@ def poses(rows: Sequence[Row]) -> dict[tuple[int, Key], NDArray[np.float64]]:
     return where
 
 
-def placements(bodies: Bodies, side: str) -> dict[tuple[int, int, int], Row]:
+def placements(bodies: PosedBodies, side: str) -> dict[tuple[int, int, int], Row]:
     """Which shape, and where: the columns of side "A" or "B" for every shape, by (body, link, shape)."""
     names = bodies.names
     poses = np.hstack([bodies.positions, bodies.orientations]).tolist()
@@ -92,7 +92,7 @@ def placements(bodies: Bodies, side: str) -> dict[tuple[int, int, int], Row]:
 def rows(
     step: int,
     time: float,
-    bodies: Bodies,
+    bodies: PosedBodies,
     contacts: Sequence[Contact],
     opinions: Sequence[Comparison] = (),
     forces: Forces | None = None,
@@ -131,7 +131,7 @@ def _pushed(forces: Forces | None) -> dict[tuple[int, ...], Row]:
 
 
 def link_rows(
-    step: int, time: float, bodies: Bodies, pairs: Sequence[LinkContact], forces: Forces | None = None
+    step: int, time: float, bodies: PosedBodies, pairs: Sequence[LinkContact], forces: Forces | None = None
 ) -> list[Row]:
     """The rows of one step by links as a whole; columns of single shapes, their poses, area, slip and FCL, are empty.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from overlapper import Overlap, Placed
 from overlapper.shapes.drawing import triangles
-from overlapper.viewer.labels import Bodies, Contact, key_of
+from overlapper.viewer.labels import Contact, DrawnBodies, key_of
 from overlapper.viewer.look import FIELD_OF_VIEW, Array
 from overlapper.viewer.tessellation import bounded
 
@@ -55,7 +55,7 @@ class Framing:
     `moment` says when, counted from 0: -1 without any.
     """
 
-    def __init__(self, bodies: Bodies) -> None:
+    def __init__(self, bodies: DrawnBodies) -> None:
         self._ground_size = _ground_size(bodies)
         box = around([box for _, box in self._bounded(bodies)])
         self.center, self.size = box.mean(axis=0), float(np.linalg.norm(box[1] - box[0]))
@@ -79,7 +79,7 @@ class Framing:
             return True
         return contact.bodyA not in self._moved and contact.bodyB in self._moved
 
-    def see(self, bodies: Bodies, contacts: Iterable[Contact]) -> None:
+    def see(self, bodies: DrawnBodies, contacts: Iterable[Contact]) -> None:
         """Add a moment: the bodies where they are now, and their contacts."""
         bounded = self._bounded(bodies)
         for key, box in bounded:
@@ -122,7 +122,7 @@ class Framing:
         """The direction to the side from which the largest overlap is seen best."""
         return _side(self.largest, [box for _, box in self._then]) if self.largest else BACK
 
-    def _bounded(self, bodies: Bodies) -> list[tuple[tuple[int, int, int], Array]]:
+    def _bounded(self, bodies: DrawnBodies) -> list[tuple[tuple[int, int, int], Array]]:
         """The shapes of all bodies that are not grounds, and the boxes around them."""
         boxes = _boxes(bodies)
         sizes = _sizes(boxes)
@@ -135,7 +135,7 @@ def around(boxes: Sequence[Array]) -> Array:
     return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
 
 
-def _boxes(bodies: Bodies) -> list[tuple[tuple[int, int, int], Array]]:
+def _boxes(bodies: DrawnBodies) -> list[tuple[tuple[int, int, int], Array]]:
     return [
         (key, np.asarray(placed.bounds))
         for key, placed in zip(bodies.keys, bodies.placed, strict=True)
@@ -151,7 +151,7 @@ def _sizes(boxes: Iterable[tuple[tuple[int, int, int], Array]]) -> dict[int, flo
     return {body: _extent(around(each)) for body, each in of_body.items()}
 
 
-def _ground_size(bodies: Bodies) -> float:
+def _ground_size(bodies: DrawnBodies) -> float:
     """The size, m, from which a body is a ground: bodies of one link, so many times larger than all smaller bodies."""
     jointed = {body for body, link, _ in bodies.keys if link >= 0}
     sizes = sorted(((size, body) for body, size in _sizes(_boxes(bodies)).items()), reverse=True)

@@ -20,7 +20,7 @@ INHERITED |= {f"__{way}{kind}__" for way in ("define", "lookup") for kind in ("G
 INHERITED |= {"toString", "valueOf", "<object>"}
 
 
-class Bodies(Protocol):
+class DrawnBodies(Protocol):
     """Shapes in the world by (body, link, shape), and the colours and distinct names of links."""
 
     @property
@@ -52,7 +52,7 @@ class Contact(Protocol):
     def overlap(self) -> Overlap: ...
 
 
-def link_names(bodies: Bodies) -> dict[tuple[int, int], tuple[str, str]]:
+def link_names(bodies: DrawnBodies) -> dict[tuple[int, int], tuple[str, str]]:
     """The names of body and link in the tree, without slashes, as a slash begins a new level."""
     names = {}
     for (body, link), name in bodies.names.items():
@@ -66,7 +66,7 @@ def _unlike(name: str) -> str:
     return f"'{name}'" if name in INHERITED or name[:1] == name[-1:] == "'" else name
 
 
-def body_paths(bodies: Bodies) -> list[str]:
+def body_paths(bodies: DrawnBodies) -> list[str]:
     """The path `/overlapper/bodies/<body>/<link>/<shape>` of each shape."""
     names = link_names(bodies)
     return [f"{ROOT}/{'/'.join(names[body, link])}/{shape}" for body, link, shape in bodies.keys]
@@ -76,7 +76,9 @@ def key_of(contact: Contact) -> Key:
     return contact.bodyA, contact.linkA, contact.shapeA, contact.bodyB, contact.linkB, contact.shapeB
 
 
-def labelled(bodies: Bodies, contacts: Iterable[Contact]) -> Iterator[tuple[Pair, tuple[LinkName, LinkName], Contact]]:
+def labelled(
+    bodies: DrawnBodies, contacts: Iterable[Contact]
+) -> Iterator[tuple[Pair, tuple[LinkName, LinkName], Contact]]:
     """The name of each overlapping pair, its bodies and links, and the pair. The link of a body of one link is ""."""
     names = link_names(bodies)
     links = Counter(body for body, _ in names)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from overlapper import Overlap
 from overlapper.shapes.drawing import polytope_edges, triangles
 from overlapper.viewer.framing import Framing
-from overlapper.viewer.labels import Bodies, Contact, Key, LinkName, key_of, labelled
+from overlapper.viewer.labels import Contact, DrawnBodies, Key, LinkName, key_of, labelled
 from overlapper.viewer.look import Array, channels, to_draw
 
 COLORS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21908c", "#27ad81", "#5dc863", "#aadc32", "#fde725")
@@ -192,7 +192,7 @@ class DrawnForces:
     @classmethod
     def of(
         cls,
-        bodies: Bodies,
+        bodies: DrawnBodies,
         contacts: Sequence[Contact],
         forces: Forces | None,
         length: float,
@@ -239,7 +239,7 @@ class Arrow:
 
 
 def arrows(
-    bodies: Bodies,
+    bodies: DrawnBodies,
     contacts: Iterable[Contact],
     pressed: Mapping[Key, Press],
     on_second: Callable[[Contact], bool] = lambda contact: False,

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from overlapper import Overlap, Placed
 from overlapper.shapes.table import facts
 from overlapper.viewer.framing import Framing, View
-from overlapper.viewer.labels import ROOT, Bodies, Contact, LinkName, Pair, body_paths, key_of, labelled
+from overlapper.viewer.labels import ROOT, Contact, DrawnBodies, LinkName, Pair, body_paths, key_of, labelled
 from overlapper.viewer.look import (
     BODIES,
     INK,
@@ -108,7 +108,7 @@ class Recording:
 
     def add(
         self,
-        bodies: Bodies,
+        bodies: DrawnBodies,
         contacts: Iterable[Contact],
         time: float,
         name: str = "",

@@ -23,7 +23,7 @@ GROUND, CUP, HAND = (0, -1, 0), (1, -1, 0), (2, 3, 0)
 GREEN = (0.1, 0.8, 0.1, 1.0)
 
 
-class Bodies:
+class GreenBodies:
     """Shapes in the world by (body, link, shape), all green."""
 
     def __init__(self, shapes: dict[tuple[int, int, int], Placed]) -> None:
@@ -65,12 +65,12 @@ class Scene:
         return [Contact(*self.keys[j], *self.keys[i], overlap(self.placed[j], self.placed[i])) for i, j in pairs]
 
 
-def hand_at(x: float) -> Bodies:
+def hand_at(x: float) -> GreenBodies:
     """A hand that is a box of 20 cm and reaches into a cup that is another when x < 0.2."""
-    return Bodies({CUP: Placed(Box([0.1, 0.1, 0.1])), HAND: Placed(Box([0.1, 0.1, 0.1]), (x, 0.06, 0.08))})
+    return GreenBodies({CUP: Placed(Box([0.1, 0.1, 0.1])), HAND: Placed(Box([0.1, 0.1, 0.1]), (x, 0.06, 0.08))})
 
 
-def recorded(frames: list[Bodies], path: Path) -> Path:
+def recorded(frames: list[GreenBodies], path: Path) -> Path:
     recording = Recording()
     for i, bodies in enumerate(frames):
         recording.add(bodies, bodies.contacts(), time=2.0 + i)

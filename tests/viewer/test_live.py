@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import umsgpack
-from pages import CUP, HAND, Bodies, hand_at
+from pages import CUP, HAND, GreenBodies, hand_at
 
 from overlapper import Placed, Sphere
 from overlapper.viewer import Viewer
@@ -55,7 +55,7 @@ def test_a_live_view_shows_the_last_step_and_ends_with_its_server():
             viewer.show(bodies, bodies.contacts())
             arm, cup = "/overlapper/bodies/arm/hand/0", "/overlapper/bodies/cup/base/0"
             assert live_paths(viewer) == {arm, cup, "/overlapper/overlaps/cup-arm.hand/1.34 dm³"}
-            viewer.show(Bodies({CUP: Placed(Sphere(0.1))}), [])
+            viewer.show(GreenBodies({CUP: Placed(Sphere(0.1))}), [])
             assert live_paths(viewer) == {cup}
         assert server.returncode is not None
 

@@ -8,7 +8,20 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from pages import CUP, HAND, Bodies, click_in_scene, coloured, hand_at, looks, opened, panel, recorded, scene, sides
+from pages import (
+    CUP,
+    HAND,
+    GreenBodies,
+    click_in_scene,
+    coloured,
+    hand_at,
+    looks,
+    opened,
+    panel,
+    recorded,
+    scene,
+    sides,
+)
 
 from overlapper import Box, Placed
 from overlapper.viewer import Recording, Viewer
@@ -35,7 +48,7 @@ def test_only_the_bodies_are_seen_before_they_overlap(browser, reach):
 @looks
 def test_an_overlap_of_a_millimetre_in_a_scene_of_metres_is_found_and_clicked_upon(browser, tmp_path):
     corner = Placed(Box([0.5, 0.5, 0.5]), (0.999, 0.999, 0.999))
-    page = recorded([Bodies({CUP: Placed(Box([0.5, 0.5, 0.5])), HAND: corner})], tmp_path / "corner.html")
+    page = recorded([GreenBodies({CUP: Placed(Box([0.5, 0.5, 0.5])), HAND: corner})], tmp_path / "corner.html")
     image = scene(opened(browser, page, "#t=0"))
     assert 20 < coloured(image, "pink") < 1000
     red, green, blue = np.moveaxis(image, -1, 0)
