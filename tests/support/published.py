@@ -38,7 +38,7 @@ TILTED_LESS = (
 )
 
 
-class Body(NamedTuple):
+class PosedPoints(NamedTuple):
     """Points, by themselves or under a pose. A matrix as published need not be a rotation to the last digit."""
 
     points: np.ndarray
@@ -53,16 +53,16 @@ class Body(NamedTuple):
 
 class Pair(NamedTuple):
     thread: str
-    a: Body
-    b: Body
+    a: PosedPoints
+    b: PosedPoints
 
     def bodies(self) -> tuple[np.ndarray, np.ndarray]:
         return self.a.vertices(), self.b.vertices()
 
 
-def box(size, rotation=UPRIGHT, position=(0, 0, 0)) -> Body:
+def box(size, rotation=UPRIGHT, position=(0, 0, 0)) -> PosedPoints:
     """By its full lengths."""
-    return Body(CORNERS * size, rotation, position)
+    return PosedPoints(CORNERS * size, rotation, position)
 
 
 def upright_prism(*corners) -> np.ndarray:
@@ -179,7 +179,7 @@ PUBLISHED = (
     ),
     Pair(
         DRAKE + "21673#issuecomment-2688753008",
-        Body(
+        PosedPoints(
             np.array(
                 [
                     [x, y, z]
@@ -201,7 +201,7 @@ PUBLISHED = (
             ),
             (4.2864836941313040342, 7.3869576872253679412, 0),
         ),
-        Body(
+        PosedPoints(
             np.array(
                 [
                     [x, y, z]
@@ -217,7 +217,7 @@ PUBLISHED = (
     ),
     Pair(
         DRAKE + "21673#issuecomment-2689248075",
-        Body(
+        PosedPoints(
             np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.92388, 0.92388) for z in (-0.382683, 0.382683)]),
             (
                 (-2.6487935924268804787e-09, -0.56303944378188575115, -0.82643002410717436579),
@@ -226,7 +226,7 @@ PUBLISHED = (
             ),
             (15.712812998638135298, 10.219809745800642276, 0),
         ),
-        Body(
+        PosedPoints(
             np.array(
                 [
                     [x, y, z]
@@ -242,7 +242,7 @@ PUBLISHED = (
     ),
     Pair(
         "https://github.com/AlexanderFabisch/distance3d/issues/27",
-        Body(
+        PosedPoints(
             np.array(
                 [
                     [1.9408982677575293, 1.7555630101186028, 0.18558370457138618],
@@ -254,7 +254,7 @@ PUBLISHED = (
                 ]
             )
         ),
-        Body(
+        PosedPoints(
             np.array(
                 [
                     [0.13746727993941066, 0.20129636190312772, 0.34482818309629215],
@@ -269,8 +269,12 @@ PUBLISHED = (
     ),
     Pair(
         "https://github.com/MattiaMontanari/openGJK/issues/52",
-        Body(upright_prism((90945.08, 54122.54), (91077.46, 53745.082), (91454.92, 53877.46), (91322.54, 54254.918))),
-        Body(upright_prism((90919.64, 54037.383), (91162.62, 53719.637), (91480.36, 53962.617), (91237.38, 54280.363))),
+        PosedPoints(
+            upright_prism((90945.08, 54122.54), (91077.46, 53745.082), (91454.92, 53877.46), (91322.54, 54254.918))
+        ),
+        PosedPoints(
+            upright_prism((90919.64, 54037.383), (91162.62, 53719.637), (91480.36, 53962.617), (91237.38, 54280.363))
+        ),
     ),
     Pair(
         "https://github.com/coal-library/coal/issues/604",
@@ -293,5 +297,7 @@ PUBLISHED = (
             (1.48838308, -1.102020834, 0.4497073799),
         ),
     ),
-    Pair("https://github.com/bulletphysics/bullet3/issues/262", Body(HULL_OF_BULLET), Body(HULL_OF_BULLET)),
+    Pair(
+        "https://github.com/bulletphysics/bullet3/issues/262", PosedPoints(HULL_OF_BULLET), PosedPoints(HULL_OF_BULLET)
+    ),
 )
