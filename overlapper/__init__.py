@@ -59,8 +59,8 @@ __all__ = [
     "random_polytope",
 ]
 
-# Imported when asked for. What needs more than numpy is not imported by *, either; what needs numpy would make every
-# start of pytest wait for it, as the plugin is a module of this package.
+# These names are imported when they are asked for. The pytest plugin is a module of this package, so an import of numpy
+# here would delay every start of pytest. Names that need more than numpy are not imported by * either.
 __getattr__ = _lazily(
     __name__,
     {

@@ -1,4 +1,4 @@
-"""What was found as a table of pyarrow, pandas or polars: columns with their units, a row per pair."""
+"""Results as a table of pyarrow, pandas or polars: columns with their units, a row per pair."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ MEASURES = {
     "normal": [f"normal_{axis}" for axis in "xyz"],
 }
 
-# What volumetric contact adds, by the attribute of `Forces`: force and torque on A, the torque about the centroid, the
-# energy that pressures store, and the velocity of A over B at the centroid.
+# The columns of volumetric contact, by the attribute of `Forces`: force and torque on A, the torque about the centroid,
+# the energy that pressures store, and the velocity of A over B at the centroid.
 FORCE_MEASURES = {
     "force": [f"force_{axis}_n" for axis in "xyz"],
     "torque": [f"torque_{axis}_nm" for axis in "xyz"],
@@ -56,7 +56,7 @@ def measures_of(pair: object) -> dict[str, float | None]:
 
 
 class Tabular(ABC):
-    """What has rows, and columns of them. A number that is missing is null, and in pandas not a number."""
+    """Rows with named columns. A missing number is null; in pandas, it is not a number."""
 
     __slots__ = ()
 

@@ -1,4 +1,4 @@
-"""What to install where a library is missing: its own name, as this package may be on no index."""
+"""The library to install where one is missing. It is told by its own name, as this package may be on no index."""
 
 from __future__ import annotations
 

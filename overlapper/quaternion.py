@@ -1,4 +1,4 @@
-"""Quaternions (x, y, z, w), many at once, of which those that turn vectors are unit."""
+"""Quaternions (x, y, z, w), many at once. Those that turn vectors are unit quaternions."""
 
 from __future__ import annotations
 

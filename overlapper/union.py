@@ -1,4 +1,4 @@
-"""What unions of convex shapes share, every volume counted once.
+"""The volume common to two unions of convex shapes, every point counted once.
 
 Of unions ∪A and ∪B, inclusion–exclusion gives the volume as the sum over all sets S of A's shapes and T of B's of
 (−1)^(|S| + |T|) vol(∩S ∩ ∩T). Every term is an overlap of convex bodies with an error bound of its own, and those that
@@ -32,7 +32,7 @@ COARSE = 0.1
 
 @dataclass(slots=True)
 class UnionOverlap:
-    """What two unions share. True only if they overlap.
+    """The overlap of two unions. True only if they overlap.
 
     `volume` (m³) is within `volume_error` of the true one. It is the sum of convex parts, `terms` in number.
     """
@@ -85,7 +85,7 @@ class UnionOverlap:
 def union_overlap(
     a: Sequence[Placed], b: Sequence[Placed], tolerance: float = 1e-3, method: Method = "auto"
 ) -> UnionOverlap:
-    """What the union of the shapes `a` has in common with that of the shapes `b`.
+    """The overlap of the union of the shapes `a` with the union of the shapes `b`.
 
     `tolerance` and `method` are those of `overlapper.overlap`, for every pair.
     """

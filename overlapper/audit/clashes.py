@@ -38,7 +38,7 @@ Way = Literal["convex", "decomposed", "hull", "unknown"]
 
 SHARED = "#ff4fa3"  # a colour that parts hardly ever have
 GREY = (0.62, 0.66, 0.72, 1.0)
-# Of bodies that clash, in turn: told apart, and none of them the colour of what is shared.
+# The colours of clashing bodies, in turn. They differ from each other and from the colour of the overlap.
 COLORS = [(0.35, 0.60, 0.90, 1.0), (0.55, 0.78, 0.40, 1.0), (0.95, 0.72, 0.30, 1.0), (0.45, 0.75, 0.75, 1.0)]
 COLORS += [(0.62, 0.55, 0.85, 1.0), (0.80, 0.62, 0.48, 1.0)]
 
@@ -226,7 +226,7 @@ def write_page(found: Clashes, path: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Drawn:
-    """What views ask of bodies, and of a shape where it stands."""
+    """The bodies, as views are given them."""
 
     keys: list[tuple[int, int, int]]
     placed: list[Placed]
@@ -318,7 +318,7 @@ def _of_parts(body: MeshBody, parts: Sequence[Hull], way: Way) -> MeshBody:
 
 
 def _shared(a: MeshBody, b: MeshBody) -> _Shared | None:
-    """What the meshes share; None if their parts must be measured instead: both are convex, or one is not closed."""
+    """The overlap of the meshes. None if both are convex or one is not closed: then their parts must be measured."""
     if a.way == b.way == "convex" or a.triangles is None or b.triangles is None:
         return None
     found = mesh_overlap(a.triangles, b.triangles)

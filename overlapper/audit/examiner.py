@@ -57,7 +57,7 @@ class Examiner:
 
     @property
     def setup(self) -> bytes:
-        """What `prepared` needs to make the same examiner in another process.
+        """The argument with which `prepared` makes the same examiner in another process.
 
         It is bytes, because jobs are compared and arrays have no single answer to ==.
         """

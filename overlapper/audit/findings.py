@@ -1,4 +1,4 @@
-"""What is wrong with a robot by its audit, in sentences: what CI is to stop at."""
+"""The faults that an audit finds in a robot, in sentences. CI fails if there are any."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def findings(audit: Audit, expected: Sequence[Patterns], disabled: Mapping[Names
 
 
 def remarks(robot: Robot) -> list[str]:
-    """What there is to say of how the robot was read."""
+    """Sentences about how the robot was read."""
     links = [(name, link) for name, link in zip(robot.link_names, robot.tree.links)]
     lines = [f"Concave: {name} is {link.concave} convex parts." for name, link in links if link.concave]
     lines += [f"Not modelled: {name}, {link.skipped}." for name, link in links if link.skipped]

@@ -73,7 +73,7 @@ class Kinematics:
 
 
 def _product(a: Numbers, b: Numbers) -> Numbers:
-    """Of quaternions xyzw."""
+    """The product of two quaternions xyzw."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
     return (
@@ -93,7 +93,7 @@ def _matrix(q: Numbers) -> Numbers:
 
 
 def _moved(position: Numbers, matrix: Numbers, vector: Array) -> Numbers:
-    """The position, moved by a vector of which the axes are turned by a matrix."""
+    """The position plus the vector, which the matrix turns first."""
     x, y, z = vector.tolist()
     if not vector.any():
         return position

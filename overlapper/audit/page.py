@@ -57,7 +57,7 @@ def _caption(audited: PairAudit) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Drawn:
-    """What views ask of bodies."""
+    """The bodies, as views are given them."""
 
     keys: list[tuple[int, int, int]]
     placed: list[Placed]

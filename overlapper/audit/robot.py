@@ -49,7 +49,7 @@ class Degree:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """What its columns are called."""
+        """The names of its columns."""
         return tuple(f"{self.name}.{each}" for each in TURN) if self.range == "spherical" else (self.name,)
 
 
@@ -66,7 +66,7 @@ class Robot:
 
     @cached_property
     def link_names(self) -> tuple[str, ...]:
-        """Of each link, distinct: after its body's where there are several, and with its place where two share one."""
+        """A distinct name for each link: after its body if there are several, and with its place if two are equal."""
         links = self.tree.links
         names = [
             f"{self.tree.bodies[link.body]}/{link.name}" * (len(self.tree.bodies) > 1) or link.name for link in links
@@ -99,7 +99,7 @@ class Robot:
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """What the numbers of a configuration are: joints, or parts of their quaternions."""
+        """The names of the numbers of a configuration: joints, or parts of their quaternions."""
         return tuple(column for degree in self.degrees for column in degree.columns)
 
     @property

@@ -74,7 +74,7 @@ def _scenes_in(folder: Path) -> list[Path]:
 
 @dataclass(frozen=True, slots=True)
 class _Held:
-    """What is said of a scene, with the exit code that it deserves, and what the scene itself has said."""
+    """The report on a scene, its exit code, and the output of the scene itself."""
 
     code: int
     lines: list[str]
@@ -107,7 +107,7 @@ def _at_once(scenes: Sequence[Path], out: Path, record: bool, workers: int | Non
 
 
 def prepared(setup: tuple[Path, bool]) -> Callable[[Path], _Held]:
-    """What holds a scene against its expected file in another process."""
+    """The function that compares a scene with its expected file in another process."""
 
     def held(scene: Path) -> _Held:
         with redirect_stderr(io.StringIO()) as talk:

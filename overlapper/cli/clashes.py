@@ -113,7 +113,7 @@ def clashes(
 
 
 def body_facts(body: MeshBody) -> dict[str, Any]:
-    """What stands for a body, as JSON takes it."""
+    """The facts of a body, for JSON."""
     return {
         "name": body.name,
         "way": body.way,

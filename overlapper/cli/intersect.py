@@ -100,7 +100,7 @@ def _hulls(source: str, query: str | None) -> Iterator[Hull]:
 
 
 def _of_meshes(sources: Sequence[str], method: str) -> tuple[dict[str, Any], list[Overlap]]:
-    """What two mesh files share, concave or not, and what pairs of their convex parts do."""
+    """The overlap of two mesh files, concave or not, and the overlaps of the pairs of their convex parts."""
     if method != "auto":
         raise Refused("--concave and --method paper do not go together: that method is for polytopes")
     if len(sources) != 2 or any("://" in source for source in sources):

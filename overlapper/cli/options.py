@@ -1,4 +1,4 @@
-"""What several commands ask for."""
+"""The options that several commands have."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ SetOption = Annotated[
 
 
 def given_parameters(settings: Sequence[str] | None) -> dict[str, str]:
-    """What --set says, by name; Refused if it says nothing, or one thing twice."""
+    """The values of --set by name. Refused if a value is missing or a name is given twice."""
     given: dict[str, str] = {}
     for each in settings or ():
         name, sign, text = each.partition("=")
@@ -90,7 +90,7 @@ ExpectOption = Annotated[
 
 
 def expected_pairs(given: list[str] | None) -> list[tuple[str, str]]:
-    """What --expect was given."""
+    """The pairs given to --expect."""
     from overlapper.audit.allowed import allowed_pair
 
     try:

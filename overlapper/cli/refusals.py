@@ -1,4 +1,4 @@
-"""What the user can mend, as one sentence; and stdout kept for the answer."""
+"""Errors that the user can mend, told in one sentence on stderr. Stdout is kept for the answer."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LIBC = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
 
 
 class Refused(Exception):
-    """What was asked for cannot be done; the message is one sentence for the person who asked."""
+    """The request cannot be carried out. The message is one sentence for the user."""
 
 
 class Interrupted(Exception):
@@ -83,7 +83,7 @@ def quiet() -> Iterator[BinaryIO]:
 
 
 def _tell_of_forces() -> None:
-    """What there is to warn of when forces come from volumes goes to stderr, a sentence each."""
+    """Write the warnings of volumetric contact to stderr, a sentence each."""
     told, others = (NoDirectionWarning, SubstepsWarning), warnings.showwarning
     for category in told:
         warnings.simplefilter("always", category)

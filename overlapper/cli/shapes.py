@@ -85,7 +85,7 @@ def _table(found: Inventory) -> Table:
 
 
 def _remarks(found: Inventory) -> list[str]:
-    """What there is to say below the table."""
+    """The lines below the table."""
     bodies = f"{found.bodies:,} bodies" if found.bodies != 1 else "1 body"
     lines = [
         f"{bodies}, {found.shapes_read:,} of {found.shapes:,} shapes modelled, "

@@ -1,4 +1,4 @@
-"""What a run came to, in words: a line per pair of links, and remarks below."""
+"""The result of a run in words: a line per pair of links, and remarks below."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from overlapper.tables.summary import Summary
 
 
 def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
-    """The `limit` largest pairs, of which there must be one, for a reader who knows nothing of this program.
+    """The `limit` largest pairs, for a reader who knows nothing of this program. There must be at least one pair.
 
     `title` is that of the scene, by default its name.
     """
@@ -48,7 +48,7 @@ def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
 
 
 def remarks(summary: Summary, limit: int = 10) -> list[str]:
-    """What there is to say below the table: what was modelled and what not, and the first `limit` disagreements."""
+    """The lines below the table: what was modelled, what was not, and the first `limit` disagreements."""
     lines = str(summary.report).splitlines() if summary.report else []
     lines += [f"Not modelled: {each.name}, {each.reason}." for each in summary.skipped]
     lines += [_decomposed(each) for each in summary.decomposed]

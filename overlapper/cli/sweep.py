@@ -40,7 +40,7 @@ MOVED_SHOWN = 10
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """What is crossed to the points of a sweep."""
+    """The axes whose product is the points of a sweep."""
 
     grid: list[str] | None
     seeds: int | None
@@ -83,7 +83,7 @@ def axes(
     ] = None,
     sample_seed: Annotated[int, typer.Option(min=0, help="Another one draws other points.")] = 0,
 ) -> Axes:
-    """What is crossed to the points of a sweep."""
+    """The axes whose product is the points of a sweep."""
     if ranges and not sample:
         raise Refused("--range says what --sample draws, and there is no --sample")
     return Axes(grid, seeds, points, sample, ranges, sample_seed)
@@ -228,7 +228,7 @@ def _tell(
     page: Path | None,
     as_json: bool,
 ) -> None:
-    """What became of it, and the exit code."""
+    """Report the result of the sweep, and exit with its code."""
     failures = [row for row in failures if row["task"] in todo.tasks]
     if as_json:
         told = {

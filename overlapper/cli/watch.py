@@ -87,7 +87,7 @@ def watch(
     else:
         sentence = f"{script} asks pybullet for a window, and there is no screen to show it on, so pybullet ends it"
         tell_of_windows(lambda: say(f"overlapper: {sentence}: --direct runs it without one", sys.stderr))
-    # What ends the script is not to be taken for something of ours.
+    # An exception that ends the script must not be mistaken for one of ours.
     return lambda: _run(script, arguments or [], Watches(script.name, files.out, files.html, how), how, as_json)
 
 

@@ -37,7 +37,7 @@ TIMED_OUT = re.compile(r"^Timeout \(\d", re.MULTILINE)  # of faulthandler
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What is done with every item: `prepare`, a function of a module by names, makes it of `setup` in each process.
+    """The function to call with every item. `prepare`, named by module and name, makes it from `setup` in each process.
 
     It must find the same bits of an item in whatever process, after whatever others. Paths are meant from `folder`,
     where there is such a folder.
@@ -51,7 +51,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What was found of an item, in so many seconds."""
+    """The result of an item, and the seconds that it took."""
 
     value: Any
     seconds: float
@@ -59,7 +59,7 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """What became of an item instead, with a sentence and all that is known of where it happened."""
+    """An item without a result: a sentence, and all that is known of where it failed."""
 
     what: Literal["raised", "hung", "died"]
     sentence: str
@@ -108,7 +108,7 @@ def _begun(job: Job) -> str:
 
 def _outcome(call: Callable[[Any], Any], item: Any, limit: float | None) -> Outcome:
 
-    # What the process has written of earlier items would be taken for words about this one.
+    # The process's output about earlier items would be mistaken for output about this one.
     sys.stderr.flush()
     os.ftruncate(2, 0)
     os.lseek(2, 0, os.SEEK_SET)
@@ -135,7 +135,7 @@ class Hand:
         self._closed = False
 
     def work(self, items: Sequence[Any]) -> Iterator[Outcome]:
-        """What becomes of each item, in their order; of the first ones if the hand is closed meanwhile."""
+        """The outcome of each item, in order. If the hand is closed meanwhile, those of the first items."""
         left = deque(items)
         tries = 0
         while left and not self._closed:

@@ -34,7 +34,7 @@ class Shares:
             return share
 
     def give_back(self, numbers: Sequence[int]) -> None:
-        """What was taken and not done."""
+        """Return items that were taken and not done."""
         with self._lock:
             self._back.extend(numbers)
 

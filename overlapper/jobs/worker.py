@@ -24,7 +24,7 @@ from overlapper.printable import first_line
 
 START_LIMIT = 60.0  # s, for a new Python to import a module on a machine that is busy
 
-# What C++ and Python say of an exception that nothing catches.
+# The messages of C++ and Python for an uncaught exception.
 UNCAUGHT = r"what\(\): *(.*)|^(\w*(?:Error|Exception): .*)"
 
 END = object()

@@ -223,7 +223,7 @@ def _sliced(slices: Callable[[Tube, Polytope], Slices], tube: Tube, polytope: Po
 
 def is_within(between: fmpq, small: fmpq, large: fmpq) -> bool:
     """Whether a circle is in another, by the squares of the distance of the centres and of the radii: d + r <= R."""
-    # d² + r² - R² <= -2 d r, of which the left side must not be positive.
+    # This is d² + r² - R² <= -2 d r. The right side is not positive, so the left side must not be positive.
     excess = between + small - large
     return small <= large and excess <= 0 and excess * excess >= 4 * between * small
 

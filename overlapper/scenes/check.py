@@ -18,7 +18,7 @@ from overlapper.verdicts.verdict import Verdict, examine
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a scene; `lines` say more, `causes` has a word for each of geometry, shapes and dynamics.
+    """The result of checking a scene. `lines` say more; `causes` has a word for each of geometry, shapes and dynamics.
 
     "new": there was nothing recorded, now there is. "recorded": it was recorded because that was asked for.
     """

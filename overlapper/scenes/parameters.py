@@ -17,7 +17,7 @@ TRUTHS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0"
 
 
 def _whole(text: str) -> int:
-    """Of those that a table can hold."""
+    """An integer that a table can hold."""
     if not -(2**63) <= (value := int(text)) < 2**63:
         raise ValueError
     return value
@@ -29,14 +29,14 @@ def _finite(text: str) -> float:
     return value
 
 
-# What values of each kind are called, and how they are read: by KeyError or ValueError they are none.
+# The name of the values of each kind, and their reader. It raises KeyError or ValueError for invalid text.
 READERS: dict[type, tuple[str, Callable[[str], Parameter]]] = {
     bool: ("true or false", lambda text: TRUTHS[text.strip().lower()]),
     int: ("a whole number of 64 bits", _whole),
     float: ("a finite number", _finite),
 }
 
-# Of the heading of a table: "set mass: 2.0".
+# Before the name of a parameter in the heading of a table: "set mass: 2.0".
 HEADING = "set "
 
 
@@ -73,7 +73,7 @@ def value_of(name: str, text: str, default: Parameter) -> Parameter:
 
 
 def values_of(given: Mapping[str, str], defaults: Mapping[str, Parameter], scene: str) -> dict[str, Parameter]:
-    """All parameters, those given as text and the rest as they are by default. ValueError names one that is none."""
+    """All parameters: those given as text, and the defaults of the rest. ValueError names an invalid one."""
     for name in given:
         known(name, defaults, scene)
     return {**defaults, **{name: value_of(name, text, defaults[name]) for name, text in given.items()}}
@@ -85,7 +85,7 @@ def described(parameters: Mapping[str, Parameter]) -> str:
 
 
 def heading_of(parameters: Mapping[str, Parameter]) -> dict[str, str]:
-    """What the heading of a table says of them."""
+    """The parameters as lines of the heading of a table."""
     return {f"{HEADING}{name}": str(value) for name, value in parameters.items()}
 
 

@@ -32,7 +32,7 @@ View = Frame[AnyBodies] | Frame[Still]
 
 @dataclass
 class Playback:
-    """What there is to see: `views`, as many as `total`; when they are through, `remarks` has what is to be said.
+    """The frames to show: `views`, as many as `total`. After the last one, `remarks` has the closing remarks.
 
     `sparse` views are few steps of many, each worth a look.
     """
@@ -103,7 +103,7 @@ def _held_against(
     try:
         asking, modelling = read_settings(Asking, metadata), read_settings(Modelling, metadata)
     except ValueError as error:
-        raise ValueError(f"{path} has a setting that is none: {error}") from error
+        raise ValueError(f"{path} has an invalid setting: {error}") from error
     contact: Any = metadata.get("contact")
     for frame in run(scene, playback.total, asking, modelling, None if contact == "None" else contact):
         where = frame.step, frame.time, frame.bodies

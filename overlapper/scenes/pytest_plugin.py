@@ -72,7 +72,7 @@ class SceneItem(pytest.Item):
             raise SceneMoved("\n".join(lines + again * (outcome.word == "moved")))
 
     def _tell(self, outcome: Outcome) -> None:
-        """What --junitxml keeps, and the end of the run prints, also of what passed and of other processes."""
+        """Keep the outcome for --junitxml and the end of the run, also for passed tests and from other processes."""
         self.user_properties += outcome.causes.items()
         remarks = [f"note: {note}" for note in outcome.notes] + outcome.lines * (outcome.word == "recorded")
         self.user_properties += [(PROPERTY, f"{outcome.name}: {remark}") for remark in remarks]

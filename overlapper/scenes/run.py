@@ -71,7 +71,7 @@ def _built(scene: Scene, simulation: Simulation) -> Step | None:
     try:
         named(scene.names)
     except ValueError as error:
-        raise SceneError(f"{scene.path} has NAMES that are none: {error}") from error
+        raise SceneError(f"{scene.path} has invalid NAMES: {error}") from error
     if step is not None and not callable(step):
         raise SceneError(f"build(client) of {scene.path} must return None or a function step(i), not {step!r}")
     return step
@@ -81,7 +81,7 @@ def _volumetric(scene: Scene, bodies: AnyBodies) -> VolumetricContact:
     try:
         return VolumetricContact(bodies, **scene.volumetric)
     except ValueError as error:
-        raise SceneError(f"{scene.path} has a CONTACT that is none: {error}") from error
+        raise SceneError(f"{scene.path} has an invalid CONTACT: {error}") from error
 
 
 def _controlled(scene: Scene, step: Step | None, i: int) -> None:

@@ -48,7 +48,7 @@ class Facts(Protocol):
     def __init__(self, shape: Any) -> None: ...
 
     def parameters(self) -> list[float | Floats]:
-        """The values of which its class makes the same shape."""
+        """The arguments with which its class makes the same shape."""
 
     def words(self) -> tuple[str, str, int]:
         """Its kind, its dimensions in m, and the number of its corners, 0 for all but hulls, as an inventory lists."""

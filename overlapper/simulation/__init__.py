@@ -50,7 +50,7 @@ __all__ = [
     "link_contacts",
 ]
 
-# Imported when asked for: pybullet says on import when it was built, and there is more in here than needs it.
+# These names are imported when they are asked for. pybullet prints its build time on import, and not all need it.
 __getattr__ = lazily(
     __name__,
     {

@@ -130,11 +130,11 @@ class AnyBodies:
         return [(links[a], links[b]) for a, b in self._pairs.colliders(asked, self._rules).tolist()]
 
     def mechanics(self) -> Mechanics:
-        """What applies forces to the bodies. ValueError if their simulator takes none."""
+        """The interface that applies forces to the bodies. ValueError if their simulator takes none."""
         return self._source.mechanics()
 
     def close(self) -> None:
-        """Leave the simulation as it was found. What was read stays; no update follows."""
+        """Leave the simulation as it was found. The bodies read so far stay; they cannot be updated any more."""
         self._source.close()
 
     def __repr__(self) -> str:
@@ -197,7 +197,7 @@ class AnyBodies:
 
     @property
     def skipped(self) -> list[Skipped]:
-        """What is not modelled, one entry per body and link."""
+        """The shapes that are not modelled, one entry per body and link."""
         skipped = [each for body in self._source.bodies.values() for each in body.skipped]
         return [*skipped, *self._source.skipped, *(self._lost(id) for id in sorted(self._nowhere))]
 
@@ -230,7 +230,7 @@ class AnyBodies:
             warnings.warn(message, SkippedShapeWarning, stacklevel=stacklevel)
 
     def _asked_for(self, pairs: Iterable[tuple[Who | str, Who | str]]) -> list[tuple[Who, Who]]:
-        """The pairs of a list, by numbers. What has been here before comes out as it went in."""
+        """The pairs of a list, by numbers. Pairs that are numbers already stay as they are."""
         return [(self._who(a), self._who(b)) for a, b in listed(pairs)]
 
     def _who(self, named: Who | str) -> Who:

@@ -1,4 +1,4 @@
-"""What a sweep came to, over its parameters: lines and heat maps, as SVG to stand in a page."""
+"""The results of a sweep over its parameters: lines and heat maps, as SVG to stand in a page."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ MEASURES = (
     Measure("mean_force_m2", "mean force per pressure, mm²", 1e6),
 )
 
-# Of volumetric contact.
+# The measure of volumetric contact.
 FORCE = Measure("largest_force_n", "largest force, N", 1.0)
 
 
@@ -53,7 +53,7 @@ class Axis:
 
 
 def axis(name: str, values: Sequence[Any]) -> Axis:
-    """The axis of a parameter with these values, of which there are at least two."""
+    """The axis of a parameter with these values. There are at least two."""
     kinds = sorted(set(values))
     if not isinstance(kinds[0], float | int) or isinstance(kinds[0], bool):
         at = {value: k for k, value in enumerate(kinds)}
@@ -134,7 +134,7 @@ def _figure(width: float, height: float) -> Any:
 
 
 def _svg(figure: Any) -> str:
-    """As an element of a page, of which equal figures are equal."""
+    """The figure as an element of a page. Equal figures give equal text."""
     import matplotlib
 
     file = io.StringIO()

@@ -24,7 +24,7 @@ from overlapper.verdicts.expected import FORCES, ROUNDING, Budget, budgets_in
 Row = Mapping[str, Any]
 Key = tuple[Parameter, ...]
 
-# What is compared, each with the quantity whose budget holds for it.
+# The measures compared, each with the quantity whose budget holds for it.
 BUDGETED = {"largest_volume_m3": "volume", "mean_volume_m3": "volume", "largest_depth_m": "depth"}
 BUDGETED |= {"largest_force_n": "force"}  # of volumetric contact alone
 FORCE, CONTACT, TASK_ITSELF = "mean_force_m2", "contact_time_s", "task"
@@ -142,7 +142,7 @@ class Recorded:
         return tuple(float(f"{value:.12g}") if isinstance(value, float) else value for value in values)
 
     def compare(self, store: Store) -> Comparison:
-        """What has become of the tasks that are in both, as far as the sweep has come in its store."""
+        """The comparison of the tasks that both sweeps have, as far as the sweep has come in its store."""
         names = self._sweep.tasks.keys()
         rows = [row for table in (TASKS, FAILURES) for row in store.rows(table) if row[TASK] in names]
         found = self._by_point(rows, "this sweep")

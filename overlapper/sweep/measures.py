@@ -35,7 +35,7 @@ MEASURES: dict[str, type] = {
     "deepestB": str,
 }
 
-# What volumetric contact adds: the largest force between two links.
+# The columns of volumetric contact: the largest force between two links.
 FORCES: dict[str, type] = {"largest_force_n": float, "hardest_step": int, "hardestA": str, "hardestB": str}
 
 

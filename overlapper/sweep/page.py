@@ -43,7 +43,7 @@ def write(
     pages: int = 0,
     comparison: Comparison | None = None,
 ) -> Path:
-    """Write the summary of the tasks of a sweep that are done, of which there is one; returns where.
+    """Write the summary of the tasks of a sweep that are done, at least one; returns where.
 
     `scene` is the name or path that commands give to it. Of the `pages` worst tasks the pages are written, too. With a
     `comparison`, it shows what has moved.
@@ -95,7 +95,7 @@ def _show(sweep: Sweep, row: Row, place: Path) -> None:
 
 
 def command(sweep: Sweep, scene: str, row: Row, place: Path) -> str:
-    """What writes the page of a task, as a shell takes it."""
+    """The shell command that writes the page of a task."""
     study, settings = sweep.study, sweep.study.settings
     defaults = study.loaded()
     words = [f"--set={name}={row[name]}" for name, value in defaults.parameters.items() if row[name] != value]
@@ -132,7 +132,7 @@ def _worst(sweep: Sweep, store: Store, scene: str, worst: Sequence[Row]) -> str:
 
 
 def _moved(sweep: Sweep, comparison: Comparison) -> Iterable[str]:
-    """What has moved since another sweep: how much of it, where over the parameters, and the worst tasks."""
+    """The changes since another sweep: how many, where over the parameters, and the worst tasks."""
     first, *more = comparison.lines(0)
     said = " ".join([first, *(line for line in more if not line.startswith(" "))])
     yield f"<h2>What has moved</h2><p>{html.escape(said)}</p>"

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 TASK = "task"
 TASKS, STEPS, FAILURES = "tasks", "steps", "failures"
 
-# What is said of a task that failed: in how many words of ours, and in its own.
+# The columns of a task that failed: our word and sentence, and its own traceback.
 FAILED: dict[str, type] = {"what": str, "sentence": str, "traceback": str}
 
 OF: dict[str, Mapping[str, type]] = {TASKS: MEASURES, STEPS: COLUMNS, FAILURES: FAILED}
 
-# What volumetric contact adds to them.
+# The columns that volumetric contact adds to them.
 FORCES_OF: dict[str, Mapping[str, type]] = {TASKS: FORCES, STEPS: FORCE_COLUMNS, FAILURES: {}}
 
 
@@ -68,7 +68,7 @@ def part(
     pyarrow.parquet.write_table(
         filled,
         file,
-        # Of a single row, all that makes a table small makes it larger, and takes a millisecond.
+        # Compressing a single row makes the file larger, and takes a millisecond.
         compression="zstd" if many else "none",
         use_dictionary=many,
         write_statistics=many,

@@ -98,7 +98,7 @@ class Store:
     def _put(self, data: bytes, place: str) -> None:
         """Without waiting for the disk, which takes longer than many a task: a power cut may leave half of what is
         seconds old, as a kill does not, and then it is done again."""
-        # As few calls of the system as can be, of which a file object would add four.
+        # A file object would add four system calls.
         file = os.open(self._begun, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
         try:
             unwritten = memoryview(data)

@@ -1,4 +1,4 @@
-"""What all tasks of a sweep have in common, and what a task is called."""
+"""The settings that all tasks of a sweep share, and the name of a task."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ Parts = dict[str, bytes]
 
 
 def prepared(study: Study) -> Callable[[Task], Parts]:
-    """What runs the tasks of a study. ValueError where this package or pybullet is of another version."""
+    """The function that runs the tasks of a study. ValueError where this package or pybullet is of another version."""
     here = origin()
     if here != dict(study.versions):
         raise ValueError(f"the sweep is of {_said(study.versions)}, but here is {_said(here)}")

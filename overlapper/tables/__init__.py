@@ -1,1 +1,1 @@
-"""What a simulation leaves behind: its frames as tables in files, pages and summaries."""
+"""The results of a simulation: its frames as tables in files, pages and summaries."""

@@ -1,4 +1,4 @@
-"""What a run leaves: a table, a page and a summary, of its frames as they come; of scenes and of scripts alike."""
+"""The outputs of a run: a table, a page and a summary, written frame by frame, for scenes and for scripts."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ COLUMNS: dict[str, type] = {
     "fcl_explanation": str,
 }
 
-# What a run with volumetric contact has beside: nothing of a pair that it does not push apart.
+# The further columns of a run with volumetric contact. They are empty for a pair that it does not push apart.
 FORCES: dict[str, type] = dict.fromkeys(FORCE_COLUMNS, float)
 
 

@@ -42,7 +42,7 @@ DENSEST = 4
 
 
 def origin() -> dict[str, str]:
-    """What wrote a table: the versions of this package and, if it is there, of pybullet."""
+    """The programs that wrote a table: the versions of this package and, if it is there, of pybullet."""
     try:
         simulator = {"pybullet": version("pybullet")}
     except PackageNotFoundError:
@@ -52,7 +52,7 @@ def origin() -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """What is in a table: its metadata by name, its rows, and the comments of a CSV file.
+    """The content of a table: its metadata by name, its rows, and the comments of a CSV file.
 
     A comment is the text of a line behind its #, with the number of rows above that line.
     """
@@ -318,7 +318,7 @@ class ParquetTable:
 
 @contextmanager
 def _named(path: Path, *kinds: type[Exception]) -> Iterator[None]:
-    """What a library says of a file that it cannot write, as an OSError with the file's name and a reason."""
+    """Turn a library's error about a file that it cannot write into an OSError with the file's name and a reason."""
     try:
         yield
     except OSError as error:

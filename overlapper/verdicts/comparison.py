@@ -1,4 +1,4 @@
-"""What moved between two tables of the same scene: in which step, of which pair, which quantity, and by how much."""
+"""The changes between two tables of a scene, each with its step, its pair, its quantity and its size."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def compare_poses(
         step, shape = k
         who = shape_label(shape, names)
         differences = {"position": 0.0, "orientation": 0.0}
-        # What has no pose, as a link of many shapes, or one that is not a number, has none on both sides.
+        # A link of many shapes has no pose. A pose that is missing or not a number on both sides is equal.
         if not np.array_equal(old[k], new[k], equal_nan=True):
             differences["position"] = float(np.linalg.norm(new[k][:3] - old[k][:3]))
             differences["orientation"] = _angle(old[k][3:], new[k][3:])
@@ -205,7 +205,7 @@ def _number(row: Row, column: str) -> float:
 
 
 def off_by(was: float, now: float) -> float:
-    """Of a measure; what is not a number differs from every number, and not from itself."""
+    """The change of a measure. Not-a-number differs from every number, and not from itself."""
     return 0.0 if was == now or (math.isnan(was) and math.isnan(now)) else abs(now - was)
 
 

@@ -1,4 +1,4 @@
-"""What was recorded of a scene: the file, and how far a quantity may be from it.
+"""The recording of a scene: the file, and how far a quantity may be from it.
 
 An expected file is a CSV table. It has the shapes, the poses and the measures of some steps of a scene, so that each
 can be told from the others when something has moved.
@@ -24,8 +24,8 @@ from overlapper.tables.table_file import Content, CsvTable, read_content
 # How a comment begins that has shapes: the (body, link, shape) that have it, and the shape as text.
 SHAPES = "shapes "
 
-# A shape that meets no other has a row with the status "alone", of which the columns of B and the measures are empty,
-# so that every shape of a step is placed, and a pair out of nothing is noticed.
+# A shape that meets no other has a row with the status "alone". Its columns of B and its measures are empty. By this
+# row every shape of a step has its pose, and a new pair is noticed.
 EXPECTED_COLUMNS = [name for name in COLUMNS if name not in ("time_s", "nameA", "nameB", "fcl", "fcl_explanation")]
 
 
@@ -69,13 +69,13 @@ DRIFT = {"position": Budget(0.0, 1e-4), "orientation": Budget(0.0, 1e-3)}
 # next to nothing, what a gram weighs, on an arm of a centimetre and over a tenth of a millimetre.
 FORCES = {"force": Budget(0.01, 0.01), "torque": Budget(0.01, 1e-4), "energy": Budget(0.01, 1e-6)}
 
-# What is told of the overlaps when bodies are elsewhere, or are others: changes of a hundredth.
+# When bodies have moved or are others, changes of the overlaps are told from a hundredth on.
 HUNDREDTHS = {"volume": Budget(0.01, 0.0), "depth": Budget(0.01, 0.0)}
 
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What was recorded of a scene in some of its `steps`, at `tolerance`, and the budget of each quantity.
+    """The recording of a scene in some of its `steps`, at `tolerance`, and the budget of each quantity.
 
     `rows` are the overlaps of those steps. `stills` are the shapes and poses, by step.
     """
@@ -124,7 +124,7 @@ def read_expected(path: Path) -> Expected:
 
 
 def expected_in(content: Content, path: Path) -> Expected:
-    """What the file at `path` has, once it has been read. ValueError if it is no expected file."""
+    """The expected values in the content of the file at `path`. ValueError if it is no expected file."""
     steps, tolerance = (content.metadata.get(name, "") for name in ("steps", "tolerance"))
     if not (re.fullmatch(r"[\d ]*\d", steps, re.ASCII) and re.fullmatch(r"[-+.e\d]+", tolerance, re.ASCII)):
         raise ValueError(f"{path} must say `# steps: <numbers>` and `# tolerance: <number>` in its first lines")

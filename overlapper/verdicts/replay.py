@@ -16,7 +16,7 @@ ASIDES = ((0.3, 0.7, 0.1), (-0.2, 0.4, 0.9), (0.6, -0.5, -0.3))
 
 
 def wanted(last_step: int, forces: bool) -> Expected:
-    """What is recorded of a scene that has no expected file: four steps, with the budgets of any scene."""
+    """The steps and budgets to record for a scene without an expected file: four steps, and the default budgets."""
     steps = sorted({max(last_step * quarter // 4, 1) for quarter in (1, 2, 3, 4)})
     return Expected(steps, 1e-3, ROUNDING | DRIFT | (FORCES if forces else {}))
 

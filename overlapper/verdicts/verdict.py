@@ -1,4 +1,4 @@
-"""What has moved in a scene since it was recorded.
+"""The changes in a scene since it was recorded.
 
 Three things may move, and are told apart. The geometry is ours: the shapes and poses recorded, measured again. The
 shapes are the models', as they are read today. The dynamics are the simulator's: where it puts the shapes today.
@@ -28,7 +28,7 @@ from overlapper.verdicts.replay import measured, replay, rounding
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What has moved in a scene since it was recorded, by cause.
+    """The changes in a scene since it was recorded, by cause.
 
     `geometry`: overlaps of the shapes and poses recorded, measured by today's package. `shapes`: shapes as today's
     simulation has them. `dynamics`: poses of today's simulation, and forces of volumetric contact. `overlaps`: what has

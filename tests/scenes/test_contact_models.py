@@ -64,7 +64,7 @@ def test_an_unknown_contact_model_is_refused(scene):
     for each in ("'soft'", "{'mass': 1}"):
         with pytest.raises(SceneError, match=rf"cube\.py has CONTACT = {each}, {either}"):
             scene(f"CONTACT = {each}")
-    with pytest.raises(SceneError, match=r"cube\.py has a CONTACT that is none: stiffness must be a number Pa/m"):
+    with pytest.raises(SceneError, match=r"cube\.py has an invalid CONTACT: stiffness must be a number Pa/m"):
         next(run(scene("CONTACT = {'stiffness': 0}")))
 
 

@@ -80,7 +80,7 @@ def test_a_run_can_be_shorter_than_the_scene_or_show_some_steps_of_it(scene_file
         ("STEPS = 5\nNAMES = ['duck']\ndef build(client): pass", r"NAMES = \['duck'\], which must be a dictionary"),
         (
             "STEPS = 5\nNAMES = {}\ndef build(client): NAMES['duck'] = 1",
-            r"has NAMES that are none: names must have names by the numbers of bodies, such as .*, not 'duck': 1",
+            r"has invalid NAMES: names must have names by the numbers of bodies, such as .*, not 'duck': 1",
         ),
         ("STEPS = 5\ndef build(client:", "cannot be loaded at line 2: SyntaxError"),
         (

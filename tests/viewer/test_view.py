@@ -143,7 +143,7 @@ def test_an_expected_file_is_viewed_without_its_scene(scene_file):
         (
             "odd.csv",
             {"scene": "press.py"},
-            "odd.csv has a setting that is none: could not convert string to float: 'x'",
+            "odd.csv has an invalid setting: could not convert string to float: 'x'",
         ),
         ("press.py", {"scene": "press.py"}, "--scene is for tables, and press.py is none"),
         ("press.py", {"live": True, "host": "192.0.2.1"}, "host must be an address of this machine, not '192.0.2.1': "),

@@ -49,7 +49,7 @@ class ListedLink:
 
 @dataclass(frozen=True, slots=True)
 class Inventory:
-    """What `Bodies` makes of a file. `pairs` counts the pairs of shapes that the simulator lets collide."""
+    """The bodies and shapes in a file. `pairs` counts the pairs of shapes that the simulator lets collide."""
 
     bodies: int
     shapes: int
@@ -70,7 +70,7 @@ class Inventory:
 
 
 def inventory(path: Path, self_collision: bool = False, modelling: Modelling = Modelling()) -> Inventory:  # noqa: B008
-    """What is modelled of a URDF, SDF, MJCF or .bullet file.
+    """The inventory of a URDF, SDF, MJCF or .bullet file.
 
     With `self_collision` a URDF or MJCF model is loaded with pybullet's URDF_USE_SELF_COLLISION. NotRead if the file is
     not there, or pybullet refuses it or dies of it.

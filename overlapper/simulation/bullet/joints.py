@@ -78,7 +78,7 @@ def _read(path: Path, modelling: Modelling) -> KinematicTree:
 
 
 def _joints(client: int, id: int, name: str) -> list[Joint]:
-    """What ties the base to the world where it was loaded, and the joints of a body.
+    """The joint that ties the base to the world where it was loaded, and the joints of a body.
 
     NotRead if pybullet does not tell where its links are.
     """

@@ -15,7 +15,7 @@ ENDINGS = (".urdf", ".sdf", ".xml", ".bullet")
 
 
 class NotRead(Exception):
-    """A file of which pybullet makes nothing; the message is one sentence."""
+    """pybullet cannot read a file. The message is one sentence."""
 
 
 def read_apart(

@@ -178,7 +178,7 @@ class VolumetricContact:
         return self._found
 
     def mean(self) -> Forces:
-        """What the bodies share now, with the mean of force and torque over the last step: what moved them in it.
+        """The overlaps now, with the mean of force and torque over the last step, which moved the bodies in it.
 
         Forces of single substeps go up and down about it, as motors do. `slip` is of the end of the step. What has
         pressed and parted within the step is not among the rows; what has come at its very end has no force yet.
@@ -212,7 +212,7 @@ class VolumetricContact:
 
     @property
     def contacts(self) -> Contacts:
-        """What the bodies share, a row for each pair of shapes."""
+        """The overlaps, a row for each pair of shapes."""
         return self._found.contacts
 
     @property

@@ -48,7 +48,7 @@ def _work(a: Placed, b: Placed, normal: Array, way: float) -> float:
         positions = np.concatenate([a.position + way * NODES[:, None] * normal, [b.position]])
         volumes = overlaps(shapes, positions, orientations, pairs).volume
         apart = np.flatnonzero(volumes == 0)
-        # What is shared may be longer than deep: nodes where nothing is shared any more say less than they might.
+        # The overlap may end before the last node. Nodes without an overlap add nothing to the accuracy.
         if not 0 < len(apart) < len(NODES):
             return float(way * (WEIGHTS @ volumes))
         way *= float(NODES[apart[0]])

@@ -16,9 +16,9 @@ from overlapper.simulation.model import Array
 
 @dataclass(frozen=True, eq=False)
 class Forces(Tabular):
-    """What pairs of shapes that share a volume do to each other, a row for each pair, in SI units and the world.
+    """Forces between overlapping pairs of shapes, a row for each pair, in SI units and the world frame.
 
-    `contacts` is what they share. `force` (p, 3) in N acts on the first of each pair at `centre`, and `torque` (p, 3)
+    `contacts` are their overlaps. `force` (p, 3) in N acts on the first of each pair at `centre`, and `torque` (p, 3)
     in N m about it: of pressures that change, and of friction that resists a spin; the opposite acts on the second.
     `slip` (p, 3) in m/s is the velocity of the first over the second at `centre`, along the patch, at the end of the
     step. `normal` (p, 3) is the direction of the pressures, unit, from the second to the first; where `directed` (p,)
