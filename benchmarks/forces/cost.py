@@ -21,7 +21,6 @@ from typing import Any
 
 import pybullet as p
 
-from forces import physics
 from harness import results
 from harness.timing import Stopwatch, on_one_processor, timed
 from overlapper import _core
@@ -29,6 +28,7 @@ from overlapper.simulation import Bodies, VolumetricContact
 from overlapper.simulation.bullet.dynamics import BulletDynamics
 
 RESULTS = results.of_machine("forces_cost.csv")
+PAGE = "forces.page"
 G = 9.81
 COLUMNS = ("scene", "part", "us")
 PILE = "pile of 200 boxes"
@@ -169,9 +169,3 @@ def measure(_: Namespace, path: Path) -> None:
     rows = [(scene, part, f"{us:.4g}") for scene, part, us in measured()]
     with results.writing(path, COLUMNS, results.today()) as write:
         write(rows)
-
-
-def write_page(path: Path, folder: Path) -> Path:
-    from forces import page
-
-    return page.write_page(physics.RESULTS, folder, path)

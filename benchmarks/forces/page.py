@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from forces import cost, physics
 from forces.cost import PARTS, PILE
 from forces.physics import LAWS
 from harness import figures, results
@@ -233,9 +234,10 @@ def cost_table(path: Path) -> str:
     return f"{said}\n\n{fill(told, 130)}\n\n    {note}"
 
 
-def write_page(physics: Path, folder: Path, cost: Path) -> Path:
-    """forces.md, with its pictures, from the figures in `physics` and the times in `cost`."""
-    of = Figures.read(physics)
+def write_page(path: Path, folder: Path) -> Path:
+    """forces.md, with its pictures, from the figures or times in `path` and the others of the checkout."""
+    laws, times = (path if path.name == each.name else each for each in (physics.RESULTS, cost.RESULTS))
+    of = Figures.read(laws)
     for draw in (draw_energy, draw_friction, draw_bodies):
         figures.style(**{"font.size": 9})
         draw(of, folder / f"forces_{draw.__name__.removeprefix('draw_')}.png")
@@ -247,9 +249,9 @@ def write_page(physics: Path, folder: Path, cost: Path) -> Path:
     return write(
         Path(__file__).with_name("page.md"),
         folder / "forces.md",
-        results=named(physics),
+        results=named(laws),
         table=physics_table(of),
-        cost=cost_table(cost),
+        cost=cost_table(times),
         face_1=f"{100 * face['1']:.0f}",
         face_4=f"{100 * face['4']:.1f}",
         face_16=f"{100 * face['16']:.2f}",

@@ -25,6 +25,7 @@ from overlapper import Box, Placed, overlap
 from overlapper.simulation import SubstepsWarning
 
 RESULTS = results.FOLDER / "forces.csv"
+PAGE = "forces.page"
 LAWS = ("volumetric", "bullet")
 SUBSTEPS = (1, 2, 4, 8, 16, 32, 64)
 FEW = (1, 4, 20)
@@ -184,9 +185,3 @@ def measure(_: Namespace, path: Path) -> None:
             print(f"{part.__name__}: measured", flush=True)
     with results.writing(path, Row._fields) as write:
         write((*row[:-1], f"{row.value:.10g}") for row in rows)
-
-
-def write_page(path: Path, folder: Path) -> Path:
-    from forces import cost, page
-
-    return page.write_page(path, folder, cost.RESULTS)

@@ -2,7 +2,7 @@
 
 A benchmark is a module with a docstring and `main(chosen)`, and with `options(parser)` if it has options. If it
 measures what a page shows, it has in place of `main`: `RESULTS`, the results file, `measure(chosen, path)`, which
-writes it, and `write_page(path, folder)`, if the benchmark has a page of its own.
+writes it, and `PAGE`, if the benchmark has a page: the module whose `write_page(path, folder)` writes it.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def parser_of(name: str, module: ModuleType) -> ArgumentParser:
         module.options(parser)
     if hasattr(module, "measure"):
         parser.add_argument("--out", type=Path, help="folder for results and page, by default those of the checkout")
-    if hasattr(module, "write_page"):
+    if hasattr(module, "PAGE"):
         parser.add_argument("--page", action="store_true", help="only write the page, from the results there are")
     return parser
 
@@ -76,8 +76,8 @@ def run(module: ModuleType, chosen: Namespace) -> int:
         path.parent.mkdir(parents=True, exist_ok=True)
         module.measure(chosen, path)
         print(f"Written: {path}")
-    if hasattr(module, "write_page"):
+    if hasattr(module, "PAGE"):
         folder = chosen.out or ROOT / "docs"
         folder.mkdir(parents=True, exist_ok=True)
-        print(f"Written: {module.write_page(path, folder)}")
+        print(f"Written: {import_module(module.PAGE).write_page(path, folder)}")
     return 0

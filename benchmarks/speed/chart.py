@@ -28,6 +28,7 @@ from speed.turns import Row, rows_of
 from speed.workloads import FAMILIES, MORE, pairs_of
 
 RESULTS = results.of_machine("speed.csv")
+PAGE = "speed.page"
 
 
 def options(parser: ArgumentParser) -> None:
@@ -60,9 +61,3 @@ def measure(chosen: Namespace, path: Path) -> None:
     ):
         for claim in CLAIMS:
             write(map(astuple, process.submit(claim, chosen.seconds / 8).result()))
-
-
-def write_page(path: Path, folder: Path) -> Path:
-    from speed.page import write_page
-
-    return write_page(path.parent, folder)

@@ -66,8 +66,8 @@ def results_in(folder: Path) -> Results:
     return Results(str(named(folder)), notes, *made, there["steps"], there["round"])
 
 
-def write_page(measured: Path, folder: Path) -> Path:
-    found = results_in(measured)
+def write_page(path: Path, folder: Path) -> Path:
+    found = results_in(path.parent)
     start()
     at_hand = {row.family for row in found.rows}
     families = [name for name in FAMILIES if name in at_hand]

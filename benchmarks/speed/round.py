@@ -49,6 +49,7 @@ from overlapper.scenes.scene import load_scene
 from overlapper.simulation import Bodies, SkippedShapeWarning
 
 RESULTS = results.of_machine("round.csv")
+PAGE = "speed.round_page"
 
 PAIRS, ROUNDS = 200, 5  # of each class, and how often each pair is asked
 ENCLOSED = 4  # a pair that is enclosed by planes takes milliseconds: of such classes, so many times fewer
@@ -342,9 +343,3 @@ def measure(chosen: Namespace, path: Path) -> None:
     found = list(measured(chosen.pairs, chosen.rounds))
     with results.writing(path, COLUMNS, results.today()) as write:
         write((*names, f"{value:.4g}") for *names, value in found)
-
-
-def write_page(path: Path, folder: Path) -> Path:
-    from speed.round_page import write_page
-
-    return write_page(path, folder)

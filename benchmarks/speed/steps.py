@@ -30,6 +30,7 @@ from overlapper import Batch, overlap
 from overlapper.simulation import Bodies
 
 RESULTS = results.of_machine("steps.csv")
+PAGE = "speed.steps_page"
 
 PILES = (50, 100, 200, 500, 1000, 2000, 5000)
 KINDS = ("jenga/jenga.urdf", "block.urdf", "domino/domino.urdf", "cube_small.urdf", "lego/lego.urdf")
@@ -163,12 +164,6 @@ def measure(chosen: Namespace, path: Path) -> None:
             finally:
                 p.disconnect(steps.client)
             print(summary(steps), flush=True)
-
-
-def write_page(path: Path, folder: Path) -> Path:
-    from speed.steps_page import write_page
-
-    return write_page(path, folder)
 
 
 def summary(steps: Steps) -> str:

@@ -27,6 +27,7 @@ from paper.steps import lost_at, lost_given_a_point, volume_without_exact_signs
 from stability.judging import RIGHT, Question, distance_column, distance_verdict, failed, verdict
 
 RESULTS = results.FOLDER / "stability.csv"
+PAGE = "stability.page"
 
 TIME_LIMIT = 10.0  # s, for a question
 
@@ -66,12 +67,6 @@ def measure(chosen: Namespace, path: Path) -> None:
     for name, step in (("given a point", given_a_point), ("and by qhull", by_qhull)):
         table.fill(name, [step(question) if fit else NOT_ASKED for question, fit in zip(asked, solid)])
     table.write(path, f"seed {chosen.seed}; {results.packages()}")
-
-
-def write_page(path: Path, folder: Path) -> Path:
-    from stability.page import write_page
-
-    return write_page(path, folder)
 
 
 def questions(seed: int, count: int) -> list[Question]:

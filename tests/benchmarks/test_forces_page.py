@@ -11,7 +11,7 @@ from overlapper.simulation import Bodies
 
 
 def test_the_page_is_what_was_measured(tmp_path):
-    page = forces_page.write_page(physics.RESULTS, tmp_path, tmp_path / "none.csv").read_text(encoding="utf-8")
+    page = forces_page.write_page(tmp_path / cost.RESULTS.name, tmp_path).read_text(encoding="utf-8")
     assert "$" not in page and "They were not measured yet." in page
     assert page.count("\n| ") == 24
     for name in ("energy", "friction", "bodies"):
