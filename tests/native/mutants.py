@@ -82,8 +82,12 @@ class Mutant:
 
     @property
     def name(self) -> tuple[str, str, str]:
-        """The mutant without its line number, which changes with the file."""
-        return self.file, self.before.strip(), self.after.strip()
+        """The mutant without its line number and the line's comment, which change with the file."""
+        return self.file, code_of(self.before), code_of(self.after)
+
+
+def code_of(line: str) -> str:
+    return line.partition(" //")[0].strip()
 
 
 def mutants_of(file: str, text: str) -> list[Mutant]:

@@ -58,7 +58,7 @@ Overlaps::Row row_of(const Placed& a, const Placed& b, double tolerance, Method 
 }
 
 /// A shape at its present pose, with its constants.
-struct Body {
+struct PosedShape {
   Placed placed;
   double radius;              ///< m
   std::uint64_t version = 0;  ///< number of poses so far
@@ -72,13 +72,13 @@ struct Body {
 
 /// True if the bodies are separated by more than rounding, along the known axis or a new one. The margin is four times
 /// that of Overlap. A later call without an axis therefore finds one, too.
-bool apart(const Body& a, const Body& b, Vec3& axis) {
+bool apart(const PosedShape& a, const PosedShape& b, Vec3& axis) {
   const bool open_a = !bounded(a.placed.shape), open_b = !bounded(b.placed.shape);
   if (open_a && open_b) return false;
   const Vec3 between = a.placed.pose.translation - b.placed.pose.translation;
   const double margin = 4 * rounding(norm(between) + reach(a.placed, a.radius) + reach(b.placed, b.radius));
   if (open_a || open_b) {
-    const Body &open = open_a ? a : b, &closed = open_a ? b : a;
+    const PosedShape &open = open_a ? a : b, &closed = open_a ? b : a;
     const Plane& plane = *only_plane(open.placed.shape);
     const Vec3 normal = open.placed.pose.rotation * plane.normal;
     const double height = dot(normal, open_a ? -between : between);
@@ -96,7 +96,7 @@ bool apart(const Body& a, const Body& b, Vec3& axis) {
 }
 
 /// False if clipping is faster than the search for an axis, which may not exist.
-bool axis_soon_found(const Body& a, const Body& b) {
+bool axis_soon_found(const PosedShape& a, const PosedShape& b) {
   const auto polytope = [](const Shape& shape) { return !smooth(shape) && bounded(shape); };
   return !polytope(a.placed.shape) || !polytope(b.placed.shape);
 }
@@ -184,7 +184,7 @@ Overlaps Overlaps::select(std::span<const std::int64_t> rows) const {
 
 /// The state that a call leaves for the next one.
 struct Batch::Memory {
-  std::vector<Body> bodies;
+  std::vector<PosedShape> bodies;
   std::shared_ptr<const std::vector<PoseNumbers>> poses;  ///< of the bodies; shared with the results
   std::vector<Enclosure> enclosures;                      ///< parallel to `poses`, from the last search
   std::vector<std::uint64_t> enclosed;                    ///< parallel to `poses`: the versions of `enclosures`
@@ -276,7 +276,7 @@ bool Batch::Memory::answer(size_t i, double with_tolerance, Method by_method) {
       return true;
     }
   }
-  const Body &a = bodies[pair.pair[0]], &b = bodies[pair.pair[1]];
+  const PosedShape &a = bodies[pair.pair[0]], &b = bodies[pair.pair[1]];
   // The article's method decides by itself and uses no axis.
   const bool in_vain = before[i] < 0 ? !axis_soon_found(a, b) : rows[before[i]].measures.status == Status::kOverlapping;
   const bool separated = by_method == Method::kAuto && !in_vain && apart(a, b, pair.axis);

@@ -22,7 +22,7 @@ struct PatchForce {
 /// keeps energy, friction by Coulomb's law, solved patch by patch until nothing changes (projected Gauss–Seidel).
 class ContactSolver {
  public:
-  explicit ContactSolver(std::vector<Link> links) : bodies_(std::move(links)) {}
+  explicit ContactSolver(std::vector<TreeLink> links) : bodies_(std::move(links)) {}
 
   const Multibodies& bodies() const { return bodies_; }
   std::span<const ElasticPatch> patches() const { return patches_; }

@@ -60,9 +60,9 @@ void invert(std::vector<double>& m, int n) {
 
 }  // namespace
 
-Multibodies::Multibodies(std::vector<Link> links) : links_(std::move(links)) {
+Multibodies::Multibodies(std::vector<TreeLink> links) : links_(std::move(links)) {
   for (int i = 0; i < int(links_.size()); ++i) {
-    const Link& link = links_[i];
+    const TreeLink& link = links_[i];
     if (link.parent < 0) bodies_.push_back({i, 0, coordinates_, 0, link.mass > 0});
     if (bodies_.empty() || link.parent >= i || (link.parent >= 0 && link.parent < bodies_.back().first_link))
       throw std::invalid_argument("links must begin with a base, and come after their parents");
@@ -84,7 +84,7 @@ Multibodies::Multibodies(std::vector<Link> links) : links_(std::move(links)) {
 void Multibodies::place(std::span<const Pose> frames) {
   frames_.assign(frames.begin(), frames.end());
   for (int i = 0; i < int(links_.size()); ++i) {
-    const Link& link = links_[i];
+    const TreeLink& link = links_[i];
     const int own = link.parent < 0 ? 0 : coordinates_of(link.joint);
     for (int k = 0; k < own; ++k) {
       const int coordinate = moved_[i][moved_[i].size() - own + k];
@@ -140,7 +140,7 @@ void Multibodies::find_inverse_mass(int number) {
   std::vector<double>& m = inverse_mass_[number];
   std::fill(m.begin(), m.end(), 0.0);
   if (body.links == 1) {
-    const Link& link = links_[body.first_link];
+    const TreeLink& link = links_[body.first_link];
     const Mat3& turn = frames_[body.first_link].rotation;
     const auto inverse = [](double x) { return x > 0 ? 1 / x : 0; };
     const Vec3 mobility{inverse(link.inertia.x), inverse(link.inertia.y), inverse(link.inertia.z)};
@@ -153,7 +153,7 @@ void Multibodies::find_inverse_mass(int number) {
   }
   std::vector<double> rows(size_t(6) * n);
   for (int i = body.first_link; i < body.first_link + body.links; ++i) {
-    const Link& link = links_[i];
+    const TreeLink& link = links_[i];
     if (!(link.mass > 0)) continue;
     jacobian(i, frames_[i].translation, rows);
     const Mat3& turn = frames_[i].rotation;

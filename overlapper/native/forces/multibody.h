@@ -12,7 +12,7 @@ enum class Joint { kHeld, kRevolute, kPrismatic, kSpherical };
 
 /// A link and the joint that moves it in its parent. Frames are inertial frames: at the centre of mass, along the
 /// principal axes.
-struct Link {
+struct TreeLink {
   int parent = -1;  ///< its place among all links, before this one; -1 of a base, with which a body begins
   Joint joint = Joint::kHeld;
   Vec3 axis;   ///< unit, in the frame of the parent; a spherical joint turns about the axes of the link's own frame
@@ -32,9 +32,9 @@ class Multibodies {
   };
 
   /// Throws std::invalid_argument unless parents come before their children.
-  explicit Multibodies(std::vector<Link> links);
+  explicit Multibodies(std::vector<TreeLink> links);
 
-  std::span<const Link> links() const { return links_; }
+  std::span<const TreeLink> links() const { return links_; }
   std::span<const Body> bodies() const { return bodies_; }
   int body_of(int link) const { return body_[link]; }
   int coordinates() const { return coordinates_; }
@@ -62,7 +62,7 @@ class Multibodies {
 
   void find_inverse_mass(int body);
 
-  std::vector<Link> links_;
+  std::vector<TreeLink> links_;
   std::vector<Body> bodies_;
   std::vector<int> body_;                ///< of each link
   std::vector<std::vector<int>> moved_;  ///< of each link: the coordinates of the joints between it and its base

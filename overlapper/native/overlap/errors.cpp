@@ -25,7 +25,7 @@ constexpr double kSums = 256 * DBL_EPSILON;
 constexpr double kNearlyFlush = 0x1p-4;
 
 /// A plane relative to the origin of a region's frame.
-struct Seen {
+struct FramePlane {
   Vec3 dual;    ///< in the frame
   Vec3 normal;  ///< unit, in the world
   double slack, moved;
@@ -44,13 +44,13 @@ std::vector<int> numbers(const std::vector<Vec3>& polygon) {
 /// Finds the planes of other bodies that pass near a facet, in trees.
 class OthersNear {
  public:
-  OthersNear(std::vector<Seen> planes, std::span<const Seen> facets, int bodies)
+  OthersNear(std::vector<FramePlane> planes, std::span<const FramePlane> facets, int bodies)
       : planes_(std::move(planes)), bodies_(bodies) {
     double facet_moved = 0;
-    for (const Seen& facet : facets) facet_moved = std::max(facet_moved, facet.moved);
+    for (const FramePlane& facet : facets) facet_moved = std::max(facet_moved, facet.moved);
     std::vector<std::vector<DualTree::Entry>> of_body(bodies);
     for (size_t i = 0; i < planes_.size(); ++i) {
-      const Seen& plane = planes_[i];
+      const FramePlane& plane = planes_[i];
       most_moved_ = std::max(most_moved_, plane.moved);
       // The plane moved inwards by its error: slack_at(y) <= distance where the dual point of the moved plane reaches
       // y.
@@ -112,7 +112,7 @@ class OthersNear {
     return at;
   }
 
-  std::vector<Seen> planes_;
+  std::vector<FramePlane> planes_;
   std::vector<Halves> halves_;
   std::vector<int> everywhere_;  ///< planes with so large an error that they are near every polygon
   int bodies_;
@@ -209,7 +209,7 @@ class Sandwich {
     std::vector<double> areas;
     for (size_t f = 0; f < facets_.size(); ++f) {
       cancellation_point();
-      const Seen& facet = facets_[f];
+      const FramePlane& facet = facets_[f];
       const auto ring = region_.polytope.facet(static_cast<int>(f));
       double around = 0;
       for (size_t i = 0; i < ring.size(); ++i)
@@ -219,7 +219,7 @@ class Sandwich {
       double doubtful = around * 2 * (facet.moved + near.most_moved()) / kNearlyFlush;
       const double all = area(f);
       const std::vector<Vec3> corners = polygon(f);
-      near.visit(facet.owner, corners, [&](const Seen& plane, std::span<const int> near_corners) {
+      near.visit(facet.owner, corners, [&](const FramePlane& plane, std::span<const int> near_corners) {
         const bool flush = norm2(cross(plane.normal, facet.normal)) <= kNearlyFlush * kNearlyFlush;
         if (flush) doubtful += area_within(corners, near_corners, plane, facet.moved + plane.moved);
         return !(doubtful >= all);
@@ -247,7 +247,7 @@ class Sandwich {
       const double all = area(f);
       const auto ring = region_.polytope.facet(static_cast<int>(f));
       for (size_t i = 0; i < ring.size() && !(doubtful >= all); ++i) {
-        const Seen& plane = facets_[ridges.left_of(ring[(i + 1) % ring.size()], ring[i])];
+        const FramePlane& plane = facets_[ridges.left_of(ring[(i + 1) % ring.size()], ring[i])];
         if (plane.owner == facets_[f].owner) continue;
         const double moved = facets_[f].moved + plane.moved;
         const std::vector<int> near = near_edge(corners, i, plane, moved);
@@ -260,7 +260,8 @@ class Sandwich {
 
   /// The corners of a convex polygon no farther than `distance` from a plane through its edge number `edge`, in order.
   /// From either end of the edge, the distance from the plane grows until the ring turns back to the edge.
-  static std::vector<int> near_edge(const std::vector<Vec3>& polygon, size_t edge, const Seen& plane, double distance) {
+  static std::vector<int> near_edge(const std::vector<Vec3>& polygon, size_t edge, const FramePlane& plane,
+                                    double distance) {
     const size_t corners = polygon.size();
     std::vector<int> near;
     const auto add = [&](size_t place) {
@@ -276,15 +277,15 @@ class Sandwich {
 
   /// The planes that may pass through the polytope's facets, each once. A facet of many corners has several triangles
   /// in one plane, but for rounding.
-  std::vector<Seen> planes_of_bodies() const {
-    std::vector<Seen> planes;
+  std::vector<FramePlane> planes_of_bodies() const {
+    std::vector<FramePlane> planes;
     std::unordered_map<int64_t, int> last_in_cell;
     const double farthest = farthest_vertex(region_.polytope);
     for (const WideDual& dual : wide_duals(bodies_, region_.reference, region_.frame, farthest)) {
       const double rounding = rounding_of_dual(dual.slack, dual.point, farthest);
       const auto [last, first] = last_in_cell.try_emplace(cell_of(dual.normal, {}) * 64 + dual.owner % 64, -1);
       if (!first) {
-        Seen& before = planes[last->second];
+        FramePlane& before = planes[last->second];
         const double off = dual.slack * norm(dual.point - before.dual) * farthest;
         if (before.owner == dual.owner && off <= rounding) {
           before.moved = std::max(before.moved, rounding + off);
@@ -299,7 +300,7 @@ class Sandwich {
 
   /// m²: the area of a polygon in the frame where the plane is no farther than the given distance. Only the corners
   /// `near`, in order, may be so near.
-  double area_within(const std::vector<Vec3>& polygon, std::span<const int> near, const Seen& plane,
+  double area_within(const std::vector<Vec3>& polygon, std::span<const int> near, const FramePlane& plane,
                      double distance) const {
     std::vector<Vec3> kept;
     const int corners = static_cast<int>(polygon.size());
@@ -323,7 +324,7 @@ class Sandwich {
   }
 
   /// True if a smooth body of another owner is behind the middle of a facet, no farther than the facet may have moved.
-  bool beside_smooth(const std::vector<Vec3>& polygon, const Seen& facet) const {
+  bool beside_smooth(const std::vector<Vec3>& polygon, const FramePlane& facet) const {
     const Vec3 direction = region_.frame.axes * middle(polygon);
     for (size_t i = 0; i < bodies_.size(); ++i) {
       if (static_cast<int>(i) == facet.owner || !smooth(bodies_[i].shape)) continue;
@@ -338,7 +339,7 @@ class Sandwich {
   bool polyhedral_;
   std::vector<Placed> relative_;  ///< about the region's reference
   std::vector<Vec3> corners_;     ///< m, about the frame's origin
-  std::vector<Seen> facets_;
+  std::vector<FramePlane> facets_;
   double moved_ = 0;   ///< largest movement of a plane by rounding, relative to its slack
   double pulled_ = 0;  ///< of vertices into smooth shapes, by tangent planes
 };

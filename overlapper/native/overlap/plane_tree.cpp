@@ -24,9 +24,9 @@ PlaneTree::PlaneTree(const Polytope& polytope, const std::vector<int>& facets, V
 int PlaneTree::grow(int begin, int end) {
   cancellation_point(end - begin);
   const int at = static_cast<int>(nodes_.size());
-  Seen lower = planes_[begin], upper = lower;
+  CentredPlane lower = planes_[begin], upper = lower;
   for (int i = begin; i < end; ++i) {
-    const Seen& plane = planes_[i];
+    const CentredPlane& plane = planes_[i];
     lower.normal = min(lower.normal, plane.normal), upper.normal = max(upper.normal, plane.normal);
     lower.offset = std::min(lower.offset, plane.offset), upper.offset = std::max(upper.offset, plane.offset);
   }
@@ -34,13 +34,13 @@ int PlaneTree::grow(int begin, int end) {
   if (end - begin <= kLeaf) return at;
   const Vec3 size = radius_ * (upper.normal - lower.normal);
   const double widest = max_component(size);
-  const auto value = [&](const Seen& plane) {
+  const auto value = [&](const CentredPlane& plane) {
     if (upper.offset - lower.offset > widest) return plane.offset;
     return size.x == widest ? plane.normal.x : size.y == widest ? plane.normal.y : plane.normal.z;
   };
   const int middle = begin + (end - begin) / 2;
   std::nth_element(planes_.begin() + begin, planes_.begin() + middle, planes_.begin() + end,
-                   [&](const Seen& a, const Seen& b) { return value(a) < value(b); });
+                   [&](const CentredPlane& a, const CentredPlane& b) { return value(a) < value(b); });
   grow(begin, middle);
   const int second = grow(middle, end);
   nodes_[at].second = second;

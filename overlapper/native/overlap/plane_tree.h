@@ -21,13 +21,13 @@ class PlaneTree {
   static constexpr int kLeaf = 8;
 
   /// A plane, relative to the centre.
-  struct Seen {
+  struct CentredPlane {
     Vec3 normal;
     double offset;
     int facet;
   };
   struct Node {
-    Seen lower, upper;
+    CentredPlane lower, upper;
     int begin, end;
     int second = -1;  ///< the other child; the first child follows directly; -1 for a leaf
   };
@@ -40,8 +40,8 @@ class PlaneTree {
   Vec3 centre_;
   double radius_, rounding_ = 0;
   std::vector<Node> nodes_;
-  std::vector<Seen> planes_;  ///< the planes of a box are contiguous
-  int last_enough_ = -1;      ///< a facet that excluded the last vertex
+  std::vector<CentredPlane> planes_;  ///< the planes of a box are contiguous
+  int last_enough_ = -1;              ///< a facet that excluded the last vertex
 };
 
 /// The distance of a vertex from the plane of a facet.

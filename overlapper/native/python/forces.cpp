@@ -25,7 +25,7 @@ ContactSolver to_solver(nb::handle parents_given, nb::handle joints_given, nb::h
   const std::vector<double> masses = numbers(masses_given, "masses", n);
   if (joints.size() != n || axes.size() != n || pivots.size() != n || inertias.size() != n)
     fail("links", "must have a row in each array");
-  std::vector<Link> links(n);
+  std::vector<TreeLink> links(n);
   for (size_t i = 0; i < n; ++i) {
     if (joints[i] < 0 || joints[i] > int(Joint::kSpherical)) fail("joints", "must be from 0 to 3");
     links[i] = {int(parents[i]), Joint(joints[i]), axes[i], pivots[i], masses[i], inertias[i]};

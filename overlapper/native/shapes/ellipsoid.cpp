@@ -33,11 +33,11 @@ WidePlane wide_supporting(Vec3 half_axes, const WideVector& outward) {
 /// At a foot of the point p on the surface, n ∝ p / (τ + s), with s = g² − 1 for the half axes g. The image of that
 /// foot on the unit ball is u = g p / (τ + s), so |u| = 1. τ is not negative for the nearest foot (Eberly 2013), and
 /// negative for the foot across the shortest axis.
-struct Seen {
+struct ScaledPoint {
   std::array<int, 3> axis;
   std::array<double, 3> g, s, p;
 
-  Seen(Vec3 half_axes, Vec3 point) {
+  ScaledPoint(Vec3 half_axes, Vec3 point) {
     const int last = shortest_axis(half_axes);
     axis = {(last + 1) % 3, (last + 2) % 3, last};
     const double shortest = half_axes[last];
@@ -146,7 +146,7 @@ Plane Ellipsoid::ray_exit(Vec3 origin, Vec3 direction) const {
 }
 
 std::vector<Vec3> Ellipsoid::ways_out(Vec3 point) const {
-  const Seen seen(half_axes, point);
+  const ScaledPoint seen(half_axes, point);
   if (seen.p[2] == 0 && seen.left() > 0) {
     const double last = std::sqrt(seen.left());
     return {seen.normal(0, last), seen.normal(0, -last)};
