@@ -33,7 +33,7 @@ def test_a_cluster_finds_the_same_bits_while_a_node_is_killed(undisturbed):
         assert process.wait(60) == 0
         assert parts("runs") == undisturbed
         # The rest of the cluster reports the same failures of tasks as one machine.
-        words = ["sweep", "balls.py", "--grid", "fate=good,raises,hangs in C,dies", "--limit", "3", "--out", "fates"]
+        words = ["sweep", "balls.py", "--grid", "fate=good,raises,hangs in C,dies", "--limit", "8", "--out", "fates"]
         words += ["--engine", "ray", "--address", address, "--json"]
         done = subprocess.run([sys.executable, "-m", "overlapper", *words], capture_output=True, text=True, timeout=120)
         told = json.loads(done.stdout)
