@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import test_facts
 from cone import ConeFacts
+from overlapper._core import Cone
 
 from overlapper import Box, Capsule, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
-from overlapper._core import Cone
 from overlapper.proof.certificate import certificate
 from overlapper.proof.claims import CertificateError
 from overlapper.rational import rotation

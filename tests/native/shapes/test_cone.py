@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import rules
 from families import Case
+from overlapper._core import Cone
 from strategies import quaternion, rotation
 
 from overlapper import (
@@ -24,7 +25,6 @@ from overlapper import (
     overlap,
     penetration_depth,
 )
-from overlapper._core import Cone
 
 RULES = (
     rules.figures_are_finite,
