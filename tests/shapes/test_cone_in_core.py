@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 import test_facts
 from cone import ConeFacts
-from overlapper._core import Cone
 
-from overlapper import Box, Capsule, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
+from overlapper import Box, Capsule, HalfSpace, Hull, Placed, RoundedHull, Sphere, _core, overlap
 from overlapper.proof.certificate import certificate
 from overlapper.proof.claims import CertificateError
 from overlapper.rational import rotation
 from overlapper.reference import Fcl
 from overlapper.shapes.table import KINDS
 
+Cone = _core.Cone
 CONE = Cone(0.5, 1.3)
 CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.7, 0.7, 0.7]]
 OTHERS = [Box([0.3, 0.4, 0.5]), Sphere(0.4), Capsule(0.2, 0.5), Hull(CORNERS), CONE]

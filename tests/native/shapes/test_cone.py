@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import rules
 from families import Case
-from overlapper._core import Cone
 from strategies import quaternion, rotation
 
 from overlapper import (
@@ -21,11 +20,13 @@ from overlapper import (
     Placed,
     RoundedHull,
     Sphere,
+    _core,
     distance,
     overlap,
     penetration_depth,
 )
 
+Cone = _core.Cone
 RULES = (
     rules.figures_are_finite,
     rules.sizes_are_not_negative,
