@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from pages import (
     CUP,
     HAND,
-    Bodies,
     Film,
+    GreenBodies,
     commands,
     drawings,
     enclosed,
@@ -56,7 +56,7 @@ def test_bodies_are_sent_once_and_have_poses_only_where_they_move(tmp_path):
 
 
 def test_a_shape_that_many_bodies_have_is_kept_once(tmp_path):
-    page = recorded([Bodies({CUP: Placed(Sphere(0.1)), HAND: Placed(Sphere(0.1), (1, 0, 0))})], tmp_path / "two.html")
+    page = recorded([GreenBodies({CUP: Placed(Sphere(0.1)), HAND: Placed(Sphere(0.1), (1, 0, 0))})], tmp_path / "two.html")
     first, second = (drawing["geometries"] for drawing in drawings(page).values())
     assert [each["uuid"] for each in first] == [each["uuid"] for each in second]
     assert all("data" in each for each in first)
@@ -72,25 +72,25 @@ def test_one_polytope_stands_for_an_overlap_at_rest(tmp_path):
 
 
 def test_a_thin_overlap_is_redrawn_after_a_small_change_of_its_thickness(tmp_path):
-    def pressed(depth: float) -> Bodies:
+    def pressed(depth: float) -> GreenBodies:
         plates = Placed(Box([1, 1, 0.1])), Placed(Box([1, 1, 0.1]), (0, 0, 0.2 - depth))
-        return Bodies({CUP: plates[0], HAND: plates[1]})
+        return GreenBodies({CUP: plates[0], HAND: plates[1]})
 
     film = Film.of(recorded([pressed(2e-3), pressed(1.9e-3), pressed(1.899e-3)], tmp_path / "plates.html"))
     assert [polytope for k in range(3) for polytope, _ in film.sightings(k).values()] == [0, 1, 1]
 
 
 def test_a_spinning_overlap_is_drawn_anew_though_its_measures_stay(tmp_path):
-    def spun(angle: float) -> Bodies:
+    def spun(angle: float) -> GreenBodies:
         turned = Placed(Box([0.1, 0.1, 0.1]), (0, 0, 0.19), (0, 0, np.sin(angle / 2), np.cos(angle / 2)))
-        return Bodies({CUP: Placed(Box([1, 1, 0.1])), HAND: turned})
+        return GreenBodies({CUP: Placed(Box([1, 1, 0.1])), HAND: turned})
 
     film = Film.of(recorded([spun(angle) for angle in (0, 0.02, 0.0201)], tmp_path / "spin.html"))
     assert [polytope for k in range(3) for polytope, _ in film.sightings(k).values()] == [0, 1, 1]
 
 
 def test_a_body_that_takes_over_an_id_is_drawn_anew(tmp_path):
-    ball = Bodies({CUP: Placed(Sphere(0.1)), HAND: Placed(Box([0.1, 0.1, 0.1]), (0.3, 0, 0))})
+    ball = GreenBodies({CUP: Placed(Sphere(0.1)), HAND: Placed(Box([0.1, 0.1, 0.1]), (0.3, 0, 0))})
     page = recorded([hand_at(0.3), ball], tmp_path / "cup.html")
     old, new = "/overlapper/bodies/cup/base/0", "/overlapper/bodies/cup/base/0 from frame 2"
     assert {old, new} <= set(drawings(page))
@@ -111,7 +111,7 @@ def test_a_body_that_takes_over_an_id_is_drawn_anew(tmp_path):
     ids=lambda shape: type(shape).__name__,
 )
 def test_the_surface_drawn_encloses_the_volume_of_the_shape(shape, tmp_path):
-    page = recorded([Bodies({CUP: Placed(shape)})], tmp_path / "shape.html")
+    page = recorded([GreenBodies({CUP: Placed(shape)})], tmp_path / "shape.html")
     surfaces = meshes(drawings(page)["/overlapper/bodies/cup/base/0"])
     assert_allclose(
         enclosed(surfaces), shape.volume, rtol=1e-2 if isinstance(shape, Sphere | Capsule | Cylinder) else 1e-6
@@ -135,7 +135,7 @@ def test_the_facets_of_each_owner_close_the_overlap_in_every_frame(tmp_path):
 
 
 def test_a_round_overlap_of_thousands_of_facets_is_drawn_with_hundreds(tmp_path):
-    bodies = Bodies({CUP: Placed(Sphere(0.1)), HAND: Placed(Sphere(0.1), (0.05, 0, 0))})
+    bodies = GreenBodies({CUP: Placed(Sphere(0.1)), HAND: Placed(Sphere(0.1), (0.05, 0, 0))})
     (contact,) = bodies.contacts()
     ((vertices, facets),) = Film.of(recorded([bodies], tmp_path / "balls.html")).polytopes()
     assert len(contact.overlap.faces) > 2000
@@ -146,7 +146,7 @@ def test_a_round_overlap_of_thousands_of_facets_is_drawn_with_hundreds(tmp_path)
 def test_far_from_the_origin_nothing_is_lost_to_single_precision(tmp_path):
     far = np.array([3e6, -2e6, 1e6])
     boxes = {CUP: Placed(Box([0.1, 0.1, 0.1]), far), HAND: Placed(Box([0.1, 0.1, 0.1]), far + [0.1875, 0, 0])}
-    film = Film.of(recorded([Bodies(boxes)], tmp_path / "far.html"))
+    film = Film.of(recorded([GreenBodies(boxes)], tmp_path / "far.html"))
     ((_, hand),) = film.poses("/overlapper/bodies/arm/hand/0")
     ((_, cup),) = film.poses("/overlapper/bodies/cup/base/0")
     assert_allclose((hand - cup)[:3], [0.1875, 0, 0], atol=1e-6)
