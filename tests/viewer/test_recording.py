@@ -56,7 +56,8 @@ def test_bodies_are_sent_once_and_have_poses_only_where_they_move(tmp_path):
 
 
 def test_a_shape_that_many_bodies_have_is_kept_once(tmp_path):
-    page = recorded([GreenBodies({CUP: Placed(Sphere(0.1)), HAND: Placed(Sphere(0.1), (1, 0, 0))})], tmp_path / "two.html")
+    balls = GreenBodies({CUP: Placed(Sphere(0.1)), HAND: Placed(Sphere(0.1), (1, 0, 0))})
+    page = recorded([balls], tmp_path / "two.html")
     first, second = (drawing["geometries"] for drawing in drawings(page).values())
     assert [each["uuid"] for each in first] == [each["uuid"] for each in second]
     assert all("data" in each for each in first)
