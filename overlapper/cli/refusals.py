@@ -118,9 +118,10 @@ def diverted(descriptor: int, file: BinaryIO) -> Iterator[None]:
 
 
 def import_engine(scene: str | Path) -> None:
-    """Import what simulates a scene, if there is that scene. ImportError says what to install.
+    """Import what simulates a scene, if the scene and its engine exist. ImportError says what to install.
 
+    A missing scene and an unknown engine are refused where the scene is loaded.
     What goes to stderr is lost meanwhile: pybullet says on import when it was built.
     """
-    with suppress(SceneError, OSError), open(os.devnull, "wb") as nowhere, diverted(2, nowhere):
+    with suppress(SceneError, OSError, ValueError), open(os.devnull, "wb") as nowhere, diverted(2, nowhere):
         engine(engine_in(find_scene(scene)))

@@ -145,6 +145,14 @@ def test_an_unknown_engine_is_named():
         overlapper.watch(World(), engine="newton")
 
 
+@pytest.mark.parametrize("options", [["run"], ["view"], ["check"], ["sweep", "--seeds", "2", "--out", "runs"]])
+def test_a_command_refuses_an_unknown_engine_in_one_sentence(options):
+    Path("sinking.py").write_text(SCENE.replace("scripted", "newton"))
+    done = subprocess.run([sys.executable, "-m", "overlapper", *options, "sinking.py"], capture_output=True, text=True)
+    told = "overlapper: sinking.py has ENGINE = 'newton', which must be one of 'bullet'\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", told)
+
+
 def test_pybullet_is_not_needed():
     """These tests pass where it cannot be imported."""
     code = f"""
