@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, Literal
 
-from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker
+from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker, forget_words
 from overlapper.printable import first_line
 
 DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
@@ -107,11 +107,7 @@ def _begun(job: Job) -> str:
 
 
 def _outcome(call: Callable[[Any], Any], item: Any, limit: float | None) -> Outcome:
-
-    # The process's output about earlier items would be mistaken for output about this one.
-    sys.stderr.flush()
-    os.ftruncate(2, 0)
-    os.lseek(2, 0, os.SEEK_SET)
+    forget_words()
     start = time.monotonic()
     if limit:
         faulthandler.dump_traceback_later(limit, exit=True)  # also where C does not let Python have a turn
@@ -142,7 +138,7 @@ class Hand:
             try:
                 worker = self._worker = self._worker or self._started()
                 if self._closed:
-                    worker.process.kill()
+                    worker.kill()
                 worker.send(_Work(tuple(left), self._limit))
                 while left:
                     outcome = worker.receive(self._limit and self._limit + GRACE)
@@ -184,7 +180,7 @@ class Hand:
         """End the process from another thread than that which works, which then ends, too."""
         self._closed = True
         if worker := self._worker:
-            worker.process.kill()
+            worker.kill()
 
     def close(self) -> None:
         """End the process."""

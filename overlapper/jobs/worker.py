@@ -1,28 +1,36 @@
 """A worker process, in which a library may abort, crash, hang or print, and how it ended is an answer.
 
-It is not of `multiprocessing`, which imports the user's main module once more in the new process.
+The process leads a process group of its own. When it ends, all that it has started ends, too. It is not a process of
+`multiprocessing`, which would import the user's main module once more.
 """
 
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import pickle
 import queue
 import re
+import select
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 import weakref
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
+from pathlib import Path
 from typing import IO, Any
 
 from overlapper.printable import first_line
 
 START_LIMIT = 60.0  # s, for a new Python to import a module on a machine that is busy
+
+GLANCE = 0.2  # s after which a silent process is looked at: what it has started may hold its pipe open
+LEAVE = 5.0  # s that a process has to end once it has closed its pipe
 
 # The messages of C++ and Python for an uncaught exception.
 UNCAUGHT = r"what\(\): *(.*)|^(\w*(?:Error|Exception): .*)"
@@ -49,13 +57,16 @@ class NotStarted(RuntimeError):
 class Worker:
     """A process that serves requests by `answers`, a generator function of a module: a request, then its replies.
 
-    `cause` is a pattern of what the process may write to stderr, whose groups are the cause of its end. Ended if there
-    can be no such process, or the module cannot be imported there. A thread reads the replies: waiting with a limit
-    works so on every system.
+    `cause` is a pattern of what the process may write to stderr, whose groups are the cause of its end. `megabytes` is
+    the memory that it may take once it has imported the module; only Linux keeps to it. Ended if there can be no such
+    process, or the module cannot be imported there. A thread reads the replies: waiting with a limit works so on every
+    system.
     """
 
-    def __init__(self, answers: Callable[[Any], Iterator[Any]], cause: str = UNCAUGHT) -> None:
-        where = f"{answers.__module__!r}, {answers.__name__!r}"
+    def __init__(
+        self, answers: Callable[[Any], Iterator[Any]], cause: str = UNCAUGHT, megabytes: int | None = None
+    ) -> None:
+        where = f"{answers.__module__!r}, {answers.__name__!r}, {megabytes}"
         program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.jobs.worker import serve; serve({where})"
         self._cause = cause
         self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -63,19 +74,24 @@ class Worker:
             try:
                 self._words = started.enter_context(tempfile.TemporaryFile())
                 self.process = subprocess.Popen(
-                    [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._words
+                    [sys.executable, "-c", program],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=self._words,
+                    start_new_session=True,
                 )
                 started.enter_context(self.process)
-                started.callback(self.process.kill)
+                started.callback(self.kill)
                 assert self.process.stdin and self.process.stdout
                 self._requests, replies = self.process.stdin, self.process.stdout
-                reader = threading.Thread(target=_forward, args=(replies, self._arrived), daemon=True)
+                reader = threading.Thread(target=_forward, args=(self.process, self._arrived), daemon=True)
                 reader.start()
             except (OSError, RuntimeError) as error:  # RuntimeError: no thread can be had
                 raise Ended(f"could not be started ({first_line(error)})", None) from error
             started.pop_all()
         # Also when the worker is forgotten and when Python exits, so that nothing is left behind.
-        self.close = weakref.finalize(self, _end, self.process, reader, (self._requests, replies, self._words))
+        files = self._requests, replies, self._words
+        self.close = weakref.finalize(self, _end, os.getpid(), self.process, reader, files)
         try:
             self.receive(START_LIMIT)
         except BaseException:
@@ -89,7 +105,11 @@ class Worker:
         self.close()
 
     def alive(self) -> bool:
-        return self.process.poll() is None
+        return not _is_over(self.process)
+
+    def kill(self) -> None:
+        """End the process and all that it has started, from any thread."""
+        _kill(self.process)
 
     def send(self, request: Any) -> None:
         with contextlib.suppress(BrokenPipeError):  # the missing reply will tell
@@ -101,7 +121,7 @@ class Worker:
         try:
             reply = self._arrived.get(timeout=time_limit)
         except queue.Empty:
-            self.process.kill()
+            self.kill()
             self.process.wait()
             raise Ended(f"gave no answer within {time_limit:g} s", None, limit=time_limit) from None
         if reply is END:
@@ -109,6 +129,10 @@ class Worker:
         return reply
 
     def _ended(self) -> Ended:
+        patience = time.monotonic() + LEAVE
+        while not _is_over(self.process) and time.monotonic() < patience:
+            time.sleep(0.01)
+        self.kill()
         code = self.process.wait()
         how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         self._words.seek(0)
@@ -117,15 +141,71 @@ class Worker:
         return Ended(f"ended with {how}" + (f" ({said[-1]})" if said else ""), code, words)
 
 
-def _forward(replies: IO[bytes], arrived: queue.SimpleQueue[Any]) -> None:
-    with contextlib.suppress(EOFError, pickle.UnpicklingError):
+def _is_over(process: subprocess.Popen[bytes]) -> bool:
+    """Whether a process has ended. Its number is kept for its group until the group is killed."""
+    if process.returncode is not None:
+        return True
+    if hasattr(os, "waitid"):
+        try:
+            return os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+        except ChildProcessError:  # another thread has just waited for it
+            return True
+    over = process.poll() is not None
+    if over:
+        _kill_group(process.pid)
+    return over
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    if process.returncode is None:
+        _kill_group(process.pid)
+        process.kill()
+
+
+def _kill_group(leader: int) -> None:
+    """Kill what a process has started, and the process itself. Windows has no such groups."""
+    if sys.platform != "win32":
+        with contextlib.suppress(ProcessLookupError, PermissionError):  # macOS refuses it for a process that has ended
+            os.killpg(leader, signal.SIGKILL)
+
+
+class _Replies(io.RawIOBase):
+    """What a process writes, up to its end, even if another process holds the pipe open."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdout
+        self._process, self._descriptor = process, process.stdout.fileno()
+        if sys.platform != "win32":
+            self._ready = select.poll()
+            self._ready.register(self._descriptor, select.POLLIN)
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        if sys.platform != "win32":
+            while not self._ready.poll(1000 * GLANCE):
+                # Nobody but the process itself writes here: what it wrote before its end has been read.
+                if _is_over(self._process) and not self._ready.poll(0):
+                    return 0
+        data = os.read(self._descriptor, len(buffer))
+        buffer[: len(data)] = data
+        return len(data)
+
+
+def _forward(process: subprocess.Popen[bytes], arrived: queue.SimpleQueue[Any]) -> None:
+    # Of a reply that is cut off or cannot be unpickled nothing is known but that it is missing.
+    with contextlib.suppress(Exception):
+        replies = io.BufferedReader(_Replies(process), 1 << 16)
         while True:
             arrived.put(pickle.load(replies))
     arrived.put(END)
 
 
-def _end(process: subprocess.Popen[bytes], reader: threading.Thread, files: Iterable[IO[bytes]]) -> None:
-    process.kill()
+def _end(owner: int, process: subprocess.Popen[bytes], reader: threading.Thread, files: Iterable[IO[bytes]]) -> None:
+    if os.getpid() != owner:  # in a fork, which must leave the process to whoever started it
+        return
+    _kill(process)
     process.wait()
     reader.join()
     for file in files:
@@ -133,24 +213,44 @@ def _end(process: subprocess.Popen[bytes], reader: threading.Thread, files: Iter
             file.close()
 
 
-def serve(module: str, name: str) -> None:
+def serve(module: str, name: str, megabytes: int | None) -> None:
     """The process: requests on standard input; on standard output a greeting, then the replies to each request."""
     # Ctrl-C is for whoever asks, who may want another answer before the end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever else gets printed must not mix with the replies
-    with contextlib.suppress(ImportError):
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an abort is an answer here, not a reason to fill the disk
 
     def say(reply: Any) -> None:
         pickle.dump(reply, replies)
         replies.flush()
 
     answers = getattr(import_module(module), name)
+    _limit(megabytes)
     say("ready")
     with contextlib.suppress(EOFError):
         while True:
             for reply in answers(pickle.load(sys.stdin.buffer)):
                 say(reply)
+
+
+def _limit(megabytes: int | None) -> None:
+    """Leave no core, and take no more memory than so much beyond what there is."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an abort is an answer here, not a reason to fill the disk
+    if megabytes is not None and sys.platform == "linux":
+        # Data, not addresses: threads and libraries reserve addresses that they never use.
+        held = re.search(r"^VmData:\s*(\d+) kB", Path("/proc/self/status").read_text(), re.MULTILINE)
+        most = (megabytes << 20) + (int(held[1]) << 10 if held else 0)
+        hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+
+
+def forget_words() -> None:
+    """In the process: drop what it has written to stderr, which would be mistaken for words about the next request."""
+    sys.stderr.flush()
+    os.ftruncate(2, 0)
+    os.lseek(2, 0, os.SEEK_SET)
