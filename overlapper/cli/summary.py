@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
 from overlapper.cli.figures import ROUNDED_UP, VOLUME_UNITS, plain_table, volume_unit
 from overlapper.printable import printable
-from overlapper.simulation import Decomposed
+from overlapper.simulation import Decomposed, Skipped
 from overlapper.tables.summary import Summary
 
 
@@ -50,7 +52,7 @@ def overlaps_table(summary: Summary, limit: int = 20, title: str = "") -> Table:
 def remarks(summary: Summary, limit: int = 10) -> list[str]:
     """The lines below the table: what was modelled, what was not, and the first `limit` disagreements."""
     lines = str(summary.report).splitlines() if summary.report else []
-    lines += [f"Not modelled: {each.name}, {each.reason}." for each in summary.skipped]
+    lines += skipped_lines(summary.skipped)
     lines += [_decomposed(each) for each in summary.decomposed]
     if summary.verdicts:
         counts = ", ".join(f"{count:,} {verdict}" for verdict, count in summary.verdicts.most_common())
@@ -61,6 +63,14 @@ def remarks(summary: Summary, limit: int = 10) -> list[str]:
         rest = len(summary.disagreements) - limit
         lines.append(f"  and {rest:,} more, each explained in the file of --out and by --json.")
     return lines
+
+
+def skipped_lines(skipped: Mapping[Skipped, int]) -> list[str]:
+    """What was left out, by the first step in which it was."""
+    return [
+        f"Not modelled{f' from step {step} on' if each.diverged else ''}: {each.name}, {each.reason}."
+        for each, step in skipped.items()
+    ]
 
 
 def _decomposed(mesh: Decomposed) -> str:

@@ -29,6 +29,7 @@ from overlapper.simulation.settings import Asking, Modelling
 if TYPE_CHECKING:
     from overlapper.jobs.executor import Executor
     from overlapper.sweep.comparison import Comparison
+    from overlapper.sweep.left_out import LeftOut
     from overlapper.sweep.points import Point, Space
     from overlapper.sweep.store import Store
     from overlapper.sweep.sweep import Progress as Reached
@@ -124,7 +125,7 @@ def sweep(
     The parameters of a scene are what its build takes beside the client, as build(client, *, mass=1.0, seed=0). What
     --grid, --seeds, --points and --sample give is crossed; --set holds for all. A task is a row of OUT/tasks.parquet,
     and one that failed a row of OUT/failures.parquet. Started again, a sweep does what is missing. The exit code is 0
-    if all tasks are done, 1 if any has failed, and 2 if none could be run.
+    if all tasks are done, 1 if any has failed, diverged or left shapes out, and 2 if none could be run.
 
     With --check, the tasks are compared with those of the same parameters in another folder, by the budgets of the
     scene's expected file, or else by rounding. The exit code is 0 if nothing moved, 1 if something did, or failed that
@@ -152,6 +153,7 @@ def sweep(
         from overlapper.scenes.scene import find_scene, load_scene
         from overlapper.sweep import charts, page
         from overlapper.sweep.comparison import Recorded
+        from overlapper.sweep.left_out import LeftOut
         from overlapper.sweep.part import must_be_no_columns
         from overlapper.sweep.points import Space
         from overlapper.sweep.study import Study
@@ -170,9 +172,10 @@ def sweep(
         reached, finished = _run(todo, store, working, limit, retry)
         compared = recorded.compare(store) if recorded and finished else None
         done = store.done & todo.tasks.keys()
+        left_out = LeftOut.of(todo, store.rows("tasks"))
         shown = page.write(todo, store, scene, pages, comparison=compared) if done else None
         failures = store.rows("failures")
-    _tell(todo, store, reached, finished, failures, compared, shown, as_json)
+    _tell(todo, store, reached, finished, failures, left_out, compared, shown, as_json)
 
 
 def _kept(text: str) -> int:
@@ -224,6 +227,7 @@ def _tell(
     reached: Reached,
     finished: bool,
     failures: list[dict[str, Any]],
+    left_out: LeftOut,
     compared: Comparison | None,
     page: Path | None,
     as_json: bool,
@@ -242,6 +246,8 @@ def _tell(
             "done": reached.done,
             "missing": reached.missing,
             "failed": [{name: row[name] for name in row if name != "traceback"} for row in failures],
+            "skipped": left_out.skipped,
+            "diverged": left_out.diverged,
             "finished": finished,
         }
         if compared:
@@ -257,6 +263,8 @@ def _tell(
     else:
         before = f", {reached.before:,} of them before" if reached.before else ""
         say(f"{todo.study.scene}: {reached.before + reached.done:,} of {reached.total:,} tasks are done{before}.")
+        for line in left_out.lines():
+            say(line)
         for row in failures[:FAILURES_SHOWN]:
             say(f"Failed: {_point(todo, row)}: {row['sentence']}")
         if len(failures) > FAILURES_SHOWN:
@@ -269,7 +277,7 @@ def _tell(
             say(line)
         for path in filter(None, (store.path("tasks") if page else None, page)):
             say(f"Written: {path}")
-    wrong = bool(failures)
+    wrong = bool(failures or left_out)
     if compared:
         wrong = bool(compared.moved or {row["task"] for row in failures} - compared.failures)
     raise typer.Exit(130 if not finished else int(wrong))

@@ -245,8 +245,7 @@ class AnyBodies:
         return known[named]
 
     def _lost(self, id: int) -> Skipped:
-        name = self._source.bodies[id].name
-        return Skipped(id, BASE, name, "it has no finite pose: the simulation has diverged")
+        return Skipped(id, BASE, self._labels[id], "it has no finite pose: the simulation has diverged", True)
 
     def _arrange(self) -> None:
         bodies = self._source.bodies

@@ -26,13 +26,14 @@ class Skipped:
     """Shapes of one link that are not modelled, and why.
 
     `body` and `link` are pybullet's indices: link -1 is the base, body -1 one to which pybullet gives no id. `name` is
-    what the link is called, `reason` one sentence.
+    what the link is called, `reason` one sentence. `diverged` is True of a body that has no finite pose.
     """
 
     body: int
     link: int
     name: str
     reason: str
+    diverged: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from overlapper.printable import first_line
 from overlapper.scenes.parameters import Parameter, described
+from overlapper.sweep.measures import LEFT_OUT
 from overlapper.sweep.part import FAILURES, OF, TASK, TASKS
 from overlapper.sweep.store import Store, rows_in
 from overlapper.sweep.sweep import Sweep
@@ -28,7 +29,8 @@ Key = tuple[Parameter, ...]
 BUDGETED = {"largest_volume_m3": "volume", "mean_volume_m3": "volume", "largest_depth_m": "depth"}
 BUDGETED |= {"largest_force_n": "force"}  # of volumetric contact alone
 FORCE, CONTACT, TASK_ITSELF = "mean_force_m2", "contact_time_s", "task"
-COMPARED = (TASK_ITSELF, *BUDGETED, FORCE, CONTACT)
+COUNTED = ("skipped", "diverged")  # any difference is one; earlier versions did not count
+COMPARED = (TASK_ITSELF, *COUNTED, *BUDGETED, FORCE, CONTACT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +165,9 @@ class Recorded:
 
 def _measured(was: Row, now: Row, budgets: Mapping[str, Budget]) -> Iterator[tuple[str, float, float, float]]:
     """Each measure with what it was and is, and the part of its budget that the difference takes."""
+    for count in COUNTED:
+        if count in was:
+            yield count, was[count], now[count], _part(Budget(0.0, 0.0), off_by(was[count], now[count]), was[count])
     for measure, quantity in BUDGETED.items():
         if measure not in was or measure not in now:
             continue
@@ -198,7 +203,7 @@ def _rows(folder: Path) -> list[Row]:
         except (OSError, ValueError, KeyError) as error:
             lacking = f"it has no column {error}" if isinstance(error, KeyError) else first_line(error)
             raise ValueError(f"--check {folder}: {table}.parquet cannot be read: {lacking}") from error
-        if found and (missing := OF[table].keys() - found[0].keys()):
+        if found and (missing := OF[table].keys() - LEFT_OUT.keys() - found[0].keys()):
             raise ValueError(f"--check {folder}: {table}.parquet has no column {min(missing)!r}")
         rows |= {row[TASK]: row for row in found}
     return [*rows.values()]

@@ -9,11 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.simulation.links import LinkContact
-from overlapper.tables.summary import Links, PairSummary, overlapping_links
+from overlapper.tables.summary import Links, PairSummary, note_skipped, overlapping_links
 
 if TYPE_CHECKING:
+    from overlapper.simulation.model import Skipped
     from overlapper.tables.frame import Frame
     from overlapper.tables.table import Value
+
+# How many links have shapes that were left out in any step, and how many bodies had no finite pose, each with the name
+# of the first; the step of the first body without a finite pose.
+LEFT_OUT: dict[str, type] = {
+    "skipped": int,
+    "first_skipped": str,
+    "diverged": int,
+    "first_diverged": str,
+    "diverged_step": int,
+}
 
 # Every measure, in order, with its type; the unit is in the name. The columns of the worst pair, that of the largest
 # volume, and of the deepest are empty if nothing overlaps.
@@ -21,6 +32,7 @@ MEASURES: dict[str, type] = {
     "steps": int,
     "time_s": float,
     "contact_time_s": float,
+    **LEFT_OUT,
     "mean_volume_m3": float,
     "largest_volume_m3": float,
     "largest_volume_error_m3": float,
@@ -70,11 +82,13 @@ class Measures:
         self._steps, self._time, self._contact = 0, 0.0, 0.0
         self._volume = 0.0
         self._pairs: dict[Links, _Pair] = {}
+        self._left_out: dict[Skipped, int] = {}
 
     def add(self, frame: Frame[Any]) -> None:
         """Take in the next step."""
         passed, self._time = frame.time - self._time, frame.time
         self._steps += 1
+        note_skipped(self._left_out, frame)
         touched = False
         for links, pair, force in overlapping_links(frame):
             names = frame.bodies.names
@@ -91,6 +105,7 @@ class Measures:
             "steps": self._steps,
             "time_s": self._time,
             "contact_time_s": self._contact,
+            **self._not_looked_at(),
             "mean_volume_m3": self._volume / max(self._steps, 1),
             "largest_volume_m3": 0.0,
             "largest_volume_error_m3": 0.0,
@@ -110,4 +125,17 @@ class Measures:
             if hardest.force:
                 row |= {"largest_force_n": hardest.force, "hardest_step": hardest.force_step}
                 row |= {"hardestA": hardest.names[0], "hardestB": hardest.names[1]}
+        return row
+
+    def _not_looked_at(self) -> dict[str, Value]:
+        """The columns of LEFT_OUT."""
+        skipped, diverged = (
+            [(each.name, step) for each, step in self._left_out.items() if each.diverged == which]
+            for which in (False, True)
+        )
+        row: dict[str, Value] = {"skipped": len(skipped), "diverged": len(diverged)}
+        if skipped:
+            row["first_skipped"] = skipped[0][0]
+        if diverged:
+            row |= {"first_diverged": diverged[0][0], "diverged_step": diverged[0][1]}
         return row

@@ -17,6 +17,7 @@ import numpy as np
 from overlapper.simulation.settings import Asking, Modelling, settings_of
 from overlapper.sweep import charts
 from overlapper.sweep.comparison import Comparison, mean_force
+from overlapper.sweep.left_out import LeftOut
 from overlapper.sweep.part import FAILURES, TASKS
 from overlapper.sweep.store import Store
 from overlapper.sweep.sweep import Sweep
@@ -52,10 +53,11 @@ def write(
     worst = sorted(rows, key=lambda row: (-row["largest_volume_m3"], row["task"]))[: max(WORST, pages)]
     for row in worst[:pages]:
         _show(sweep, row, store.folder / _view(row))
+    opening = [_opening(sweep, rows), *LeftOut.of(sweep, rows).lines()]
     place = store.folder / "summary.html"
     texts = {
         "title": html.escape(f"Sweep of {sweep.study.scene}"),
-        "opening": html.escape(_opening(sweep, rows)),
+        "opening": html.escape(" ".join(opening)),
         "moved": "\n".join(_moved(sweep, comparison)) if comparison else "",
         "worst": _worst(sweep, store, scene, worst),
         "failed": _failed(sweep, store),

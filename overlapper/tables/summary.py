@@ -62,6 +62,12 @@ def overlapping_links(frame: Frame[Any]) -> Iterator[tuple[Links, LinkContact, f
         yield links, pair, float(np.linalg.norm(between.get(links, 0.0)))
 
 
+def note_skipped(known: dict[Skipped, int], frame: Frame[AnyBodies]) -> None:
+    """Take in what a frame leaves out: `known` has the first step of each."""
+    for each in frame.bodies.skipped:
+        known.setdefault(each, frame.step)
+
+
 @dataclass(frozen=True, slots=True)
 class Disagreement:
     """FCL and we differ, or FCL gave no answer; `explanation` is one sentence."""
@@ -77,9 +83,9 @@ class Summary:
     """The frames of a run, taken in one by one.
 
     `scene` is what was run, for `steps` steps and `seconds` of simulated time. `pairs` has a `PairSummary` by (bodyA,
-    linkA, bodyB, linkB); `report`, `skipped` and `decomposed` are those of `Bodies`, summed up or as they are in the
-    end. If FCL was asked, `verdicts` counts what it said, and `disagreements` says where it differs. `forces` says
-    whether there were those of volumetric contact.
+    linkA, bodyB, linkB). `report` is that of `Bodies`, summed up, and `decomposed` as it is in the end. `skipped` has
+    all that was left out in any step, with the first step in which it was. If FCL was asked, `verdicts` counts what it
+    said, and `disagreements` says where it differs. `forces` says whether there were those of volumetric contact.
     """
 
     scene: str
@@ -87,7 +93,7 @@ class Summary:
     seconds: float = 0.0
     pairs: dict[Links, PairSummary] = field(default_factory=dict)
     report: Report | None = None
-    skipped: list[Skipped] = field(default_factory=list)
+    skipped: dict[Skipped, int] = field(default_factory=dict)
     decomposed: list[Decomposed] = field(default_factory=list)
     verdicts: Counter[str] = field(default_factory=Counter)
     disagreements: list[Disagreement] = field(default_factory=list)
@@ -97,7 +103,8 @@ class Summary:
         """Take in a frame; `opinions` are FCL's of its contacts, if it was asked."""
         self.steps, self.seconds = frame.step, frame.time
         self.report = _sum(self.report, frame.bodies.report())
-        self.skipped, self.decomposed = frame.bodies.skipped, frame.bodies.decomposed
+        note_skipped(self.skipped, frame)
+        self.decomposed = frame.bodies.decomposed
         names = frame.bodies.names
         self.forces |= frame.forces is not None
         for links, pair, force in overlapping_links(frame):
@@ -139,7 +146,7 @@ class Summary:
                 for key, pair in sorted(self.pairs.items(), key=lambda item: -item[1].volume)
             ],
             "report": asdict(self.report) if self.report else None,
-            "skipped": [asdict(each) for each in self.skipped],
+            "skipped": [asdict(each) | {"first_step": step} for each, step in self.skipped.items()],
             "decomposed": [
                 asdict(each) | {"shapes": [*each.shapes], "path": str(each.path) if each.path else None}
                 for each in self.decomposed

@@ -56,10 +56,16 @@ def test_a_concave_mesh_is_reported_with_its_parts_volume_and_cache_file():
 
 
 def test_skipped_shapes_and_examined_pairs_are_reported():
-    summary = Summary("pile", report=Report(1, 3, 2, 1, 1, 1, 0, 9, 8), skipped=[Skipped(0, -1, "net", "it is soft")])
+    net = {Skipped(0, -1, "net", "it is soft"): 1, Skipped(2, -1, "duck", "it is nowhere", diverged=True): 7}
+    summary = Summary("pile", report=Report(1, 3, 2, 1, 1, 1, 0, 9, 8), skipped=net)
     first, *rest = remarks(summary)
     assert first == "1 bodies, 2 of 3 shapes read"
-    assert rest[-2:] == ["1 overlap, none of them measured again in wider arithmetic", "Not modelled: net, it is soft."]
+    assert rest[-3:] == [
+        "1 overlap, none of them measured again in wider arithmetic",
+        "Not modelled: net, it is soft.",
+        "Not modelled from step 7 on: duck, it is nowhere.",
+    ]
+    assert [(each["name"], each["first_step"]) for each in summary.as_dict()["skipped"]] == [("net", 1), ("duck", 7)]
     assert "1 of them measured again" in str(Report(1, 3, 2, 1, 1, 1, 1, 9, 8))
 
 

@@ -75,7 +75,7 @@ def test_a_body_without_a_finite_pose_is_named_once_and_left_out_until_it_has_on
     lost = box(client, position=[5, 0, 0])
     bodies = Bodies(client)
     p.resetBasePositionAndOrientation(lost, *pose, physicsClientId=client)
-    with pytest.warns(SkippedShapeWarning, match=rf"box \(body {lost}, .* no finite pose: .* diverged") as told:
+    with pytest.warns(SkippedShapeWarning, match=rf"box#{lost} \(body {lost}, .* no finite pose: .* diverged") as told:
         bodies.update()
     assert len(told) == 1 and told[0].filename == __file__
     for _ in range(2):
@@ -99,7 +99,7 @@ def test_bodies_are_read_beside_one_that_has_diverged_before(client):
     ids = [box(client, position=[0.9 * x, 0, 0]) for x in range(2)]
     p.resetBasePositionAndOrientation(ids[1], [np.nan] * 3, [0, 0, 0, 1], physicsClientId=client)
     ids.append(box(client, position=[-0.9, 0, 0]))
-    with pytest.warns(SkippedShapeWarning, match=rf"box \(body {ids[1]}, "):
+    with pytest.warns(SkippedShapeWarning, match=rf"box#{ids[1]} \(body {ids[1]}, "):
         bodies = Bodies(client)
     assert [(c.bodyA, c.bodyB) for c in bodies.overlaps()] == [(ids[0], ids[2])]
     assert [key[0] for key in bodies.keys] == [ids[0], ids[2]]
