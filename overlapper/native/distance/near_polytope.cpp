@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "geometry/predicates.h"
+
 namespace overlapper {
 namespace {
 
@@ -18,15 +20,27 @@ NearPolytope::NearPolytope(const WideBody& body, const WideVector& about)
   }
 }
 
+bool NearPolytope::in_a_plane(const Edge& ridge, const CoreSurface& surface) const {
+  if (ridge.left < 0) return false;
+  const auto &left = surface.facets[ridge.left], &right = surface.facets[ridge.right];
+  if (left[2] < 0 || right[2] < 0) return false;
+  return std::ranges::all_of(right, [&](int corner) {
+    return orientation(local_[left[0]], local_[left[1]], local_[left[2]], local_[corner]) == 0;
+  });
+}
+
 void NearPolytope::cut(Vec3 direction, double height) {
   std::vector<char> kept;
   for (const NearCorner& c : corners) kept.push_back(dot(direction, c.at) + c.lost >= height);
   CoreSurface surface;
   ask(body_.shape, [&](const auto& s) { s.append_core_surface(kept, surface); });
   for (const auto& facet : surface.facets) facets.push_back({{}, facet});
-  for (const Edge& r : surface.ridges) ridges.push_back({r.from, r.to, r.left, r.right, {}, {}});
+  for (const Edge& r : surface.ridges)
+    if (!in_a_plane(r, surface)) ridges.push_back({r.from, r.to, r.left, r.right, {}, {}});
   for (NearFacet& facet : facets) facet.normal = rounded(normal(facet));
   for (NearRidge& ridge : ridges) complete(ridge);
+  const auto height_of = [&](const NearCorner& c) { return dot(direction, c.at); };
+  if (!corners.empty()) opposite_ = *std::ranges::min_element(corners, {}, height_of);
   size_t next = 0;
   std::erase_if(corners, [&](const NearCorner&) { return !kept[next++]; });
 }
@@ -49,7 +63,7 @@ double NearPolytope::lost(const NearFacet& facet) const {
 }
 
 double NearPolytope::least_reach(Vec3 direction) const {
-  double farthest = -kInfinity;
+  double farthest = opposite_ ? dot(direction, opposite_->at) - opposite_->lost : -kInfinity;
   for (const NearCorner& c : corners) farthest = std::max(farthest, dot(direction, c.at) - c.lost);
   return farthest;
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "shapes/wide_body.h"
@@ -61,12 +62,18 @@ class NearPolytope {
   double most_reach(Vec3 direction) const;
 
  private:
+  /// True if the facets beside the ridge are exactly in one plane. The ridge then gives no direction that the facets do
+  /// not give.
+  bool in_a_plane(const Edge& ridge, const CoreSurface& surface) const;
   void complete(NearRidge& ridge) const;
   NearCorner nearest(const NearRidge& ridge) const;
 
   const WideBody& body_;
   WideVector about_;
   std::vector<Vec3> local_;
+  /// The corner farthest from the contact. Without it, the corners that are kept would give a direction into the body
+  /// the reach of the contact alone.
+  std::optional<NearCorner> opposite_;
 };
 
 }  // namespace overlapper
