@@ -23,8 +23,9 @@ from overlapper import Batch, Hull, Overlaps, Placed
 from overlapper.audit.allowed import is_allowed, must_name_some
 from overlapper.columns import measures_of
 from overlapper.polytopes.decomposition import ROUNDING, NotDecomposed, WeldedMesh, decompose
-from overlapper.polytopes.mesh_file import ASSEMBLIES, BODIES, MeshPart, read_parts
+from overlapper.polytopes.mesh_file import BODIES, MeshPart, read_parts
 from overlapper.polytopes.mesh_overlap import mesh_overlap, window
+from overlapper.polytopes.mesh_parser import ASSEMBLIES
 from overlapper.printable import first_line
 from overlapper.simulation.links import LinkContact, link_contacts
 from overlapper.tables.still import Still

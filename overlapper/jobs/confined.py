@@ -23,6 +23,11 @@ from overlapper.printable import first_line
 P = ParamSpec("P")
 T = TypeVar("T")
 
+# Limits of what reads files from outside: far beyond what a file of this world takes, so that only those meet them that
+# would never end.
+SECONDS = 600.0
+MEGABYTES = 8192
+
 IDLE = 20  # s after which a process that nobody calls ends
 GRACE = 2  # s beyond the limit after which a process ends itself, as nobody waits for it any more
 
@@ -99,7 +104,9 @@ class Confined:
         if OUT_OF_MEMORY.search(ended.words):
             return Unanswered(f"needed more than {self.megabytes:,} MB")
         name = signal.Signals(-ended.code).name if ended.code is not None and ended.code < 0 else ""
-        return Unanswered(f"died with signal {name}" if name else f"had a process that {ended}", name)
+        if ended.code is None:
+            return Unanswered(f"had a process that {ended}")
+        return Unanswered(str(ended).replace("ended with", "ended its process with", 1), name)
 
 
 def answers(request: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any], float]) -> Iterator[tuple[bool, Any]]:

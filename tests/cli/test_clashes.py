@@ -363,7 +363,7 @@ def test_a_step_file_that_crashes_its_reader_is_named_and_the_others_measured(tm
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "fake"))
     (tmp_path / "bad.step").write_text("ISO-10303-21;\n")
     done = clashes("bad.step", "one.stl", "two.obj")
-    reason = "the process that read it ended with signal SIGABRT"
+    reason = "reading it ended its process with signal SIGABRT"
     assert (done.returncode, done.stderr) == (
         2,
         f"overlapper: bad.step is not a mesh that can be read: {reason}\n",

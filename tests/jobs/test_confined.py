@@ -96,9 +96,9 @@ def test_errors_are_raised_here_and_cost_no_process(confine):
     ("function", "sentence", "name"),
     [
         (hang_in_c, "took longer than 1 s", ""),
-        (os.abort, "died with signal SIGABRT", "SIGABRT"),
+        (os.abort, "ended its process with signal SIGABRT", "SIGABRT"),
         (abort_for_memory, "needed more than 256 MB", ""),
-        (exit_with_7, "had a process that ended with exit code 7", ""),
+        (exit_with_7, "ended its process with exit code 7", ""),
     ],
 )
 def test_a_call_without_an_answer_is_a_sentence_and_the_next_call_is_answered(confine, function, sentence, name):
@@ -124,7 +124,8 @@ def test_a_limit_of_memory_is_kept(confine):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no process groups")
 @pytest.mark.parametrize(
-    ("how", "sentence"), [("dies", "died with signal SIGKILL"), ("hangs", "took longer than 1 s"), ("answers", "")]
+    ("how", "sentence"),
+    [("dies", "ended its process with signal SIGKILL"), ("hangs", "took longer than 1 s"), ("answers", "")],
 )
 def test_children_that_hold_a_pipe_end_with_the_process(confine, tmp_path, how, sentence):
     file, start = tmp_path / "child", time.monotonic()
@@ -141,7 +142,7 @@ def test_children_that_hold_a_pipe_end_with_the_process(confine, tmp_path, how, 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no process groups")
 def test_a_child_that_has_left_the_group_delays_nothing(confine, tmp_path):
     file, start = tmp_path / "child", time.monotonic()
-    with pytest.raises(Unanswered, match="died with signal SIGKILL"):
+    with pytest.raises(Unanswered, match="ended its process with signal SIGKILL"):
         confine(leave_a_child, file, "escapes")
     assert time.monotonic() - start < 10
     os.kill(int(file.read_text()), signal.SIGKILL)

@@ -3,8 +3,10 @@
 import contextlib
 import io
 import json
+import os
 import re
 import struct
+import time
 import zipfile
 from datetime import timedelta
 
@@ -16,7 +18,8 @@ from hypothesis import strategies as st
 from mutation import mutated, said_by
 
 from overlapper import Hull, read_hull
-from overlapper.polytopes import mesh_file
+from overlapper.jobs.confined import Confined
+from overlapper.polytopes import mesh_file, mesh_parser
 from overlapper.polytopes.mesh_file import read_parts
 
 CORNERS = np.random.default_rng(0).normal(size=(12, 3))
@@ -100,6 +103,77 @@ def test_counts_of_off_and_indices_of_obj_that_are_not_there_are_refused(tmp_pat
     assert refusal(tmp_path / "x.off") and refusal(tmp_path / "x.obj")
 
 
+PIPES = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes")
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+
+
+@PIPES
+def test_a_pipe_is_refused_as_a_mesh_and_as_a_file_that_a_mesh_needs(tmp_path):
+    for name in ("pipe.obj", "pipe"):
+        os.mkfifo(tmp_path / name)
+    assert refusal(tmp_path / "pipe.obj") == "it is a pipe or a device, and no file"
+    with pytest.raises(ValueError, match=r"is not a mesh that can be read: it is a pipe or a device, and no file$"):
+        read_parts(tmp_path / "pipe.obj")
+    (tmp_path / "x.gltf").write_text(json.dumps(scene(uri="pipe")))
+    assert refusal(tmp_path / "x.gltf") == "it needs 'pipe', and there is no such file beside it"
+    (tmp_path / "x.obj").write_text("mtllib pipe\nusemtl a\n" + TETRAHEDRON)
+    assert read_hull(tmp_path / "x.obj").volume == pytest.approx(1 / 6)
+
+
+def test_a_folder_and_a_file_that_is_not_there_are_errors_of_the_system(tmp_path):
+    with pytest.raises(IsADirectoryError):
+        read_hull(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        read_parts(tmp_path / "none.step")
+
+
+@PIPES
+def test_a_texture_is_not_opened(tmp_path, capfd):
+    head = "ply\nformat ascii 1.0\ncomment TextureFile /dev/zero\nelement vertex 4\n"
+    head += "".join(f"property float {axis}\n" for axis in "xyzst")
+    faces = "element face 4\nproperty list uchar int vertex_indices\nend_header\n"
+    corners = "0 0 0 0 0\n1 0 0 0 0\n0 1 0 0 0\n0 0 1 0 0\n"
+    (tmp_path / "x.ply").write_text(f"{head}{faces}{corners}3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n")
+    assert read_hull(tmp_path / "x.ply").volume == pytest.approx(1 / 6)
+    os.mkfifo(tmp_path / "picture.png")
+    picture = {"images": [{"uri": "picture.png"}], "textures": [{"source": 0}]}
+    material = {"materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]}
+    whole = scene(3) | picture | material
+    whole["meshes"][0]["primitives"][0]["material"] = 0
+    (tmp_path / "x.gltf").write_text(json.dumps(whole))
+    assert "picture" not in refusal(tmp_path / "x.gltf")  # its corners are nowhere
+    assert capfd.readouterr().err == ""
+
+
+def test_an_obj_of_many_materials_is_one_mesh_and_read_as_fast_as_without(tmp_path):
+    faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n" * 500
+    (tmp_path / "x.obj").write_text(
+        TETRAHEDRON + "".join(f"usemtl m{k}\n{f}\n" for k, f in enumerate(faces.split("\n")))
+    )
+    (tmp_path / "y.obj").write_text(TETRAHEDRON + faces)
+    (dear,), (plain,) = read_parts(tmp_path / "x.obj"), read_parts(tmp_path / "y.obj")
+    assert np.array_equal(dear.triangles, plain.triangles)
+    start = time.process_time()
+    mesh_parser.parts(tmp_path / "x.obj", "m")
+    assert time.process_time() - start < 1.0  # a mesh for each material took 4 s
+
+
+def test_few_materials_leave_the_order_of_triangles_as_trimesh_has_it(tmp_path):
+    (tmp_path / "x.obj").write_text(TETRAHEDRON.replace("f 2", "usemtl b\nf 2").replace("f 1 3", "usemtl a\nf 1 3"))
+    (part,) = read_parts(tmp_path / "x.obj")
+    assert part.triangles[0].tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+
+
+def test_meshes_share_a_process_which_ends_with_one_that_breaks_a_limit(tmp_path, monkeypatch):
+    (tmp_path / "x.obj").write_text(TETRAHEDRON)
+    read_hull(tmp_path / "x.obj")
+    first = mesh_file.confined(os.getpid)
+    read_parts(tmp_path / "x.obj")
+    assert mesh_file.confined(os.getpid) == first != os.getpid()
+    monkeypatch.setattr(mesh_file, "confined", Confined(0.0, 256))
+    assert refusal(tmp_path / "x.obj") == "reading it took longer than 0 s"
+
+
 def scene(count=4, nodes=1, **buffer):
     """A glTF scene of one mesh. Its buffer has four corners; its accessor claims `count` indices."""
     corners = {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}
@@ -135,9 +209,10 @@ def test_numbers_in_a_file_beside_the_scene_are_there(tmp_path):
 
 
 def test_a_mesh_that_a_scene_shows_too_often_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(mesh_file, "MOST_SHOWN", 1000)
+    monkeypatch.setattr(mesh_parser, "MOST_SHOWN", 1000)
     (tmp_path / "x.gltf").write_text(json.dumps(scene(nodes=126)))
-    assert refusal(tmp_path / "x.gltf") == "it shows 1,008 corners and indices, which is more than 1,000"
+    with pytest.raises(ValueError, match=r"^it shows 1,008 corners and indices, which is more than 1,000$"):
+        mesh_parser.hull(tmp_path / "x.gltf")
 
 
 def package(path, objects, build, **files):
