@@ -24,9 +24,20 @@ enum class Way {
   kDoubt,           ///< neither doubles nor double-doubles tell whether there is an inside: the bodies touch
   kPaper,           ///< the article's method, as asked for
 };
-inline constexpr std::array<const char*, 11> kWayNames{
-    "separation",      "clipping",      "tracing",        "closed form", "slicing", "dual hull",
-    "wide separation", "wide clipping", "wide dual hull", "doubt",       "paper"};
+inline constexpr auto kWayNames = std::to_array<const char*>({
+    "separation",
+    "clipping",
+    "tracing",
+    "closed form",
+    "slicing",
+    "dual hull",
+    "wide separation",
+    "wide clipping",
+    "wide dual hull",
+    "doubt",
+    "paper",
+});
+static_assert(kWayNames.size() == static_cast<size_t>(Way::kPaper) + 1, "each way has a name");
 inline const char* name(Way way) { return kWayNames[static_cast<size_t>(way)]; }
 
 /// Doubles were not enough for the volume, and it was computed again in wider arithmetic.

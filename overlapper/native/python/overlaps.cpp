@@ -341,6 +341,12 @@ disc within 2 %, of a triangle 2 % more, and of a thin ring 6 % less. None witho
       "(2, 3) lower and upper corner of the box around the common polytope; None unless overlapping.");
 }
 
+std::string signature_of_way() {
+  std::string ways;
+  for (const char* way : kWayNames) ways += (ways.empty() ? "'" : ", '") + std::string(way) + "'";
+  return "def way(self) -> typing.Literal[" + ways + "]";
+}
+
 void define_overlap(nb::module_& m) {
   nb::class_<Overlap> cls(m, "Overlap",
                           R"(What two or more convex shapes share. True only if they overlap.
@@ -370,10 +376,7 @@ smooth shape is given, leave more in doubt. True of bodies that do not overlap.)
       "method", [](const Overlap& o) { return o.method() == Method::kAuto ? "auto" : "paper"; },
       nb::sig("def method(self) -> typing.Literal['auto', 'paper']"));
   cls.def_prop_ro(
-      "way", [](const Overlap& o) { return name(measured(o).way()); },
-      nb::sig(
-          "def way(self) -> typing.Literal['separation', 'clipping', 'tracing', 'closed form', 'slicing', 'dual hull', "
-          "'wide separation', 'wide clipping', 'wide dual hull', 'doubt', 'paper']"),
+      "way", [](const Overlap& o) { return name(measured(o).way()); }, nb::sig(signature_of_way().c_str()),
       R"(How the answer came: by which way the volume was measured, or the status found of bodies that do not overlap.
 
 'separation': doubles prove a gap. 'clipping': corners of each body held against the planes of the other. 'tracing': the

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from families import prism
 
-from overlapper import Box, Hull, Overlaps, Placed, overlap, overlaps, random_polytope
+from overlapper import Box, Hull, Overlap, Overlaps, Placed, overlap, overlaps, random_polytope
 from speed.ways import AROUND, CUBE, FLOOR, TURN, TYPICAL
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -43,6 +43,10 @@ def test_every_way_is_explained_once():
     assert [row[0] for row in rows_below("`Overlap.way`", "the answer", "code")] == [
         f"`{way}`" for way in Overlaps.WAYS
     ]
+
+
+def test_the_docstring_of_way_explains_every_way():
+    assert all(f"'{way.removeprefix('wide ')}'" in Overlap.way.__doc__ for way in Overlaps.WAYS)
 
 
 def test_limits_are_those_by_which_the_code_chooses():

@@ -1,6 +1,8 @@
 """The public surface of the native core is a text under version control: a change of it is a line in a diff."""
 
+import ast
 import difflib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +19,11 @@ def test_the_native_surface_is_the_committed_one():
     )
     changes = "\n".join(difference)
     assert not changes, f"{changes}\nIf the change is meant: cp {built} {COMMITTED}"
+
+
+def test_the_type_of_ways_has_all_their_names():
+    literal = re.search(r"def way\(self\) -> Literal\[(.*)\]", COMMITTED.read_text())[1]
+    assert ast.literal_eval(f"({literal})") == overlapper.Overlaps.WAYS
 
 
 def test_user_programs_type_check_against_the_stub(tmp_path):
