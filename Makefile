@@ -59,7 +59,7 @@ coverage-core: build/coverage/dev ## report the lines of the core that its own t
 	@$(VENV)/bin/python -m gcovr --root overlapper/native --exclude-throw-branches --gcov-ignore-parse-errors=all \
 	  --object-directory $(COUNTED) $(COUNTED) --fail-under-line=$(LEAST_OF_CORE)
 
-mutants: $(VENV)/dev ## change one operator of the core at a time, report which changes no test notices
+mutants: $(VENV)/dev ## change one operator at a time, report which changes no test notices and what was left out
 	@$(VENV)/bin/python tests/native/mutants.py $(MUTANTS)
 
 growth: $(VENV)/dev ## look for inputs that take time out of proportion to their size, with GROWTH="--rounds 50 --seed 0"

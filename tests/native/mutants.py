@@ -1,18 +1,23 @@
-"""Which small faults of the core its tests notice: `make mutants`.
+"""Which small faults of the package its tests notice: `make mutants`.
 
-A mutant is the core with one operator or constant changed: + for -, < for <=, && for ||, min for max, no ! and so on.
-A seed draws some of them. They are built all at once in a copy of the tree under build/mutants, each behind its number,
-and shown to the tests of the core one by one. The recorded answers come first, as they notice most mutants within a
-second or two; the tests of the mutant's folder follow, and then all tests of the core. Mutants of forces/ are shown to
-the tests of forces alone, as no other native test reaches them. A mutant that no test notices is either equivalent, and
-then named in EQUIVALENT with the reason, or a test is missing. Results are kept in build/mutants and not asked for
-again; `--again` shows the survivors once more.
+A mutant is the core, or with `--python` the package, with one operator or constant changed: + for -, < for <=, && for
+||, min for max, no ! and so on. A seed draws some of them. Mutants of the core are built all at once in a copy of the
+tree under build/mutants, each behind its number, and shown to the tests of the core one by one. The recorded answers
+come first, as they notice most mutants within seconds. The tests of the mutant's folder follow, and then all tests of
+the core. Mutants of forces/ are shown to the tests of forces alone, as no other native test reaches them. A mutant of
+Python is shown to the tests of its folder, and then to all tests but those of the core.
+
+A mutant that no test notices is either equivalent, and then named in EQUIVALENT with the reason, or a test is missing.
+Results are kept in build/mutants and not asked for again, so that a run goes on where it ended; `--again` shows the
+survivors once more. The last lines say which mutants and tests were left out.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import io
+import keyword
 import os
 import random
 import re
@@ -21,16 +26,22 @@ import shutil
 import signal
 import subprocess
 import sys
+import tokenize
 import venv
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from overlapper import _core
+
 ROOT = Path(__file__).resolve().parents[2]
 WORK = ROOT / "build" / "mutants"
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.csv")
-NOT_THE_CORE = ("python", "fuzz")
-PATIENCE = 10  # times the processor time that tests may take: a mutant may wait for ever
+NATIVE = "overlapper/native/"
+NOT_THE_CORE = ("python/", "fuzz/")
+PATIENCE = 10  # seconds that pass for one of processor time: others may use the machine, and a mutant may wait for ever
+SLOWER = 5  # times the processor time of the first tests without a mutant, after which a mutant counts as endless
+LEAST_SECONDS, MOST_SECONDS = 30, 900  # of processor time; the latter for tests that are not timed without a mutant
 ADDRESS_SPACE = 6 << 30  # bytes: a mutant may ask for memory without end
 
 SWAPS = {
@@ -50,16 +61,21 @@ TOKEN = re.compile(
 )
 NOT_RUN = re.compile(r"^\s*(#|assert\(|static_assert|throw |using |template|///|\*|case )")
 
-# Tests of the core that such faults cannot change: those of the stub, memory and signals.
+WORDS = {"and": "or", "or": "and", "True": "False", "False": "True", "min": "max", "max": "min", "any": "all",
+         "all": "any", "not": ""}  # fmt: skip
+NOT_RUN_IN_PYTHON = re.compile(r"^\s*(import |from |@|raise |def |class )")
+
+# Tests that such faults cannot change: those of the stub, memory, signals and of this file.
 LEFT_OUT = ("test_stub.py", "test_out_of_memory.py", "test_mutants.py")
 NOT_ASKED = "not memory and not ctrl_c and not spawn and not process"
 QUICK = "tests/native/test_recorded_answers.py"
+NOT_OF_PYTHON = ("__pycache__", "benchmarks", "fuzz", "native", "support")
 OF_FORCES = ["tests/native/forces", "tests/native/python/test_contact_solver.py"]
 
 
 @dataclass(frozen=True)
 class Mutant:
-    file: str  # below the native folder
+    file: str  # below the native folder; of Python, below the package
     line: int  # from 0
     before: str  # the line
     start: int  # of what is changed in it
@@ -71,13 +87,18 @@ class Mutant:
         return self.before[: self.start] + self.new + self.before[self.end :]
 
     @property
-    def tests(self) -> list[list[str]]:
-        """The tests that may notice it, in stages: tests mirror the folders of the core."""
+    def stages(self) -> list[list[str]]:
+        """The tests that may notice it, those that are likely to first: tests mirror the folders of the package."""
         folder = self.file.split("/")[0]
-        if folder == "forces":
-            return [OF_FORCES]
-        own = f"tests/native/{folder}"
-        stages = [[QUICK], [own], ["tests/native", f"--ignore={QUICK}", f"--ignore={own}"]]
+        if self.file.endswith(".py"):
+            own = f"tests/{folder}" if "/" in self.file else f"tests/test_{folder}"
+            folders = sorted(path.name for path in (ROOT / "tests").iterdir() if path.is_dir())
+            stages = [[own], [f"tests/{name}" for name in folders if name not in (folder, *NOT_OF_PYTHON)]]
+        elif folder == "forces":
+            stages = [OF_FORCES]
+        else:
+            own = f"tests/native/{folder}"
+            stages = [[QUICK], [own], ["tests/native", f"--ignore={QUICK}", f"--ignore={own}"]]
         return [stage for stage in stages if (ROOT / stage[0]).exists()]
 
     @property
@@ -87,7 +108,7 @@ class Mutant:
 
 
 def code_of(line: str) -> str:
-    return line.partition(" //")[0].strip()
+    return re.split(r" //|  # ", line)[0].strip()
 
 
 def mutants_of(file: str, text: str) -> list[Mutant]:
@@ -104,14 +125,37 @@ def mutants_of(file: str, text: str) -> list[Mutant]:
     return found
 
 
-def all_mutants(native: Path) -> list[Mutant]:
-    files = sorted(path for path in native.rglob("*") if path.suffix in (".cpp", ".h"))
-    names = [path.relative_to(native).as_posix() for path in files]
+def mutants_of_python(file: str, text: str) -> list[Mutant]:
+    found, lines = [], text.split("\n")
+    tokens = list(tokenize.generate_tokens(io.StringIO(text).readline))
+    for before, token, after in zip(tokens, tokens[1:], tokens[2:]):
+        (row, start), (_, end), line = token.start, token.end, lines[token.start[0] - 1 : token.start[0]]
+        if not line or NOT_RUN_IN_PYTHON.match(line[0]) or tokenize.STRING in (before.type, after.type):
+            continue
+        spaced = line[0][:start].endswith(" ") and line[0][end:].startswith(" ")
+        new = None
+        if token.type == tokenize.NAME:
+            new = WORDS.get(token.string)
+        elif token.type == tokenize.NUMBER or spaced:
+            new = SWAPS.get(token.string)
+        elif token.string == "-" and (before.string in "([{=,:<>+-*/" or keyword.iskeyword(before.string)):
+            new = ""
+        if new is not None:
+            found.append(Mutant(file, row - 1, line[0], start, end, new))
+    return found
+
+
+def all_mutants(python: bool = False) -> list[Mutant]:
+    folder, kinds, find = ROOT / NATIVE, (".cpp", ".h"), mutants_of
+    if python:
+        folder, kinds, find = ROOT / "overlapper", (".py",), mutants_of_python
+    files = sorted(path for path in folder.rglob("*") if path.suffix in kinds)
+    names = [path.relative_to(folder).as_posix() for path in files]
     return [
         mutant
         for name, path in zip(names, files)
         if not name.startswith(NOT_THE_CORE)
-        for mutant in mutants_of(name, path.read_text())
+        for mutant in find(name, path.read_text())
     ]
 
 
@@ -206,71 +250,44 @@ def switched(text: str, mutants: dict[int, Mutant]) -> tuple[str, dict[int, list
     return text, lines
 
 
-class Bench:
-    """A copy of the tree, built once with some mutants in it, which are then shown to the tests one by one."""
+def write(path: Path, content: bytes) -> None:
+    """Leaves a file as it is that has this content, so that nothing is built again without need."""
+    if not path.exists() or path.read_bytes() != content:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
 
-    def __init__(self, folder: Path, mutants: dict[int, Mutant]) -> None:
-        self.tree, self.build, self.python = folder / "tree", folder / "build", folder / "venv" / "bin" / "python"
+
+class Bench:
+    """A copy of the tree in which mutants are shown to tests one by one."""
+
+    folder: Path
+
+    def __init__(self, mutants: dict[int, Mutant]) -> None:
+        self.tree, self.python = self.folder / "tree", self.folder / "venv" / "bin" / "python"
         self.mutants = mutants
+        self.limits: dict[str, int] = {}  # seconds of processor time for some tests
         listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
         names = [name for name in run(listed, ROOT).stdout.split("\0") if name and (ROOT / name).is_file()]
-        shutil.rmtree(self.tree, ignore_errors=True)
-        for name in names:
-            (self.tree / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, self.tree / name)
-        # As they are now: others may change them while they are built and shown.
-        self.texts = {mutant.file: (self.native / mutant.file).read_text() for mutant in mutants.values()}
+        # As they are now: others may change them while mutants are built and shown.
+        self.files = {name: (ROOT / name).read_bytes() for name in names}
+        for path in self.tree.rglob("*"):
+            if path.is_file() and path.relative_to(self.tree).as_posix() not in self.files:
+                path.unlink()
+        self.prepare()
         if not self.python.exists():
-            venv.create(folder / "venv", symlinks=True)
+            venv.create(self.folder / "venv", symlinks=True)
         # Folders that a .pth names are on the path, but their own .pth are not read: the tree comes before an editable
         # package.
-        site = next((folder / "venv").glob("lib/python*/site-packages"))
+        site = next((self.folder / "venv").glob("lib/python*/site-packages"))
         others = [path for path in sys.path if path.endswith("site-packages")]
         (site / "tree.pth").write_text("\n".join([str(self.tree), *others]) + "\n")
-        switch = folder / "switch.h"
-        switch.write_text(SWITCH)
-        # Hardly optimised: sooner built, and the same bits.
-        settings = [f"-DPython_EXECUTABLE={sys.executable}", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG"]
-        settings += [f"-DCMAKE_CXX_FLAGS=-w -include {switch}"]
-        run(["cmake", "-S", str(self.native), "-B", str(self.build), *settings], self.tree)
-        self.compile()
+        self.measure_limits()
 
-    @property
-    def native(self) -> Path:
-        return self.tree / "overlapper" / "native"
+    def measure_limits(self) -> None:
+        pass
 
-    def compile(self) -> None:
-        """Leaves out mutants that do not compile, or not behind a switch."""
-        while True:
-            lines = {}
-            for file in sorted({mutant.file for mutant in self.mutants.values()}):
-                of_file = {number: mutant for number, mutant in self.mutants.items() if mutant.file == file}
-                text, lines[file] = switched(self.texts[file], of_file)
-                if text != (self.native / file).read_text():
-                    (self.native / file).write_text(text)
-            command = ["cmake", "--build", str(self.build), "--target", "_core", "--parallel", f"{os.cpu_count()}"]
-            done = run([*command, "--", "-k"], self.tree, check=False)
-            if done.returncode == 0:
-                break
-            wrong = set()
-            for file, line in re.findall(
-                r"^(\S+?):(\d+):\d+: +(?:fatal )?error", done.stdout + done.stderr, re.MULTILINE
-            ):
-                name = Path(file).resolve().relative_to(self.native.resolve()).as_posix() if "native" in file else ""
-                wrong |= {*lines.get(name, {}).get(int(line) - 1, [])}
-            if not wrong:
-                raise SystemExit((done.stdout + done.stderr)[-3000:])
-            print(f"{len(wrong)} mutants do not compile", flush=True)
-            for number in wrong:
-                file, line = self.mutants[number].file, self.mutants[number].line
-                del self.mutants[number]
-                if not any(mutant.file == file for mutant in self.mutants.values()):
-                    (self.native / file).write_text(self.texts[file])
-        for module in self.build.glob("_core*.so"):
-            shutil.copyfile(module, self.tree / "overlapper" / module.name)
-        for tests in ([QUICK], OF_FORCES):
-            if failed := self.complaint(0, tests, seconds=600):
-                raise SystemExit(f"without a mutant: {failed}")
+    def prepare(self) -> None:
+        raise NotImplementedError
 
     def complaint(self, number: int, tests: list[str], seconds: int) -> str:
         """The test that fails with the mutant of that number, or nothing if all pass."""
@@ -285,18 +302,111 @@ class Bench:
             return ""
         if done.returncode == -signal.SIGXCPU:
             return f"no end in {seconds} s of processor time"
-        noticed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+        noticed = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, re.MULTILINE)
         if noticed:
             return noticed[1]
         return f"the process ended by {done.returncode}" if done.returncode < 0 else done.stdout[-300:].strip()
 
     def noticed(self, number: int, quick: bool) -> str:
-        first, *others = self.mutants[number].tests
-        if quick:
-            others = []
-        return self.complaint(number, first, seconds=90) or next(
-            filter(None, (self.complaint(number, tests, seconds=900) for tests in others)), ""
-        )
+        stages = self.mutants[number].stages[: 1 if quick else None]
+        return next(filter(None, (self.complaint_by_mutant(number, tests) for tests in stages)), "")
+
+    def complaint_by_mutant(self, number: int, tests: list[str]) -> str:
+        found = self.complaint(number, tests, self.limits.get(tests[0], MOST_SECONDS))
+        if found.startswith("tests/") and (failed := self.complaint(0, [found], MOST_SECONDS)):
+            raise SystemExit(f"without a mutant: {failed}")
+        return found
+
+
+class NativeBench(Bench):
+    """All mutants in one build, each behind its number."""
+
+    folder = WORK / "core"
+
+    def prepare(self) -> None:
+        self.build = self.folder / "build"
+        self.lines = self.write_mutants()
+        switch = self.folder / "switch.h"
+        write(switch, SWITCH.encode())
+        settings = [f"-DPython_EXECUTABLE={sys.executable}", "-DCMAKE_CXX_FLAGS_RELEASE=-O2 -DNDEBUG"]
+        settings += [f"-DCMAKE_CXX_FLAGS=-w -include {switch}"]
+        run(["cmake", "-S", str(self.tree / NATIVE), "-B", str(self.build), *settings], self.tree)
+        while wrong := self.not_compiling():
+            for number in wrong:
+                del self.mutants[number]
+            self.lines = self.write_mutants()
+        for module in self.build.glob("_core*.so"):
+            shutil.copyfile(module, self.tree / "overlapper" / module.name)
+
+    def measure_limits(self) -> None:
+        """From the processor time that the first tests take without a mutant."""
+        for tests in (mutant.stages[0] for mutant in self.mutants.values()):
+            if tests[0] not in self.limits:
+                before = resource.getrusage(resource.RUSAGE_CHILDREN)
+                if failed := self.complaint(0, tests, MOST_SECONDS):
+                    raise SystemExit(f"without a mutant: {failed}")
+                after = resource.getrusage(resource.RUSAGE_CHILDREN)
+                self.limits[tests[0]] = int(SLOWER * (after.ru_utime - before.ru_utime)) + LEAST_SECONDS
+
+    def write_mutants(self) -> dict[str, dict[int, list[int]]]:
+        """Which mutants there are in each line of each file."""
+        texts, lines = dict(self.files), {}
+        for file in {mutant.file for mutant in self.mutants.values()}:
+            of_file = {number: mutant for number, mutant in self.mutants.items() if mutant.file == file}
+            text, lines[file] = switched(self.files[NATIVE + file].decode(), of_file)
+            texts[NATIVE + file] = text.encode()
+        for name, content in texts.items():
+            write(self.tree / name, content)
+        return lines
+
+    def not_compiling(self) -> set[int]:
+        """Mutants that do not compile, or not behind a switch."""
+        command = ["cmake", "--build", str(self.build), "--target", "_core", "--parallel", f"{os.cpu_count()}"]
+        done = run([*command, "--", "-k"], self.tree, check=False)
+        if done.returncode == 0:
+            return set()
+        said, wrong = done.stdout + done.stderr, set()
+        for file, line in re.findall(r"^(\S+?):(\d+):\d+: +(?:fatal )?error", said, re.MULTILINE):
+            path = (self.build / file).resolve()  # ccache may say it from there
+            if path.is_relative_to(self.tree / NATIVE):
+                of_file = self.lines.get(path.relative_to(self.tree / NATIVE).as_posix(), {})
+                wrong |= {*of_file.get(int(line) - 1, [])}
+        if not wrong:
+            raise SystemExit(said[-3000:])
+        return wrong
+
+
+class PythonBench(Bench):
+    """One mutant at a time, in the file itself."""
+
+    folder = WORK / "python"
+
+    def prepare(self) -> None:
+        for name, content in self.files.items():
+            write(self.tree / name, content)
+        for number, text in {number: self.text_with(number) for number in self.mutants}.items():
+            try:
+                compile(text, self.mutants[number].file, "exec")
+            except SyntaxError:
+                del self.mutants[number]
+        core = Path(_core.__file__)
+        for built in core.parent.glob("_core*"):
+            shutil.copyfile(built, self.tree / "overlapper" / built.name)
+
+    def complaint(self, number: int, tests: list[str], seconds: int) -> str:
+        if not number:
+            return super().complaint(number, tests, seconds)
+        file = f"overlapper/{self.mutants[number].file}"
+        write(self.tree / file, self.text_with(number))
+        try:
+            return super().complaint(number, tests, seconds)
+        finally:
+            write(self.tree / file, self.files[file])
+
+    def text_with(self, number: int) -> bytes:
+        mutant = self.mutants[number]
+        lines = self.files[f"overlapper/{mutant.file}"].decode().split("\n")
+        return "\n".join([*lines[: mutant.line], mutant.after, *lines[mutant.line + 1 :]]).encode()
 
 
 def run(command, folder, seconds=0, check=True, mutant=None):
@@ -306,14 +416,16 @@ def run(command, folder, seconds=0, check=True, mutant=None):
         resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
 
-    alone = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OVERLAPPER_MUTANT": f"{mutant or 0}"}
+    # Compiled Python is told from a mutant's by its second of time and its size, which a mutant may share.
+    alone = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     return subprocess.run(
-        command, cwd=folder, env={**os.environ, **alone}, capture_output=True, text=True, errors="replace", check=check,
-        timeout=PATIENCE * seconds or None, preexec_fn=None if mutant is None else limit,
+        command, cwd=folder, env={**os.environ, **alone, "OVERLAPPER_MUTANT": f"{mutant or 0}"}, capture_output=True,
+        text=True, errors="replace", check=check, timeout=PATIENCE * seconds or None,
+        preexec_fn=None if mutant is None else limit,
     )  # fmt: skip
 
 
-COLUMNS = ["file", "line", "before", "after", "noticed_by"]
+COLUMNS = ["file", "before", "after", "noticed_by"]
 
 
 def read_results(path: Path) -> dict[tuple[str, str, str], str]:
@@ -323,51 +435,80 @@ def read_results(path: Path) -> dict[tuple[str, str, str], str]:
         return {(row["file"], row["before"], row["after"]): row["noticed_by"] for row in csv.DictReader(lines)}
 
 
+def keep_results(path: Path, results: dict[tuple[str, str, str], str]) -> None:
+    with path.open("w", newline="") as out:
+        csv.writer(out, lineterminator="\n").writerows([COLUMNS, *([*name, by] for name, by in results.items())])
+
+
+@dataclass(frozen=True)
+class Draw:
+    asked: list[Mutant]
+    elsewhere: int  # mutants of other folders
+    known: int  # as equivalent
+    not_drawn: int
+
+
+def draw(everything: list[Mutant], seed: int, count: int, under: str) -> Draw:
+    equivalent = known_equivalent()
+    shuffled = random.Random(seed).sample(everything, len(everything))
+    inside = [mutant for mutant in shuffled if mutant.file.startswith(under)]
+    unknown = [mutant for mutant in inside if mutant.name not in equivalent]
+    return Draw(unknown[:count], len(shuffled) - len(inside), len(inside) - len(unknown), max(0, len(unknown) - count))
+
+
+def report(drawn: Draw, made: list[Mutant], earlier: int, results: dict[tuple[str, str, str], str]) -> list[str]:
+    """The survivors, how many were noticed, and all that was left out."""
+    shown = [mutant for mutant in made if mutant.name in results]
+    survived = [mutant for mutant in shown if not results[mutant.name]]
+    return [
+        *map(survivor, survived),
+        f"{len(shown) - len(survived)} of {len(shown)} mutants are noticed.",
+        "Left out:",
+        f"- {drawn.known} mutants known as equivalent, {len(drawn.asked) - len(made)} that do not compile",
+        f"- {drawn.not_drawn} mutants not drawn, {drawn.elsewhere} elsewhere, and all of {NATIVE}{{python,fuzz}}",
+        f"- {len(made) - len(shown)} mutants not shown before the end, {earlier} shown by earlier runs only",
+        f"- tests in {', '.join(LEFT_OUT)}, and those of other names than -k '{NOT_ASKED}'",
+    ]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int, default=200, help="mutants drawn that are not known as equivalent")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="mutants shown to the tests at once")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="mutants of the core shown at once")
+    parser.add_argument("--python", action="store_true", help="mutants of Python in the place of the core's")
     parser.add_argument("--under", default="", help="the folder or file that mutants are drawn from, as in forces/")
     parser.add_argument("--quick", action="store_true", help="show them to the first tests only; then use --again")
     parser.add_argument("--again", action="store_true", help="show those once more that survived")
     chosen = parser.parse_args()
 
-    everything = all_mutants(ROOT / "overlapper" / "native")
-    equivalent = known_equivalent()
-    if gone := equivalent.keys() - {mutant.name for mutant in everything}:
+    core, package = all_mutants(), all_mutants(python=True)
+    if gone := known_equivalent().keys() - {mutant.name for mutant in core + package}:
         raise SystemExit(f"{EQUIVALENT.name} names what is not in the source: {sorted(gone)}")
-    drawn = random.Random(chosen.seed).sample(everything, len(everything))
-    asked = [mutant for mutant in drawn if mutant.name not in equivalent and mutant.file.startswith(chosen.under)]
-    bench = Bench(WORK, dict(enumerate(asked[: chosen.count], 1)))
-    print(f"{len(bench.mutants)} of {chosen.count} mutants compile", flush=True)
+    drawn = draw(package if chosen.python else core, chosen.seed, chosen.count, chosen.under)
+    bench = (PythonBench if chosen.python else NativeBench)(dict(enumerate(drawn.asked, 1)))
+    made = bench.mutants
+    print(f"{len(made)} of {len(drawn.asked)} mutants compile", flush=True)
 
-    file = WORK / f"seed-{chosen.seed}.csv"
-    known = {name: by for name, by in read_results(file).items() if by or not chosen.again}
-    results: dict[int, str] = {
-        number: known[mutant.name] for number, mutant in bench.mutants.items() if mutant.name in known
-    }
-
-    def write() -> None:
-        with file.open("w", newline="") as out:
-            writer = csv.writer(out, lineterminator="\n")
-            writer.writerow(COLUMNS)
-            for number, by in sorted(results.items()):
-                mutant = bench.mutants[number]
-                writer.writerow([mutant.name[0], mutant.line + 1, *mutant.name[1:], by])
+    file = WORK / f"{'python-' * chosen.python}seed-{chosen.seed}.csv"
+    results = {name: by for name, by in read_results(file).items() if by or not chosen.again}
+    left = [number for number in made if made[number].name not in results]
 
     def show(number: int) -> None:
-        results[number] = bench.noticed(number, chosen.quick)
-        print(f"{len(results)}/{len(bench.mutants)} {results[number] or survivor(bench.mutants[number])}", flush=True)
-        write()
+        results[made[number].name] = by = bench.noticed(number, chosen.quick)
+        keep_results(file, results)
+        shown = sum(mutant.name in results for mutant in made.values())
+        print(f"{shown}/{len(made)} {by or survivor(made[number])}", flush=True)
 
-    with ThreadPoolExecutor(chosen.jobs) as jobs:
-        for shown in [jobs.submit(show, number) for number in bench.mutants if number not in results]:
+    jobs = ThreadPoolExecutor(1 if chosen.python else chosen.jobs)
+    try:
+        for shown in [jobs.submit(show, number) for number in left]:
             shown.result()
-    write()
-    survived = [bench.mutants[number] for number, by in sorted(results.items()) if not by]
-    print(*map(survivor, survived), sep="\n")
-    print(f"{len(results) - len(survived)} of {len(results)} mutants of seed {chosen.seed} are noticed")
+    finally:
+        jobs.shutdown(cancel_futures=True)
+        print(*report(drawn, [*made.values()], len(made) - len(left), results), sep="\n")
+        if chosen.quick:
+            print("- by --quick, all tests but the first that a mutant is shown to")
 
 
 def survivor(mutant: Mutant) -> str:

@@ -1,7 +1,16 @@
 """The faults that are made by hand to see whether tests notice them."""
 
 import pytest
-from mutants import ROOT, all_mutants, expression_around, known_equivalent, mutants_of, switched
+from mutants import (
+    all_mutants,
+    draw,
+    expression_around,
+    known_equivalent,
+    mutants_of,
+    mutants_of_python,
+    report,
+    switched,
+)
 
 
 def changed(line):
@@ -62,6 +71,41 @@ def test_two_changes_of_one_expression_are_two_choices_of_it():
     assert lines == {1: [1, 2]}
 
 
+@pytest.mark.parametrize(
+    ("line", "after"),
+    [
+        ("    if a < b and not c:", {"    if a <= b and not c:", "    if a < b or not c:", "    if a < b and  c:"}),
+        ("    return min(-a, [*b][1:])", {"    return max(-a, [*b][1:])", "    return min(a, [*b][1:])",
+                                          "    return min(-a, [*b][0:])"}),
+        ("    raise ValueError(1 + 1)", set()),
+        ('    x = folder / "0 + 1"  # 0 + 1', set()),
+        ("def f(a, /, *, b=1):", set()),
+    ],
+)  # fmt: skip
+def test_operators_and_constants_of_python_are_changed(line, after):
+    assert {mutant.after for mutant in mutants_of_python("file.py", line + "\n")} == after
+
+
+def test_a_mutant_is_named_without_the_comment_of_its_line():
+    (native,) = mutants_of("f.cpp", "  c = a + b;  // a sum")
+    (python,) = mutants_of_python("f.py", "c = a + b  # a sum\n")
+    assert native.name == ("f.cpp", "c = a + b;", "c = a - b;")
+    assert python.name == ("f.py", "c = a + b", "c = a - b")
+
+
+def test_the_report_says_what_was_noticed_and_what_was_left_out():
+    everything = mutants_of("f.cpp", "a + b;\nc < d;\n") + mutants_of("g.cpp", "a * b;\n")
+    drawn = draw(everything, 0, 1, "f")
+    assert (len(drawn.asked), drawn.elsewhere, drawn.known, drawn.not_drawn) == (1, 1, 0, 1)
+    noticed, survived, _ = made = everything
+    said = "\n".join(report(drawn, made, 2, {noticed.name: "test_f.py::test_sum", survived.name: ""}))
+    assert said.startswith(
+        "survived: f.cpp:2\n  - c < d;\n  + c <= d;\n1 of 2 mutants are noticed.\nLeft out:\n- 0 mut"
+    )
+    assert "- 1 mutants not drawn, 1 elsewhere" in said
+    assert "- 1 mutants not shown before the end, 2 shown by earlier runs only" in said
+
+
 def test_faults_that_are_said_to_change_nothing_can_still_be_made():
-    assert known_equivalent().keys() <= {mutant.name for mutant in all_mutants(ROOT / "overlapper" / "native")}
+    assert known_equivalent().keys() <= {mutant.name for mutant in all_mutants() + all_mutants(python=True)}
     assert all(known_equivalent().values())
