@@ -5,7 +5,6 @@ PYTEST := $(VENV)/bin/pytest
 SCENE := franka_grasp
 FUZZ := -max_total_time=60
 MUTANTS := --seed 0 --count 200
-GROWTH := --rounds 50 --seed 0
 # A kind of shape that joins the sanitized core alone, to show that one header is enough.
 CONE := tests/native/shapes/cone.h
 NATIVE := $(shell find overlapper/native -type f -not -path '*/corpus/*')
@@ -17,7 +16,7 @@ COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_out_of_memory python/test_stub
 
-.PHONY: help run test wheel record docs coverage coverage-python coverage-core mutants growth fuzz pictures lint format hooks ci clean
+.PHONY: help run test wheel record docs coverage coverage-python coverage-core mutants fuzz pictures lint format hooks ci clean
 
 help: ## this list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -61,9 +60,6 @@ coverage-core: build/coverage/dev ## report the lines of the core that its own t
 
 mutants: $(VENV)/dev ## change one operator at a time, report which changes no test notices and what was left out
 	@$(VENV)/bin/python tests/native/mutants.py $(MUTANTS)
-
-growth: $(VENV)/dev ## look for inputs that take time out of proportion to their size, with GROWTH="--rounds 50 --seed 0"
-	@$(VENV)/bin/python benchmarks growth $(GROWTH)
 
 # Inputs that reach new code are kept in build/fuzz/corpus. A failing input is written to build/fuzz.
 fuzz: build/sanitized/dev ## give the sanitized core inputs that reach new places, for FUZZ=-max_total_time=60 seconds

@@ -4,7 +4,6 @@ import html
 import inspect
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -35,9 +34,6 @@ toc_object_entries_show_parents = "hide"
 # links to the files beside it.
 repository = os.environ.get("OVERLAPPER_REPOSITORY", "")
 
-# Files for a browser come along, in a folder of their own: docs/speed.html is not what is made of docs/speed.md.
-SHOWN = {file for ending in ("html", "svg") for file in DOCS.glob(f"*.{ending}")}
-
 LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|!\[[^\]]*\]\([^)]*\))+)\]\(([^()\s]+)\)")
 FENCED = re.compile(r"^(```.*?^```$)", re.MULTILINE | re.DOTALL)
 CODE = re.compile(r"(`+[^`]+`+)")
@@ -63,8 +59,6 @@ def mapped(text, base, page):
             raise FileNotFoundError(f"{page} links to {link}, which does not exist")
         if file.suffix == ".md" and file.is_relative_to(DOCS):
             return f"[{words}]({os.path.relpath(file, DOCS / Path(page).parent)}{anchor and '#' + anchor})"
-        if file in SHOWN:
-            return f'<a href="{os.path.relpath("files", Path(page).parent)}/{file.name}">{words}</a>'
         return f'<a href="{in_repository(file.relative_to(ROOT), page)}{anchor and "#" + anchor}">{words}</a>'
 
     parts = FENCED.split(text)
@@ -88,12 +82,6 @@ def commands():
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     said = re.sub(r'<span style="font-weight: bold">(.*?)</span>', r"`\1`", said)
     return html.unescape(said.partition("\n")[2])
-
-
-def bring_files(app, error):
-    (Path(app.outdir) / "files").mkdir(exist_ok=True)
-    for file in SHOWN:
-        shutil.copy(file, Path(app.outdir) / "files")
 
 
 def as_rst(lines):
@@ -160,6 +148,5 @@ def linkcode_resolve(domain, info):
 
 def setup(app):
     app.connect("source-read", read_source)
-    app.connect("build-finished", bring_files)
     app.connect("autodoc-process-docstring", process_docstring)
     app.connect("autodoc-process-signature", process_signature)

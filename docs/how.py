@@ -27,11 +27,9 @@ from overlapper.viewer.look import LIGHT, OWNER_COLORS
 from overlapper.viewer.tessellation import tessellation
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parent / "benchmarks"), str(HERE.parent / "tests" / "support")]
+sys.path.insert(0, str(HERE.parent / "tests" / "support"))
 
 from families import DODECAHEDRON, icosphere  # noqa: E402
-
-from paper.steps import common_point  # noqa: E402
 
 INK, GREY, PALE, MARK = "#222222", (0.62, 0.66, 0.72), (0.93, 0.94, 0.95), "#d1206a"
 VIEW = (20, -117)
@@ -201,8 +199,7 @@ def draw_steps() -> None:
     planes = np.vstack(bodies)
     owner = np.repeat([0, 1], [len(body) for body in bodies])
     colors = [OWNER_COLORS[k] for k in owner]
-    corners = [in_world(placed, np.asarray(tessellation(placed.shape).vertices)) for placed in (first, second)]
-    found = common_point(*corners)
+    found = np.array([0.2530159196513282, -0.08466998486956352, 0.3076280238506208])  # the witness point of GJK
     point = analytic_centre(common.halfspaces, common.centroid)
     duals = dual_points(planes, point)
     hull = ConvexHull(duals)

@@ -31,7 +31,7 @@ class Maker(NamedTuple):
 
 def of_results(command: str, results: str, *pictures: str, by: tuple[str, ...]) -> Maker:
     """Drawn from what was measured; what measures it is no source of the picture."""
-    drawn_by = [f"benchmarks/{script}.py" for script in ("harness/figures", *by)]
+    drawn_by = [f"benchmarks/{script}.py" for script in ("harness/charts", *by)]
     return Maker(f"benchmarks {command} --page", pictures, (f"benchmarks/results/{results}", *drawn_by))
 
 
@@ -50,7 +50,7 @@ MAKERS = (
     of_results(
         "physics",
         "forces.csv",
-        *("forces_energy.png", "forces_friction.png", "forces_bodies.png"),
+        *("forces_energy.png", "forces_friction.png"),
         by=("forces/page",),
     ),
     of_results("round", "*/round.csv", "round.png", by=("speed/round_page",)),
@@ -59,14 +59,14 @@ MAKERS = (
         "chart",
         "*/[cs][lp]*.csv",
         *("speed.png", "speed_sizes.png", "speed_claims.png", "speed_families.png"),
-        by=("speed/figures", "speed/page", "harness/peers"),
+        by=("speed/page", "harness/peers"),
     ),
     of_results(
         "stability",
         "stability.csv",
         *("stability.png", "stability_degeneracy.png", "stability_distances.png"),
-        *("stability_distances_degeneracy.png", "stability_planes.png", "stability_shifts.png"),
-        by=("stability/page", "paper/pictures"),
+        "stability_distances_degeneracy.png",
+        by=("stability/page",),
     ),
 )
 

@@ -1,7 +1,6 @@
 """`overlapper audit` beside pinocchio and coal, and on every robot of example-robot-data.
 
     python benchmarks audit speed [ROUNDS]           configurations a second of a Franka, on one core
-    python benchmarks audit agree [CONFIGURATIONS]   the same pairs of shapes in the same configurations of ten robots
     python benchmarks audit robots [CONFIGURATIONS]  the table of docs/audit.md
 
 The first two need `pip install pin`, which is pinocchio with coal. Both sides have the same convex shapes: those that
@@ -13,7 +12,6 @@ after the other, with and without a tree of boxes. Figures are medians of rounds
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections import Counter
 from importlib.metadata import distribution
 from pathlib import Path
 from statistics import median
@@ -23,7 +21,7 @@ import numpy as np
 from harness.bodies import of_coal
 from harness.page import table
 from harness.timing import timed
-from overlapper import Batch, Overlaps, Placed, overlap
+from overlapper import Placed
 from overlapper.audit.audit import audit
 from overlapper.audit.examiner import Examiner
 from overlapper.audit.robot import read_robot
@@ -32,18 +30,6 @@ from overlapper.simulation.bullet.model_file import NotRead
 
 ROBOTS = Path(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots"))
 FRANKA = "panda_description/urdf/panda.urdf"
-TEN = [
-    FRANKA,
-    "ur_description/urdf/ur5_robot.urdf",
-    "xarm_description/urdf/xarm7.urdf",
-    "kinova_description/robots/kinova.urdf",
-    "z1_description/urdf/z1.urdf",
-    "so_arm_description/urdf/so101.urdf",
-    "a1_description/urdf/a1.urdf",
-    "anymal_b_simple_description/robots/anymal.urdf",
-    "solo_description/robots/solo12.urdf",
-    "talos_data/robots/talos_full_v2.urdf",
-]
 
 
 class Peer:
@@ -99,11 +85,6 @@ class Peer:
     def by_tree(self, q: np.ndarray) -> None:
         self.pin.computeCollisions(self.model, self.data, self.tree, q, False)
 
-    def answers(self, q: np.ndarray) -> list[bool]:
-        """For each pair of `pairs`, which is asked for by itself."""
-        self.one_by_one(q)
-        return [result.isCollision() for result in self.geometry_data.collisionResults]
-
 
 def at_0(degree) -> tuple[float, ...]:
     return (0.0, 0.0, 0.0, 1.0) if degree.range == "spherical" else (0.0,)
@@ -134,59 +115,6 @@ def speed(rounds: int = 5) -> None:
         print(f"{way:30}{1e6 * middle:8.1f} µs{1 / middle:12,.0f} configurations a second")
 
 
-def agree(count: int = 1000) -> None:
-    """All pairs of shapes that are asked for in every configuration, by both; what differs is judged by a proof."""
-    total: Counter[str] = Counter()
-    for name in TEN:
-        robot = read_robot(ROBOTS / name)
-        sampling = Sampling(robot, count, seed=0)
-        examiner = Examiner(robot, sampling)
-        peer = Peer(ROBOTS / name, examiner)
-        configurations = np.concatenate([sampling.block(block) for block in range(len(sampling.blocks))])
-        positions, orientations = examiner.kinematics.poses(configurations)
-        said: Counter[str] = Counter()
-        off, differing = 0.0, []
-        links = np.array([shape.link for shape in robot.tree.shapes])[peer.pairs]
-        owners, owner = np.unique(links, axis=0, return_inverse=True)
-        met = np.zeros((2, len(owners)), dtype=int)
-        batch = Batch([each.shape for each in robot.tree.shapes])
-        for row, configuration in enumerate(configurations):
-            q = peer.positions(configuration)
-            off = max(off, np.abs(peer.placements(q)[:, :3, 3] - positions[row]).max())
-            found = batch.overlaps(positions[row], orientations[row], peer.pairs)
-            ours = found.status == Overlaps.OVERLAPPING
-            theirs = np.array(peer.answers(q))
-            said["both yes"] += int((ours & theirs).sum())
-            said["both no"] += int((~ours & ~theirs).sum())
-            for side, answers in enumerate((ours, theirs)):
-                met[side, np.unique(owner[answers])] += 1
-            for at in np.flatnonzero(ours != theirs):
-                differing.append((row, int(at), bool(ours[at])))
-        for row, at, ours in differing:
-            placed = [
-                Placed(robot.tree.shapes[k].shape, positions[row, k], orientations[row, k]) for k in peer.pairs[at]
-            ]
-            said[judged(placed, ours)] += 1
-        total += said
-        classes = np.where(met == 0, "never", np.where(met == count, "always", "sometimes"))
-        same = int((classes[0] == classes[1]).sum())
-        for pair in np.flatnonzero(classes[0] != classes[1]):
-            names = " and ".join(robot.link_names[link] for link in owners[pair])
-            print(f"{names}: {classes[0, pair]} by ours, {met[0, pair]}, {classes[1, pair]} by coal, {met[1, pair]}")
-        rest = ", ".join(f"{number:,} {what}" for what, number in said.items())
-        print(f"{name}: {same} of {len(owners)} pairs of links alike, places {off:.0e} m apart: {rest}", flush=True)
-    print(f"in all: {', '.join(f'{number:,} {what}' for what, number in total.items())}")
-
-
-def judged(placed: list[Placed], ours: bool) -> str:
-    """Which of two different answers is right, and how near to touching the pair is."""
-    found = overlap(*placed)
-    lower, upper = found.certificate().verify()
-    proved = "overlap" if lower > 0 else "share nothing" if upper == 0 else "are not told apart"
-    how = f"{found.depth:.0e} m deep" if found else f"{found.distance:.0e} m apart"
-    return f"{'yes' if ours else 'no'} by ours alone, which by proof {proved} ({how})"
-
-
 def robots(count: int = 2000) -> None:
     """A row for each robot, by `audit` in this process; seconds are of a processor."""
     heading = ["robot", "joints", "links", "pairs", "adjacent", "never", "sometimes", "always", "s"]
@@ -208,7 +136,7 @@ def row_of(path: Path, count: int) -> list[str]:
     return list(map(str, cells))
 
 
-WHAT = {"speed": speed, "agree": agree, "robots": robots}
+WHAT = {"speed": speed, "robots": robots}
 
 
 def options(parser: ArgumentParser) -> None:

@@ -8,13 +8,12 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from forces import cost, physics
 from forces.cost import PARTS, PILE
 from forces.physics import LAWS
-from harness import figures, results
-from harness.figures import INK, OURS, plt
+from harness import charts, results
+from harness.charts import BOOK, INK, OURS, Panel, Series
 from harness.page import named, table, write
 
 
@@ -118,97 +117,56 @@ def expected_incline(slope: float, friction: float = 0.5) -> float:
     return max(0.0, math.sin(angle) - friction * math.cos(angle))
 
 
-THEIRS, BOOK = INK, "#1f5fbf"
-BY_LAW = {"volumetric": (OURS, "volumetric"), "bullet": (THEIRS, "Bullet")}  # colour and name
+BY_LAW = {"volumetric": (OURS, "volumetric", "o"), "bullet": (INK, "Bullet", "x")}  # colour, name and marker
+BY_BULLET = (("face", "s:"), ("edge", "^:"))
+ROLLING = {"cylinder": "s", "ball": "^"}
 
 
-def panels(count: int) -> Any:
-    return plt.subplots(1, count, figsize=(10.8, 4.0 if count == 2 else 3.6))
+def curve(of: Figures, name: tuple[str, str, str], label: str, form: str, colour: str, least: float = 0) -> Series:
+    """The values of a law over what they are at."""
+    x, y = of.series(*name)
+    return Series(x, np.maximum(np.abs(y), least), label, form, style={"color": colour, "ms": 5})
 
 
-def finish(figure: Any, axes: tuple[Axes, ...], path: Path) -> None:
-    figures.tidy(*axes)
-    for ax in axes:
-        ax.legend(frameon=False, fontsize=7.5)
-    figure.tight_layout()
-    figures.save(figure, path)
+def book(x: Any, y: Any, label: str | None = "textbook", form: str = "-") -> Series:
+    return Series(x, y, label, form, style={"color": BOOK, "lw": 1, "zorder": 1})
 
 
-def draw_energy(of: Figures, path: Path) -> None:
-    figure, (bounce, rattle) = panels(2)
-    words = {"face": "on a face", "edge": "on an edge", "corner": "on a corner", "skew": "askew"}
-    for pose, colour in (("face", "#d1001f"), ("skew", "#f58518"), ("edge", "#8c6bb1"), ("corner", "#4292c6")):
-        bounce.plot(*of.series("bounce", "volumetric", pose), "o-", color=colour, ms=4, label=words[pose])
-    for pose, dashes in (("face", "s:"), ("edge", "^:")):
-        label = f"Bullet, {words[pose]}"
-        bounce.plot(*of.series("bounce", "bullet", pose), dashes, color=THEIRS, ms=4, label=label)
-    bounce.set(
-        xscale="log", yscale="log", xlabel="substeps of 1/240 s", title="A bounce: energy lost or gained, of the drop's"
-    )
-    bounce.set_xticks([1, 2, 4, 8, 16, 32, 64], ["1", "2", "4", "8", "16", "32", "64"])
-    bounce.minorticks_off()
-    for case, colour in (("1e+07 Pa/m", "#f4a582"), ("1e+08 Pa/m", "#e0533d"), ("1e+09 Pa/m", "#a50026")):
-        x, y = of.series("rattle", "volumetric", case)
-        rattle.plot(x, np.maximum(y, 1e-17), color=colour, label=case.replace("e+0", "e"))
-    for case, dashes in (("1 substeps", "-"), ("4 substeps", ":")):
-        label = "Bullet" if case[0] == "1" else "Bullet, 4 substeps"
-        rattle.plot(*of.series("rattle", "bullet", case), dashes, color=THEIRS, label=label)
-    rattle.set(yscale="log", xlabel="s", ylabel="m/s", title="A cube that is set down tilted: its speed")
-    finish(figure, (bounce, rattle), path)
+def energy_panels(of: Figures) -> list[Panel]:
+    bounces = {"face": "#d1001f", "skew": "#f58518", "edge": "#8c6bb1", "corner": "#4292c6"}
+    bounce = [curve(of, ("bounce", "volumetric", pose), pose, "o-", colour) for pose, colour in bounces.items()]
+    bounce += [curve(of, ("bounce", "bullet", pose), f"{pose}, Bullet", form, INK) for pose, form in BY_BULLET]
+    rattles = {"1e+07 Pa/m": "#f4a582", "1e+08 Pa/m": "#e0533d", "1e+09 Pa/m": "#a50026"}
+    rattle = [curve(of, ("rattle", "volumetric", case), case, "-", colour, 1e-17) for case, colour in rattles.items()]
+    for substeps, form in ((1, "-"), (4, ":")):
+        case = f"{substeps} substeps"
+        rattle.append(curve(of, ("rattle", "bullet", case), f"Bullet, {case}", form, INK))
+    substeps = {"xscale": "log", "yscale": "log", "xlabel": "substeps of 1/240 s"}
+    lost, speed = "A bounce: energy lost or gained, of the drop's", "A cube that is set down tilted: its speed"
+    time = {"yscale": "log", "xlabel": "s", "ylabel": "m/s"}
+    ticks = {2**k: str(2**k) for k in range(7)}
+    return [Panel(lost, bounce, substeps, xticks=ticks, legend={}), Panel(speed, rattle, time, legend={})]
 
 
-def draw_friction(of: Figures, path: Path) -> None:
-    figure, (slide, incline, spin) = panels(3)
-    for law, (colour, words) in BY_LAW.items():
-        x, y = of.series("slide", law, "")
-        slide.plot(x, np.abs(np.array(y) - 1), "o-", color=colour, label=words)
-        incline.plot(
-            *of.series("incline", law, "acceleration"), "o" if law == "volumetric" else "x", color=colour, label=words
-        )
-        for shape, dashes in (("box", "-"), ("disc", ":")):
-            spin.plot(*of.series("spin", law, shape), f"o{dashes}", color=colour, ms=4, label=f"{words}, {shape}")
-    slopes = np.linspace(0.988, 1.012, 241)
-    incline.plot(slopes, [expected_incline(slope) for slope in slopes], color=BOOK, lw=1, zorder=1, label="textbook")
-    slide.set(xscale="log", yscale="log", xlabel="substeps", title="Way of a sliding box:\nerror of v²/2µg")
-    incline.set(xlabel="slope, of µ", ylabel="acceleration, of g", title="On an incline")
-    spin.axhline(1, color=BOOK, lw=1)
-    spin.set(xscale="log", xlabel="substeps", title="Time of a spin,\nof Iω/µmgρ", ylim=(0, 1.3))
-    for ax in (slide, spin):
-        ax.set_xticks([1, 4, 20], ["1", "4", "20"])
-        ax.minorticks_off()
-    finish(figure, (slide, incline, spin), path)
-
-
-def draw_bodies(of: Figures, path: Path) -> None:
-    figure, (roll, stack, grip) = panels(3)
+def friction_panels(of: Figures) -> list[Panel]:
+    incline, spin, roll = [], [], []
     times = np.linspace(0, 4e-3, 50)
-    for shape, factor, marker in (("cylinder", 2 / 3, "o"), ("ball", 5 / 7, "^")):
-        x, y = of.series("roll", "volumetric", shape)
-        roll.plot(np.array(x) * 1e3, y, marker, color=OURS, label=f"{shape}")
-        roll.plot(
-            times * 1e3, np.exp(-factor * times * 9.81 / 0.05), color=BOOK, lw=1, ls="-" if marker == "o" else ":"
-        )
-        x, y = of.series("roll", "bullet", shape)
-        roll.plot(x, y, marker, color=THEIRS, mfc="none", ms=9, label=f"Bullet, {shape}")
-    roll.plot([], [], color=BOOK, lw=1, label="textbook")
-    roll.set(xlabel="dissipation, ms", title="Rolling from 1 m/s:\nspeed after 1 s, of that before")
-    cases = [("volumetric", "1e8 Pa/m"), ("volumetric", "1e7 Pa/m"), ("bullet", "1 substeps"), ("bullet", "4 substeps")]
-    for k, (law, case) in enumerate(cases):
-        colour, words = BY_LAW[law]
-        stack.bar(k, of["stack", law, case]["drift"], 0.6, color=colour, label=words if k % 2 == 0 else None)
-    stack.set(yscale="log", title="A stack of five: drift\nfrom 5 to 10 s, m")
-    stack.set_xticks(range(4), ["1e8\nPa/m", "1e7\nPa/m", "1 sub-\nstep", "4 sub-\nsteps"])
-    for law, (colour, words) in BY_LAW.items():
-        x, y = of.series("grip", law, "fallen")
-        grip.plot(
-            x, np.maximum(np.abs(np.array(y)), 1e-18), "o-" if law == "volumetric" else "x-", color=colour, label=words
-        )
-    parts = np.linspace(0.968, 0.9999, 100)
-    grip.plot(parts, (1 - parts) * 9.81 * 0.5**2 / 2, color=BOOK, lw=1, label="textbook")
-    grip.set(
-        yscale="log", xlabel="coefficient of friction, of mg/2F", title="A gripped box:\nfallen in half a second, m"
-    )
-    finish(figure, (roll, stack, grip), path)
+    for law, (colour, words, marker) in BY_LAW.items():
+        incline.append(curve(of, ("incline", law, "acceleration"), words, marker, colour))
+        for shape, form in (("box", "-"), ("disc", ":")):
+            spin.append(curve(of, ("spin", law, shape), f"{words}, {shape}", marker + form, colour))
+        roll += [curve(of, ("roll", law, shape), f"{words}, {shape}", m, colour) for shape, m in ROLLING.items()]
+    for factor, form in ((2 / 3, "-"), (5 / 7, ":")):
+        roll.append(book(times, np.exp(-factor * times * 9.81 / 0.05), "textbook" if form == "-" else None, form))
+    slopes = np.linspace(0.988, 1.012, 241)
+    incline.append(book(slopes, [expected_incline(slope) for slope in slopes]))
+    spin.append(book([1, 20], [1, 1], None))
+    few = {"xlabel": "substeps", "xscale": "log", "ylim": (0, 1.3)}
+    return [
+        Panel("On an incline", incline, {"xlabel": "slope, of µ", "ylabel": "acceleration, of g"}, legend={}),
+        Panel("Time of a spin, of Iω/µmgρ", spin, few, xticks={1: "1", 4: "4", 20: "20"}, legend={}),
+        Panel("Rolling: speed after 1 s, of that before", roll, {"xlabel": "dissipation, s"}, legend={}),
+    ]
 
 
 def cost_table(path: Path) -> str:
@@ -238,9 +196,9 @@ def write_page(path: Path, folder: Path) -> Path:
     """forces.md, with its pictures, from the figures or times in `path` and the others of the checkout."""
     laws, times = (path if path.name == each.name else each for each in (physics.RESULTS, cost.RESULTS))
     of = Figures.read(laws)
-    for draw in (draw_energy, draw_friction, draw_bodies):
-        figures.style(**{"font.size": 9})
-        draw(of, folder / f"forces_{draw.__name__.removeprefix('draw_')}.png")
+    for name, panels_of in (("energy", energy_panels), ("friction", friction_panels)):
+        panels = panels_of(of)
+        charts.draw(folder / f"forces_{name}.png", panels, (10.8, 4.0 if len(panels) == 2 else 3.6), font=9)
     face, mixed, spread = (
         of["bounce", "volumetric", "face"],
         *(of["slide and spin", "volumetric", f"box {friction}"] for friction in ("ellipsoid", "distributed")),

@@ -40,3 +40,8 @@ def duration(us: float) -> str:
         if us >= size:
             return f"{us / size:.3g} {unit}"
     return f"{us:.3g} µs"
+
+
+def times(ratio: float) -> str:
+    """How many times, in few digits."""
+    return f"{ratio:,.0f}" if ratio >= 10 else f"{ratio:.1f}"

@@ -6,8 +6,6 @@ the exact truth, as is what the others answer.
 
 from __future__ import annotations
 
-import os
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -23,7 +21,7 @@ from harness.command import Wrong
 from harness.peers import MOST_IN_NUMPY, clipping
 from harness.timing import in_turn
 from overlapper import Hull, Placed, overlap
-from speed import truth, workloads
+from speed import workloads
 from speed.turns import error_of
 
 Way = Callable[[], float]
@@ -36,8 +34,7 @@ SLOWEST = 0.2  # s: a way that takes longer is not asked at the next size
 
 @dataclass
 class Claim:
-    """A line of the results. `us` is the median of the processor's time; where the claim is about cores, the least time
-    by the clock, which also counts what else the machine does."""
+    """A line of the results. `us` is the median of the processor's time."""
 
     claim: str
     way: str
@@ -87,37 +84,18 @@ def groups(seconds: float) -> list[Claim]:
     return found
 
 
-def cores(seconds: float) -> list[Claim]:
-    """The pairs of a level of the tree side by side: the same call on one core and on two, by the clock."""
-    rng, found, slow = np.random.default_rng(2), [], set()
-    all_cores = sorted(os.sched_getaffinity(os.getppid()))
-    for count, size in ((8, VERTICES), (64, VERTICES), (8, 200)):
-        clouds = [directions(rng, size) + 0.2 * directions(rng, 1) for _ in range(count)]
-        bodies = [Placed(Hull(cloud)) for cloud in clouds]
-
-        def on(number: int, bodies: list[Placed] = bodies) -> float:
-            os.sched_setaffinity(0, all_cores[:number])
-            return overlap(*bodies, method="paper").volume
-
-        ways = {f"{k} cores": lambda k=k, on=on: on(k) for k in (1, min(2, len(all_cores)))}
-        volume = exact.common(*(truth.polytope(cloud) for cloud in clouds)).volume
-        found += asked("cores", ways, slow, size, count, volume, 4 * seconds, time.perf_counter, min)
-    return found
-
-
 def asked(
-    claim: str, ways: dict[str, Way], slow: set[str], vertices: int, bodies: int, volume: Fraction, seconds: float,
-    clock: Callable[[], float] = time.process_time, figure: Callable[[list[float]], float] = median,
-) -> list[Claim]:  # fmt: skip
+    claim: str, ways: dict[str, Way], slow: set[str], vertices: int, bodies: int, volume: Fraction, seconds: float
+) -> list[Claim]:
     """The ways in turn, but for those that were too slow before."""
     ways = {name: way for name, way in ways.items() if name not in slow}
     errors = {name: error_of(way(), volume) for name, way in ways.items()}
     if errors.get("auto", 0.0) > 1e-12:
         raise Wrong(f"{claim}, {vertices} vertices, {bodies} bodies: auto is off by {errors['auto']:.1e}")
-    samples = dict(zip(ways, in_turn([*ways.values()], 3, seconds / len(ways), clock=clock)))
+    samples = dict(zip(ways, in_turn([*ways.values()], 3, seconds / len(ways))))
     slow |= {name for name in ways if median(samples[name]) > SLOWEST}
     return [
-        Claim(claim, name, vertices, bodies, f"{1e6 * figure(samples[name]):.4g}", f"{errors[name]:.2e}")
+        Claim(claim, name, vertices, bodies, f"{1e6 * median(samples[name]):.4g}", f"{errors[name]:.2e}")
         for name in ways
     ]
 
@@ -158,4 +136,4 @@ def volume_of_polar(points: np.ndarray) -> float:
 
 
 # Each takes the seconds to spend on a size.
-CLAIMS: tuple[Callable[[float], list[Claim]], ...] = (pairs, groups, cores)
+CLAIMS: tuple[Callable[[float], list[Claim]], ...] = (pairs, groups)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from harness import results
-from harness.page import duration, filled, indented, named, table
-from harness.peers import PEERS
+from harness import charts, results
+from harness.charts import Panel, Series
+from harness.page import duration, filled, indented, named, table, times
+from harness.peers import PEERS, TIMED, Look
 from paper.claims import VERTICES, Claim
-from speed.figures import Growth, accuracy, growth, start
 from speed.turns import Row
 from speed.workloads import FAMILIES, SIZES
 
@@ -23,27 +23,18 @@ CHOSEN = [
     "crossing cylinders",
 ]  # fmt: skip
 
-# Times as fast as manifold3d on meshes made before, for a single call and for a pair of a batch: what was aimed at.
-TARGETS: dict[str, tuple[float, float | None]] = {
-    "box deep": (60, 110),
-    "box sliver": (40, 80),
-    "box on ground": (30, 80),
-    "tetra": (30, 80),
-    "h20": (20, None),
-    "h50": (18, None),
-    "h100": (10, None),
-    "h500": (6, None),
-    "i320 deep": (5, None),
-    "i320 shallow": (15, None),
-    "i1280 deep": (4, None),
-    "i1280 shallow": (25, None),
-    "i5120 deep": (3, None),
-    "i5120 shallow": (35, None),
-    "prism 64 and box": (60, None),
-}
+# The families of polyhedra, whose times are compared with those of manifold3d.
+COMPARED = [*list(FAMILIES)[:15]]
 
 # Beyond this, a method that has no setting for its accuracy is wrong, not inexact.
 WRONG = 1e-6
+
+# Where an answer without any error is drawn: below the half-ulp of 1e-16.
+EXACT = 1e-17
+
+# Ways that are not peers are drawn as the peer that they are most like.
+ALIKE = {"cutting": "clipping", "duality": "scipy", "one hull": "scipy", "tree": "voxels"}
+LOOKS = {name: peer.look for name, peer in TIMED.items() if peer.look}
 
 
 @dataclass(frozen=True)
@@ -54,40 +45,28 @@ class Results:
     notes: list[str]
     rows: list[Row]
     claims: list[Claim]
-    steps: bool  # whether the steps of a simulation were measured, too
-    round: bool  # and all classes of round bodies
 
 
 def results_in(folder: Path) -> Results:
     notes, rows = results.read(folder / "speed.csv")
-    there = {name: (folder / f"{name}.csv").exists() for name in ("claims", "steps", "round")}
-    claims = results.read(folder / "claims.csv")[1] if there["claims"] else []
-    made = [Row(**row) for row in rows], [Claim(**claim) for claim in claims]
-    return Results(str(named(folder)), notes, *made, there["steps"], there["round"])
+    path = folder / "claims.csv"
+    claims = results.read(path)[1] if path.exists() else []
+    return Results(str(named(folder)), notes, [Row(**row) for row in rows], [Claim(**claim) for claim in claims])
 
 
 def write_page(path: Path, folder: Path) -> Path:
     found = results_in(path.parent)
-    start()
     at_hand = {row.family for row in found.rows}
     families = [name for name in FAMILIES if name in at_hand]
     if families:
-        accuracy(found.rows, [name for name in CHOSEN if name in at_hand] or families, 4, folder / "speed.png")
-        accuracy(found.rows, families, 4, folder / "speed_families.png", folder / "speed.html")
-    by_size, by_claim = panels(found)
-    if all(panel.lines for panel in by_size):
-        growth(by_size, folder / "speed_sizes.png")
-    if found.claims:
-        growth(by_claim, folder / "speed_claims.png")
+        accuracy(found.rows, [name for name in CHOSEN if name in at_hand] or families, folder / "speed.png")
+        accuracy(found.rows, families, folder / "speed_families.png")
+    for name, panels in panels_of(found).items():
+        if all(panel.lines for panel in panels):
+            growth(panels, folder / f"speed_{name}.png")
     page = folder / "speed.md"
     page.write_text(text(found), encoding="utf-8")
     return page
-
-
-def panels(found: Results) -> tuple[list[Growth], list[Growth]]:
-    """The panels of the chart of time over size, and those of the article's claims."""
-    by_size = [sizes(found.rows, way) for way in ("deep", "shallow")]
-    return by_size, [of_pairs(found.claims), of_groups(found.claims)]
 
 
 def find(rows: Iterable[Row], family: str, method: str, setting: str | None = None) -> Row | None:
@@ -102,190 +81,170 @@ def best(rows: Iterable[Row], family: str, method: str) -> Row | None:
     return find(rows, family, method, setting)
 
 
+# Error over time
+
+
+def marks(look: Look) -> dict[str, object]:
+    fill, edge, width = ("white", look.colour, 1.1) if look.hollow else (look.colour, "white", 0.6)
+    return {"color": look.colour, "marker": look.marker, "ms": look.size, "mfc": fill, "mec": edge, "mew": width}
+
+
+def accuracy(rows: list[Row], families: list[str], path: Path) -> None:
+    """A panel for each family, every method at every setting a point."""
+    lines = -(-len(families) // 4)
+    key = [
+        Series([], [], f"{name} (ours)" if look.ours else name, style=marks(look) | {"lw": float(look.joined)})
+        for name, look in LOOKS.items()
+    ]
+    panels = [accuracy_panel(family, [row for row in rows if row.family == family]) for family in families]
+    size = (9.8, 2.05 * lines + 1.1)
+    charts.draw(path, panels, size, columns=4, key=key, dpi=170, colours=128, share=True)
+
+
+def accuracy_panel(family: str, rows: list[Row]) -> Panel:
+    series = []
+    for name, look in LOOKS.items():
+        found = [row for row in rows if row.method == name and row.us and row.error]
+        x = [float(row.us) for row in found]
+        y = [min(1.0, max(EXACT, float(row.error))) for row in found]
+        style = marks(look) | {"lw": float(look.joined), "zorder": 3 + 2 * look.ours + look.joined, "clip_on": False}
+        if found:
+            series.append(Series(x, y, style=style))
+    axes = {"xscale": "log", "yscale": "log", "xlim": (0.1, 3e7), "ylim": (3e-18, 8)}
+    return Panel(
+        family,
+        series,
+        axes | {"xlabel": "time per pair", "ylabel": "error, relative"},
+        xticks={1e0: "1 µs", 1e2: "100 µs", 1e4: "10 ms", 1e6: "1 s"},
+        yticks={EXACT: "none", 1e-12: "1e−12", 1e-8: "1e−8", 1e-4: "1e−4", 1: "1"},
+    )
+
+
 # Time over size
 
 
-def sizes(rows: list[Row], way: str) -> Growth:
+@dataclass(frozen=True)
+class Growth:
+    """A panel: for each method its points (size, µs), and the power of the size with which it grows, where fitted."""
+
+    title: str
+    along: str
+    lines: dict[str, list[tuple[float, float]]]
+    least: float  # the size from which on powers are fitted
+
+    @property
+    def powers(self) -> dict[str, float]:
+        """The power of the size with which time grows, of methods with three points or more."""
+        large = {name: [point for point in points if point[0] >= self.least] for name, points in self.lines.items()}
+        return {name: power(points) for name, points in large.items() if len(points) > 2}
+
+
+def power(points: list[tuple[float, float]]) -> float:
+    x, y = np.log(points).T
+    return float(np.polyfit(x, y, 1)[0])
+
+
+def panels_of(found: Results) -> dict[str, list[Growth]]:
+    """The panels of time over size, and those of the article's claims."""
+    sizes = [by_size(found.rows, way) for way in ("deep", "shallow")]
+    pairs = by_claim(found.claims, "pair", "a pair", "vertices of either body", "vertices", 50)
+    groups = by_claim(found.claims, "bodies", f"many bodies of {VERTICES} vertices", "bodies", "bodies", 8)
+    return {"sizes": sizes, "claims": [pairs, groups]}
+
+
+def by_size(rows: list[Row], way: str) -> Growth:
     lines = {}
     for name in ("auto", "auto, batch", "paper", "scipy", "manifold3d", "trimesh"):
-        found = [(size, best(rows, f"i{size} {way}", name)) for size in SIZES]
-        lines[name] = [(float(size), float(row.us)) for size, row in found if row]
-    lines = {name: points for name, points in lines.items() if points}
-    return Growth(way, "facets of either mesh", lines, powers_of(lines, 320))
+        found = [(float(size), float(row.us)) for size in SIZES if (row := best(rows, f"i{size} {way}", name))]
+        lines |= {name: found} if found else {}
+    return Growth(way, "facets of either mesh", lines, 320)
 
 
-def of_pairs(claims: list[Claim]) -> Growth:
-    return of_claim(claims, "pair", "a pair", "vertices of either body", "vertices", 50)
-
-
-def of_groups(claims: list[Claim]) -> Growth:
-    return of_claim(claims, "bodies", f"many bodies of {VERTICES} vertices", "bodies", "bodies", 8)
-
-
-def of_claim(claims: list[Claim], name: str, title: str, along: str, size: str, least: float) -> Growth:
+def by_claim(claims: list[Claim], name: str, title: str, along: str, size: str, least: float) -> Growth:
     lines: dict[str, list[tuple[float, float]]] = {}
     for claim in claims:
         if claim.claim == name:
             lines.setdefault(claim.way, []).append((float(getattr(claim, size)), float(claim.us)))
-    return Growth(title, along, lines, powers_of(lines, least))
+    return Growth(title, along, lines, least)
 
 
-def powers_of(lines: dict[str, list[tuple[float, float]]], least: float) -> dict[str, float]:
-    """The power of the size with which time grows, fitted from a size on to at least three points."""
-    fitted = {}
-    for name, points in lines.items():
-        large = [point for point in points if point[0] >= least]
-        if len(large) > 2:
-            x, y = np.log(large).T
-            fitted[name] = float(np.polyfit(x, y, 1)[0])
-    return fitted
+def growth(panels: list[Growth], path: Path) -> None:
+    """Time over size, a line for each method, which is named with its power."""
+    points = [point for panel in panels for line in panel.lines.values() for point in line]
+    decades = 10.0 ** np.arange(np.floor(np.log10(min(us for _, us in points))), 9)
+    top = max(us for _, us in points)
+    charts.draw(path, [growth_panel(panel, {us: duration(us) for us in decades if us < 10 * top}) for panel in panels],
+                (9.4, 4.2), dpi=170, colours=128)  # fmt: skip
+
+
+def growth_panel(shown: Growth, decades: dict[float, str]) -> Panel:
+    series = []
+    for name, points in sorted(shown.lines.items(), key=lambda item: -item[1][-1][1]):
+        look = LOOKS.get(name) or LOOKS[ALIKE[name]]
+        said = f"{name}, {shown.powers[name]:.2f}" if name in shown.powers else name
+        style = {"color": look.colour, "marker": look.marker, "ms": look.size, "lw": 2.2 if look.ours else 1.2}
+        series.append(Series(*zip(*points), said, style=style))
+    sizes = sorted({x for points in shown.lines.values() for x, _ in points})
+    axes = {"xscale": "log", "yscale": "log", "xlabel": shown.along, "ylabel": "time"}
+    ticks = {size: f"{size:,.0f}" for size in sizes}
+    return Panel(shown.title, series, axes, xticks=ticks, yticks=decades, legend={"title": "grows with the power of"})
 
 
 # Words
 
 
 def text(found: Results) -> str:
-    by_size, by_claim = panels(found)
     rows = found.rows
     pairs = {row.family: int(row.pairs) for row in rows if row.method == "auto"}
-    parts = {
-        "families": str(len(pairs)),
-        "pairs": str(sum(pairs.values())),
-        "targets": targets(rows),
-        **clocks(found),
-        "wrong": wrong(rows),
-        "powers": power_table(by_size),
-        "per_facet": per_facet(rows),
-        "warm": warm(rows),
-        "depths": depths(rows),
-        "missing": missing(rows),
-        "results": found.folder,
-        "notes": indented(found.notes),
-        "round": ROUND if found.round else "This was not measured.",
-        "steps": STEPS if found.steps else "This was not measured.",
-        "claims": claims_text(found.claims, *by_claim) if found.claims else "They were not measured.",
-    }
-    return filled(Path(__file__).with_name("page.md"), **parts)
-
-
-STEPS = """[Where the time of a step goes](steps.md) is a page of its own: piles of boxes, beside pybullet's own step.
-
-![Time of a step per box, by its parts, and of the whole, over the number of boxes](steps.png)"""
-
-ROUND = """[Round bodies beside boxes](round.md) is a page of its own: every two kinds of shapes, in single calls and in
-batches, meshes with margins, and scenes.
-
-![The median and the slowest hundredth of every class of pairs, over the time of a call](round.png)"""
-
-
-def claims_text(claims: list[Claim], pair: Growth, groups: Growth) -> str:
-    def power(panel: Growth, name: str) -> str:
-        return f"{panel.powers[name]:.2f}" if name in panel.powers else "?"
-
-    def last(panel: Growth, name: str) -> str:
-        return duration(panel.lines[name][-1][1])
-
-    most, bodies = pair.lines["paper"][-1][0], groups.lines["paper"][-1][0]
-    n_log_n = 1 + np.log(np.log(most) / np.log(50)) / np.log(most / 50)
+    depths = ((family, find(rows, family, "auto, depth")) for family in COMPARED)
+    cores = re.search(r"(\d+) cores", " ".join(found.notes))
     return filled(
-        Path(__file__).with_name("claims.md"),
-        most=f"{most:,.0f}",
-        bodies=f"{bodies:.0f}",
-        n_log_n=f"{n_log_n:.2f}",
-        pair_holds=holds(pair.powers.get("paper"), n_log_n),
-        groups_hold=holds(groups.powers.get("paper"), 1.0),
-        auto_group=last(groups, "auto"),
-        paper_group=last(groups, "paper"),
-        paper=power(pair, "paper"),
-        paper_m=power(groups, "paper"),
-        auto_m=power(groups, "auto"),
-        cutting=power(pair, "cutting"),
-        duality=power(pair, "duality"),
-        auto_pair=last(pair, "auto"),
-        paper_pair=last(pair, "paper"),
-        one_hull=last(groups, "one hull"),
-        tree=last(groups, "tree"),
-        cores=cores(claims),
+        Path(__file__).with_name("page.md"),
+        families=len(pairs),
+        pairs=sum(pairs.values()),
+        processors=cores[1] if cores else "its",
+        compared=compared(rows),
+        wrong=wrong(rows),
+        warm=warm(rows),
+        depths=", ".join(f"{family} {duration(float(row.us))}" for family, row in depths if row),
+        results=found.folder,
+        notes=indented(found.notes),
+        claims=claims_text(*panels_of(found)["claims"]) if found.claims else "They were not measured.",
     )
 
 
-def holds(measured: float | None, claimed: float) -> str:
-    """To a tenth, which is what times at so few sizes can tell."""
-    return "it cannot be told" if measured is None else "it holds" if measured < claimed + 0.1 else "it does not hold"
+def claims_text(*panels: Growth) -> str:
+    said = {}
+    for claim, panel in zip(("pair", "bodies"), panels):
+        for way, points in panel.lines.items():
+            name = f"{claim}_{way}".replace(" ", "_")
+            said |= {name: duration(points[-1][1]), f"{name}_power": f"{panel.powers.get(way, np.nan):.2f}"}
+    return filled(Path(__file__).with_name("claims.md"), **said).strip()
 
 
-def cores(claims: list[Claim]) -> str:
-    times: dict[tuple[int, int], list[float]] = {}
-    for claim in claims:
-        if claim.claim == "cores":
-            times.setdefault((claim.bodies, claim.vertices), []).append(float(claim.us))
-    lines = [
-        [f"{bodies} bodies of {vertices} vertices", *map(duration, us), f"{us[0] / us[-1]:.2f}"]
-        for (bodies, vertices), us in times.items()
-    ]
-    return table(["", "one core", "two cores", "times faster"], lines)
-
-
-BY_CLOCK = "manifold3d, by the clock"
-
-
-def clocks(found: Results) -> dict[str, str]:
-    """On how many processors the clock was read, and how much slower one of them made manifold3d at most."""
-    ratios = {
-        f"{row.family}{f', {row.setting} segments' if row.setting.isdigit() else ''}": float(bound.us) / float(row.us)
-        for row in found.rows
-        if row.method == BY_CLOCK
-        and row.us
-        and float(row.us) >= 1e3
-        and (bound := find(found.rows, row.family, "manifold3d", row.setting))
-    }
-    cores = re.search(r"(\d+) cores", " ".join(found.notes))
-    worst = max(ratios, key=lambda name: ratios[name], default="none, as it was not asked")
-    return {
-        "processors": cores[1] if cores else "its",
-        "slower": f"{ratios.get(worst, 1.0):.1f}",
-        "slower_at": worst,
-    }
-
-
-def targets(rows: list[Row]) -> str:
+def compared(rows: list[Row]) -> str:
+    """Times of this package beside those of manifold3d."""
     lines = []
-    for family, (aim, aim_batch) in TARGETS.items():
+    for family in COMPARED:
         peer, alone, many = (best(rows, family, name) for name in ("manifold3d", "auto", "auto, batch"))
         if not (peer and alone):
             continue
-        clock = find(rows, family, BY_CLOCK, "prebuilt")
+        clock = find(rows, family, "manifold3d, by the clock", "prebuilt")
         cells = [family, duration(float(peer.us)), duration(float(clock.us)) if clock else ""]
-        cells += [duration(float(alone.us)), held(peer, alone, aim)]
-        cells += [duration(float(many.us)), held(peer, many, aim_batch)] if many else ["", ""]
+        for ours in (alone, many):
+            cells += [duration(float(ours.us)), times(float(peer.us) / float(ours.us))] if ours else ["", ""]
         lines.append(cells)
-    return table(
-        ["", "manifold3d", "by the clock", "a call", "times faster (aim)", "a pair of a batch", "times faster (aim)"],
-        lines,
-    )
-
-
-def held(peer: Row, ours: Row, aim: float | None) -> str:
-    """Times faster, in bold where it reaches the aim."""
-    ratio = float(peer.us) / float(ours.us)
-    said = f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.1f}"
-    if aim is None:
-        return said
-    return f"**{said}** ({aim:g})" if ratio >= aim else f"{said} ({aim:g})"
-
-
-def depths(rows: list[Row]) -> str:
-    times = ((family, find(rows, family, "auto, depth")) for family in TARGETS)
-    return ", ".join(f"{family} {duration(float(row.us))}" for family, row in times if row)
+    heading = ["", "manifold3d", "by the clock", "a call", "times faster", "a pair of a batch", "times faster"]
+    return table(heading, lines)
 
 
 def warm(rows: list[Row]) -> str:
     lines = []
-    for family in [*TARGETS, "boxes apart"]:
+    for family in [*COMPARED, "boxes apart"]:
         cold, again = best(rows, family, "auto, batch"), best(rows, family, "auto, warm batch")
         if cold and again:
-            ratio = float(cold.us) / float(again.us)
-            lines.append([family, duration(float(cold.us)), duration(float(again.us)), f"{ratio:.2f}"])
+            us = float(cold.us), float(again.us)
+            lines.append([family, *map(duration, us), f"{us[0] / us[1]:.2f}"])
     return table(["", "first call", "the next, a little moved", "times faster"], lines)
 
 
@@ -304,34 +263,3 @@ def wrong(rows: list[Row]) -> str:
         said = ", ".join(f"{row.family} {float(row.error):.0e}" for row in worst[:4])
         lines.append([name, str(len(found)), said + (", ..." if len(worst) > 4 else "")])
     return table(["", "families", "relative error, the worst first"], lines)
-
-
-def power_table(panels: list[Growth]) -> str:
-    names = dict.fromkeys(name for panel in panels for name in panel.powers)
-    lines = [[name, *(f"{p.powers[name]:.2f}" if name in p.powers else "" for p in panels)] for name in names]
-    return table(["time grows with the facets to the power of", *(panel.title for panel in panels)], lines)
-
-
-def per_facet(rows: list[Row]) -> str:
-    """The cost of a facet of the answer in shallow pairs, over the size of the meshes."""
-    lines = []
-    for size in SIZES:
-        alone, many = (best(rows, f"i{size} shallow", name) for name in ("auto", "auto, batch"))
-        if alone and many:
-            facets = float(alone.facets)
-            costs = [f"{float(row.us) / facets:.2f} µs" for row in (alone, many)]
-            lines.append([f"{size:,}", f"{facets:.3g}", *costs])
-    return table(["facets of either mesh", "facets in common", "a facet, by a call", "by a batch"], lines)
-
-
-def missing(rows: list[Row]) -> str:
-    found: dict[tuple[str, str], tuple[dict[str, None], dict[str, None]]] = {}
-    for row in rows:
-        if row.note and not row.us:
-            settings, families = found.setdefault((row.method, row.note), ({}, {}))
-            settings[row.setting], families[row.family] = None, None
-    lines = [
-        f"- {method} {', '.join(settings)}: {note} ({', '.join(families)})".replace(" :", ":")
-        for (method, note), (settings, families) in sorted(found.items())
-    ]
-    return "\n".join(lines) or "Everybody was asked everything."

@@ -7,7 +7,7 @@
 In every step pybullet and this package are asked in turn, on one processor, and the time is that of the processor, so
 that other processes do not count. Every volume is compared with that of a call for its pair alone: if one bit differs,
 the run ends. Writes steps.csv, a line per pile and part, to benchmarks/results/MACHINE, and the page steps.md with
-steps.png and steps.svg to docs.
+steps.png to docs.
 """
 
 from __future__ import annotations

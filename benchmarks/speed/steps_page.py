@@ -6,12 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from harness import figures, results
-from harness.figures import INK, OURS, plt
+from harness import charts, results
+from harness.charts import INK, OURS, Panel, Series
 from harness.page import duration, named, table, write
 from speed.steps import PARTS
 
-COLOURS = dict(zip(PARTS, ("#9ecae1", "#4292c6", "#fdae6b", OURS, "#8c6bb1")))
+COLOURS = ("#9ecae1", "#4292c6", "#fdae6b", OURS, "#8c6bb1")
+WHOLES = {
+    "stepSimulation": ("pybullet's stepSimulation()", INK, ".:"),
+    "getContactPoints": ("pybullet's getContactPoints()", INK, ".-"),
+    "ours": ("update() and overlaps()", OURS, ".-"),
+}
 
 Figures = dict[str, dict[int, float]]  # median µs, or counts, by part and number of boxes
 
@@ -23,53 +28,55 @@ def read(path: Path) -> Figures:
     return found
 
 
-def draw(us: Figures, folder: Path) -> None:
-    """The chart, as steps.png and steps.svg."""
-    figures.style(**{"font.size": 9})
+def draw(us: Figures, path: Path) -> None:
     piles = sorted(us["ours"])
-    figure, (each, whole) = plt.subplots(1, 2, figsize=(10.8, 4.4), gridspec_kw={"width_ratios": [1.35, 1]})
-
-    bottom = np.zeros(len(piles))
-    places = np.arange(len(piles))
-    for part, words in PARTS.items():
-        heights = np.array([max(0.0, us[part][boxes]) / boxes for boxes in piles])
-        each.bar(places, heights, 0.62, bottom=bottom, color=COLOURS[part], label=words, zorder=2)
-        bottom += heights
-    lines = {"getContactPoints": (INK, "-", 1), "stepSimulation": (INK, ":", 10)}
-    for part, (colour, dashes, divisor) in lines.items():
-        words = f"pybullet's {part}()" + (", a tenth" if divisor > 1 else "")
+    places, names = np.arange(len(piles)), [f"{boxes:,}" for boxes in piles]
+    parts = np.array([[max(0.0, us[part][boxes]) / boxes for boxes in piles] for part in PARTS])
+    bars = [
+        Series(places, heights, words, bottom=below, style={"color": colour, "width": 0.62, "zorder": 2})
+        for heights, below, words, colour in zip(parts, np.cumsum(parts, 0) - parts, PARTS.values(), COLOURS)
+    ]
+    divided = {"getContactPoints": 1, "stepSimulation": 10}
+    for part, divisor in divided.items():
+        words, colour, form = WHOLES[part]
         heights = [us[part][boxes] / boxes / divisor for boxes in piles]
-        each.plot(places, heights, dashes, color=colour, marker=".", label=words, zorder=3)
-    each.set_xticks(places, [f"{boxes:,}" for boxes in piles])
-    each.set(xlabel="boxes in the pile", ylabel="µs of a step, per box", title="Where the time of a step goes")
-    each.set_ylim(0, 1.45 * max(bottom.max(), *(us["getContactPoints"][boxes] / boxes for boxes in piles)))
-    each.legend(frameon=False, fontsize=7.2, ncols=2, columnspacing=1, loc="upper left")
-
-    for part, words, colour, dashes in (
-        ("stepSimulation", "stepSimulation()", INK, ":"),
-        ("getContactPoints", "getContactPoints()", INK, "-"),
-        ("ours", "update() and overlaps()", OURS, "-"),
-    ):
-        whole.plot(piles, [us[part][boxes] / 1e3 for boxes in piles], dashes, color=colour, marker=".", label=words)
-    whole.set(xscale="log", yscale="log", xlabel="boxes in the pile", ylabel="ms of a step", title="The whole")
-    whole.set_xticks(piles, [f"{boxes:,}" for boxes in piles])
-    whole.minorticks_off()
-    whole.legend(frameon=False, fontsize=8)
-    figures.tidy(each, whole)
-    figure.tight_layout()
-    figures.save(figure, folder / "steps.png", svg=True)
+        bars.append(Series(places, heights, words + ", a tenth" * (divisor > 1), form, style={"color": colour}))
+    top = max(max(bars[-2].y), parts.sum(0).max())
+    each = Panel(
+        "Where the time of a step goes",
+        bars,
+        {"xlabel": "boxes in the pile", "ylabel": "µs of a step, per box", "ylim": (0, 1.45 * top)},
+        xticks=dict(enumerate(names)),
+        legend={"ncols": 2, "columnspacing": 1, "loc": "upper left"},
+    )
+    lines = [
+        Series(piles, [us[part][boxes] / 1e3 for boxes in piles], words, form, style={"color": colour})
+        for part, (words, colour, form) in WHOLES.items()
+    ]
+    scales = {"xscale": "log", "yscale": "log"}
+    whole = Panel(
+        "The whole",
+        lines,
+        {**scales, "xlabel": "boxes in the pile", "ylabel": "ms of a step"},
+        xticks=dict(zip(piles, names)),
+        legend={"fontsize": 8},
+    )
+    charts.draw(path, [each, whole], (10.8, 4.4), font=9, widths=[1.35, 1])
 
 
 def write_page(path: Path, folder: Path) -> Path:
     us = read(path)
-    draw(us, folder)
+    draw(us, folder / "steps.png")
     piles = sorted(us["ours"])
-    rows = []
-    for boxes in piles:
-        whole = [us[part][boxes] for part in ("ours", "getContactPoints", "stepSimulation")]
-        parts = [f"{us[part][boxes] / boxes:.2f}" for part in PARTS]
-        rows.append([f"{boxes:,}", f"{us['pairs overlapping'][boxes]:,.0f}", *parts, *map(duration, whole)])
-    heading = ["boxes", "pairs", "poses asked, µs per box", "placing", "culling", "geometry", "hand-over"]
+    rows = [
+        [
+            f"{boxes:,}", f"{us['pairs overlapping'][boxes]:,.0f}",
+            *(f"{us[part][boxes] / boxes:.2f}" for part in PARTS),
+            *(duration(us[part][boxes]) for part in ("ours", "getContactPoints", "stepSimulation")),
+        ]
+        for boxes in piles
+    ]  # fmt: skip
+    heading = ["boxes", "pairs", "poses asked, µs per box", *list(PARTS)[1:]]
     heading += ["all of ours", "`getContactPoints`", "`stepSimulation`"]
     at = {part: of_part[200 if 200 in piles else piles[0]] for part, of_part in us.items()}
     return write(

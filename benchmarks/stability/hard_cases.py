@@ -23,8 +23,7 @@ from harness import results
 from harness.peers import NOT_ASKED, HardCase, hard_cases
 from harness.watched import Watched
 from overlapper import Placed, overlap
-from paper.steps import lost_at, lost_given_a_point, volume_without_exact_signs
-from stability.judging import RIGHT, Question, distance_column, distance_verdict, failed, verdict
+from stability.judging import Question, distance_column, distance_verdict, verdict
 
 RESULTS = results.FOLDER / "stability.csv"
 PAGE = "stability.page"
@@ -61,11 +60,6 @@ def measure(chosen: Namespace, path: Path) -> None:
     for name in hard_cases("distance"):
         table.put(distance_column(name), HardCase("distance", name), pairs, distance_verdict, asked)
     table.put("way", way, [question.bodies for question in asked], lambda _, answer: answer, asked)
-    lost = [lost_at(*q.bodies) if failed(row["paper"]) else NOT_ASKED for q, row in zip(asked, table.rows)]
-    table.fill("paper lost at", lost)
-    solid = [not q.round and q.clear and q.common.dimension == 3 for q in asked]
-    for name, step in (("given a point", given_a_point), ("and by qhull", by_qhull)):
-        table.fill(name, [step(question) if fit else NOT_ASKED for question, fit in zip(asked, solid)])
     table.write(path, f"seed {chosen.seed}; {results.packages()}")
 
 
@@ -122,17 +116,6 @@ class Columns:
 def way(*bodies: np.ndarray | Placed) -> str:
     """By which way the package itself answers."""
     return overlap(*bodies).way
-
-
-def given_a_point(question: Question) -> str:
-    return lost_given_a_point(question.bodies, question.common) or RIGHT
-
-
-def by_qhull(question: Question) -> str:
-    try:
-        return verdict(question, volume_without_exact_signs(question.bodies, question.common))
-    except Exception as error:
-        return f"raises {type(error).__name__}"
 
 
 def described(question: Question) -> dict[str, str]:

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import replace
+from itertools import islice
 from math import ceil, log10
 from pathlib import Path
 
-import exact
-import families
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import Colormap, LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap
 
-from harness import figures, results
-from harness.figures import INK, plt
+from harness import charts, results
+from harness.charts import Cells, Panel
 from harness.page import filled, indented, table
 from harness.peers import NO_ANSWER, NOT_ASKED, OUT_OF_ITERATIONS, hard_cases
-from paper.pictures import PICTURES, save, steps_in_thicknesses
-from paper.steps import STEPS
 from stability import contacts, stress
-from stability.judging import RIGHT, distance_column, error_of, failed
+from stability.judging import distance_column, error_of, failed
 
 Row = dict[str, str]
 
@@ -65,24 +62,19 @@ DISTANCES = {distance_column(peer): peer for peer in hard_cases("distance")}
 # One hue from pale to dark: told apart without colours, too, and the figures stand in the cells.
 FAILURES = LinearSegmentedColormap.from_list("failures", ["#fdebd3", "#f4a259", "#c8553d", "#5b1a18"])
 ERRORS = LinearSegmentedColormap.from_list("errors", ["#eef3f8", "#a9c6de", "#4f83b5", "#16365c"])
-CLEAN, EMPTY = "#ffffff", "#f0f0f0"
+
+Figure = Callable[[Iterable[Row], str], float]
 
 
 def write_page(measured: Path, folder: Path) -> Path:
     notes, rows = results.read(measured)
-    figures.style(**{"font.size": 8, "axes.linewidth": 0.0})
     overview(with_volumes(rows), folder / "stability.png")
-    volumes = volumes_of(rows)
-    by_degeneracy(rows, folder / "stability_degeneracy.png", DEGENERACIES, peers_of(rows), volumes, "a volume")
+    by_degeneracy(rows, folder / "stability_degeneracy.png", DEGENERACIES, peers_of(rows), volumes_of(rows), "a volume")
     overview_of_distances(rows, folder / "stability_distances.png")
-    columns = list(DISTANCES)
-    path = folder / "stability_distances_degeneracy.png"
+    columns, path = list(DISTANCES), folder / "stability_distances_degeneracy.png"
     by_degeneracy(rows, path, DEGENERACIES_OF_PAIRS, columns, columns, "a depth or distance")
-    shown = shown_cases(rows)
-    for step, row in shown.items():
-        PICTURES[CAUSES[step]](*case_of(row), folder / f"stability_{CAUSES[step]}.png")
     page = folder / "stability.md"
-    page.write_text(text(notes, rows, shown), encoding="utf-8")
+    page.write_text(text(notes, rows), encoding="utf-8")
     return page
 
 
@@ -156,19 +148,6 @@ def exponent(value: float) -> str:
     return "" if np.isnan(value) else "×" if value > 0.5 else f"{ceil(log10(max(value, 1e-17)))}".replace("-", "−")
 
 
-def heat_map(ax: Axes, values: np.ndarray, shade: Callable, label: Callable[[float], str], colours: Colormap) -> None:
-    """Cells with their figures. `shade` maps a value to 0 ... 1, or to None where it is as good as can be."""
-    for (i, j), value in np.ndenumerate(values):
-        strength = None if np.isnan(value) else shade(value)
-        colour = EMPTY if np.isnan(value) else CLEAN if strength is None else colours(strength)
-        ax.add_patch(plt.Rectangle((j - 0.47, i - 0.45), 0.94, 0.9, facecolor=colour, edgecolor="#dddddd", lw=0.5))
-        ink = "white" if strength is not None and strength > 0.6 else "#999999" if strength is None else INK
-        ax.text(j, i, label(value), ha="center", va="center", color=ink, fontsize=7)
-    ax.set_xlim(-0.5, values.shape[1] - 0.5)
-    ax.set_ylim(values.shape[0] - 0.5, -0.5)
-    ax.tick_params(length=0)
-
-
 def failure_shade(value: float) -> float | None:
     return None if value == 0 else min(1.0, (value / 60) ** 0.5)
 
@@ -177,119 +156,73 @@ def error_shade(value: float) -> float | None:
     return None if value < 1e-12 else min(1.0, (log10(value) + 12) / 12)
 
 
-def failures(ax: Axes, groups: Iterable[list[Row]], columns: list[str], across: bool = True) -> None:
-    """Shares of failures; groups go down and columns across, or the other way round."""
-    values = np.array([[failure_share(group, column) for column in columns] for group in groups])
-    heat_map(ax, values if across else values.T, failure_shade, percent, FAILURES)
+def cells(share: Figure, groups: Iterable[list[Row]], columns: list[str]) -> np.ndarray:
+    """A row for each group, a column for each peer."""
+    return np.array([[share(group, column) for column in columns] for group in groups])
 
 
-def errors(ax: Axes, groups: Iterable[list[Row]], columns: list[str], across: bool = True) -> None:
-    values = np.array([[worst_error(group, column) for column in columns] for group in groups])
-    heat_map(ax, values if across else values.T, error_shade, exponent, ERRORS)
+def failures(groups: Iterable[list[Row]], columns: list[str]) -> Cells:
+    return Cells(cells(failure_share, groups, columns), failure_shade, percent, FAILURES)
 
 
-def name_columns(ax: Axes, columns: Iterable[str], *lines: float) -> None:
-    """Names above, the first in bold, and lines between groups of columns."""
-    names = [DISTANCES.get(column, column) for column in columns]
-    ax.xaxis.tick_top()
-    ax.set_xticks(range(len(names)), names, rotation=40, ha="left", rotation_mode="anchor")
-    ax.get_xticklabels()[0].set_fontweight("bold")
-    for line in lines:
-        ax.axvline(line, color=INK, lw=0.8)
+def errors(groups: Iterable[list[Row]], columns: list[str]) -> Cells:
+    return Cells(cells(worst_error, groups, columns), error_shade, exponent, ERRORS)
+
+
+def named(columns: list[str]) -> dict[float, str]:
+    return dict(enumerate(DISTANCES.get(column, column) for column in columns))
 
 
 def overview(rows: list[Row], path: Path) -> None:
     groups, peers, volumes = grouped(rows), peers_of(rows), volumes_of(rows)
-    widths = [len(peers), len(volumes)]
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 0.36 * len(groups) + 1.75), width_ratios=widths)
-    failures(left, groups.values(), peers)
-    errors(right, groups.values(), volumes)
-    left.set_yticks(range(len(groups)), [f"{name}  ({len(group)})" for name, group in groups.items()])
-    right.set_yticks([])
-    name_columns(left, peers, 1.5, len(volumes) - 0.5)
-    name_columns(right, volumes, 1.5)
-    left.set_xlabel("failures, % of the cases (number in brackets)", labelpad=6)
-    right.set_xlabel("worst error of a volume, power of ten (× lost)", labelpad=6)
-    figure.tight_layout(w_pad=1.5)
-    save(figure, path)
+    counts = dict(enumerate(f"{name}  ({len(group)})" for name, group in groups.items()))
+    left = failures(groups.values(), peers), "failures, % of the cases (number in brackets)", counts, peers
+    right = errors(groups.values(), volumes), "worst error of a volume, power of ten (× lost)", {}, volumes
+    draw_overview(path, [left, right])
 
 
 def overview_of_distances(rows: list[Row], path: Path) -> None:
     groups = {name: group for name, group in grouped(rows).items() if deep(group) or not_deep(group)}
-    figure, axes = plt.subplots(1, 4, figsize=(9, 0.36 * len(groups) + 1.75))
-    columns = list(DISTANCES)
-    for j, (part, word) in enumerate([(deep, "depth"), (not_deep, "distance")]):
-        failures(axes[j], map(part, groups.values()), columns)
-        errors(axes[2 + j], map(part, groups.values()), columns)
-        axes[j].set_xlabel(f"{word}: failures, %", labelpad=6)
-        axes[2 + j].set_xlabel(f"{word}: worst error", labelpad=6)
-    counts = [f"{name}  ({len(deep(group))}, {len(not_deep(group))})" for name, group in groups.items()]
-    for ax in axes:
-        ax.set_yticks(range(len(groups)) if ax is axes[0] else [], counts if ax is axes[0] else [])
-        name_columns(ax, columns, 0.5)
-    figure.tight_layout(w_pad=1.2)
-    save(figure, path)
+    counts = (f"{name}  ({len(deep(group))}, {len(not_deep(group))})" for name, group in groups.items())
+    names, columns, panels = dict(enumerate(counts)), list(DISTANCES), []
+    for shown, words in ((failures, "failures, %"), (errors, "worst error")):
+        for part, word in ((deep, "depth"), (not_deep, "distance")):
+            panels.append((shown(map(part, groups.values()), columns), f"{word}: {words}", names, columns))
+            names = {}
+    draw_overview(path, panels)
+
+
+def draw_overview(path: Path, panels: list[tuple[Cells, str, dict[float, str], list[str]]]) -> None:
+    rows, _ = panels[0][0].values.shape
+    widths = [shown.values.shape[1] for shown, *_ in panels]
+    drawn = [
+        Panel(axes={"xlabel": words}, xticks=named(columns), yticks=names, cells=shown, above=True)
+        for shown, words, names, columns in panels
+    ]
+    charts.draw(path, drawn, (9, 0.36 * rows + 1.75), widths=widths, dpi=180, colours=64)
 
 
 def by_degeneracy(
     rows: list[Row], path: Path, families: dict[str, str], columns: list[str], measured: list[str], what: str
 ) -> None:
     """Failures of these columns and worst errors of those that are measures, by the parameter of families."""
-    panels = {family: [r for r in rows if r["family"] == family] for family in families}
-    panels = {family: members for family, members in panels.items() if members}
-    figure, axes = plt.subplots(len(panels), 2, figsize=(9, 2.3 * len(panels)), squeeze=False)
-    for (left, right), (family, members) in zip(axes, panels.items()):
+    panels = []
+    for family, words in families.items():
+        members = [row for row in rows if row["family"] == family]
         decades = sorted({decade(row) for row in members})
         parts = [[row for row in members if decade(row) == d] for d in decades]
         shown = [column for column in columns if asked(members, column)]
-        exact_ones = [column for column in measured if column in shown]
-        failures(left, parts, shown, across=False)
-        errors(right, parts, exact_ones, across=False)
-        for ax, names in ((left, shown), (right, exact_ones)):
-            ax.set_yticks(range(len(names)), [DISTANCES.get(name, name) for name in names])
-            ax.get_yticklabels()[0].set_fontweight("bold")
-            ax.set_xticks(range(len(decades)), ["0" if np.isinf(d) else f"1e{d:.0f}" for d in decades])
-            ax.tick_params(axis="x", labelsize=6 if len(decades) > 10 else 7.5)
-            ax.set_xlabel(families[family])
-        name = family.replace("_", " ")
-        left.set_title(f"{name}: failures, %", loc="left", fontsize=8.5, fontweight="bold")
-        right.set_title(f"worst error of {what}, power of ten (× lost)", loc="left", fontsize=8.5)
-    figure.tight_layout(h_pad=1.2, w_pad=1.5)
-    save(figure, path)
-
-
-# Pictures of the causes
-
-
-CAUSES = {"2 shifts": "shifts", "3 planes": "planes", "4 coplanar duals": "coplanar"}
-
-
-def shown_cases(rows: list[Row]) -> dict[str, Row]:
-    """For each cause that occurs, the failing case that shows it best."""
-    pairs = [row for row in rows if row["bodies"] == "2" and row["clear"] == "yes"]
-    shown = {}
-    for step in CAUSES:
-        column = "paper lost at" if step == "2 shifts" else "given a point"
-        found = [row for row in pairs if row[column] == step]
-        if found:
-            shown[step] = max(found, key=lambda row: vividness(step, row))
-    return shown
-
-
-def vividness(step: str, row: Row) -> float:
-    if step == "2 shifts":
-        # Shifts of a few thicknesses: all of them and the body can be seen at one scale.
-        return -abs(log10(steps_in_thicknesses(*case_of(row)) / 2.5))
-    if step == "3 planes":
-        error = error_of(row["and by qhull"])
-        return 0.0 if np.isnan(error) else error
-    return -len(case_of(row)[1].facets)
-
-
-def case_of(row: Row) -> tuple[list[np.ndarray], exact.Polytope]:
-    case = families.make(row["family"], int(row["seed"]))
-    bodies = [np.array(families.points_of(body), float) for body in case.bodies]
-    return bodies, exact.common(*map(exact.hull, bodies))
+        named_decades = enumerate("0" if np.isinf(d) else f"1e{d:.0f}" for d in decades)
+        ticks = dict(islice(named_decades, 0, None, 1 + len(decades) // 12))
+        title = f"{family.replace('_', ' ')}: failures, %"
+        for figures, names in ((failures, shown), (errors, [column for column in measured if column in shown])):
+            across = figures(parts, names)
+            turned = replace(across, values=across.values.T)
+            if members:
+                panels.append(Panel(title, axes={"xlabel": words}, xticks=ticks, yticks=named(names), cells=turned))
+            title = f"worst error of {what}, power of ten (× lost)"
+    if panels:
+        charts.draw(path, panels, (9, 1.15 * len(panels)), columns=2, font=7, dpi=180, colours=64)
 
 
 # Words
@@ -307,9 +240,7 @@ def kind(cell: str, wrong: str = KINDS[0]) -> str:
     return {"raises": "raised", "crash": "crashed", "hang": "hung"}.get(cell.split()[0], wrong)
 
 
-def text(notes: list[str], rows: list[Row], shown: dict[str, Row]) -> str:
-    solids = [row for row in rows if row["given a point"] != NOT_ASKED]
-    paper = Counter(row["paper lost at"] for row in rows if row["paper lost at"] != NOT_ASKED)
+def text(notes: list[str], rows: list[Row]) -> str:
     parts = {
         "cases": f"{len(with_volumes(rows)):,}",
         "pairs": f"{len(deep(rows)) + len(not_deep(rows)):,}",
@@ -317,15 +248,11 @@ def text(notes: list[str], rows: list[Row], shown: dict[str, Row]) -> str:
         "depths": totals_of_distances(deep(rows)),
         "distances": totals_of_distances(not_deep(rows)),
         "ways": ways(rows),
-        "solids": f"{len(solids):,}",
         "notes": indented(notes),
         "totals": totals(with_volumes(rows)),
-        "steps": steps(rows, solids, paper),
         "auto": about_auto(rows),
         "stress": stress_run(),
         **shallow_rounds(),
-        "paper_failures": str(sum(paper.values())),
-        "shift_failures": str(paper["2 shifts"]),
     }
     for column, peer in DISTANCES.items():
         key = peer.split(",")[0] + "_tight" * ("," in peer)
@@ -338,11 +265,6 @@ def text(notes: list[str], rows: list[Row], shown: dict[str, Row]) -> str:
         parts |= {f"{key}_{name.replace(' ', '_')}": str(kinds[name]) for name in KINDS}
         parts |= {f"{key}_share": percent(failure_share(rows, peer))}
         parts |= {f"{key}_worst_at": worst_places(rows, peer)}
-    for step, name in CAUSES.items():
-        row = shown.get(step)
-        at = f"`{row['family']}` {row['seed']} ({row['detail']})" if row else ""
-        picture = f"![{STEPS[step]}](stability_{name}.png)\n\nThe case is {at}."
-        parts[f"picture_{name}"] = picture if row else "In these cases that never happened."
     return filled(Path(__file__).with_name("page.md"), **parts)
 
 
@@ -437,17 +359,3 @@ def all_said(cells: list[str]) -> str:
     words = Counter(cell for cell in cells if cell != NOT_ASKED and np.isnan(error_of(cell)))
     worst = [f"{max(errors):.0e}"] if errors else []
     return ", ".join([*worst, *(f"{count} {word}" for word, count in words.most_common())])
-
-
-def steps(rows: list[Row], solids: list[Row], paper: Counter[str]) -> str:
-    given = Counter(row["given a point"] for row in solids)
-    late = ("1 common point", "2 shifts", "not reproduced")
-    lines = [
-        [f"{step}: {words}", str(paper[step]), "" if step in late else str(given[step])]
-        for step, words in STEPS.items()
-    ]
-    by_qhull = sum(failed(row["and by qhull"]) for row in solids)
-    lost = given.total() - given[RIGHT]
-    lines.append(["**all**", f"**{paper.total()}** of {len(with_volumes(rows))}", f"**{lost}** of {len(solids)}"])
-    lines.append(["the same with qhull in place of exact signs", "", f"{by_qhull} of {len(solids)}"])
-    return table(["first step that loses it", "as written", "the centroid given"], lines)

@@ -1,9 +1,7 @@
-"""The rules of tests/support/rules.py on as many hard cases as wanted, and memory over a million of them.
+"""The rules of tests/support/rules.py on as many hard cases as wanted.
 
     python benchmarks stress --count 20000                   the families in turn, from seed 0 on
     python benchmarks stress --first 500 --family slivers    other seeds, one family
-    python benchmarks stress --soak 1000000                  only asked for everything, memory watched
-    python benchmarks stress --rounded 1000000               pairs of rounded hulls, by status
 
 Cases are judged in processes that are watched, so that a crash or a hang of the core is a result. Rows are written as
 they come; a case again: `families.make(FAMILY, SEED)`. The table is printed at the end, and --record keeps it in
@@ -12,7 +10,6 @@ benchmarks/results for the stability page. The command fails if a rule is broken
 
 from __future__ import annotations
 
-import os
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -26,7 +23,6 @@ from typing import Any
 import exact
 import families
 import numpy as np
-import rounded_pairs
 import rules
 from rich import box
 from rich.console import Console
@@ -165,32 +161,6 @@ def print_table(lines: Sequence[Row]) -> None:
     Console(width=120).print(shown)
 
 
-# Memory
-
-
-def soak(first: int, count: int, steps: int = 20) -> bool:
-    """True if memory stays as it is while so many new cases are asked for everything."""
-    stream = jobs(first)
-    sizes = []
-    for step in range(steps):
-        for family, seed in islice(stream, count // steps):
-            found = rules.answer(families.make(family, seed).placed)
-            rules.figures_are_finite(families.Case("", 0.0, found.shapes), found)
-            found.faces, found.halfspaces, found.patch, found.owner  # noqa: B018
-        sizes.append(resident())
-        print(f"{count // steps * (step + 1)} cases: {sizes[-1] / 2**20:.1f} MiB", flush=True)
-    # The first steps meet the largest cases for the first time, and the allocator keeps what these needed.
-    growth = max(sizes[steps // 2 :]) - sizes[steps // 2 - 1]
-    print(f"growth over the second half: {growth / (count / 2):.1f} bytes a case")
-    return growth < count  # two bytes a case; what belongs to the smallest answer takes hundreds
-
-
-def resident() -> int:
-    """Bytes of this process in memory."""
-    with open("/proc/self/statm") as statm:
-        return int(statm.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-
-
 def options(parser: ArgumentParser) -> None:
     parser.add_argument("--first", type=int, default=0, help="the seed to begin with")
     parser.add_argument("--count", type=int, default=1000, help="so many cases")
@@ -198,19 +168,11 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, default=2, help="processes at a time")
     parser.add_argument("--out", type=Path, default=ROWS, help="file of the rows")
     parser.add_argument("--record", action="store_true", help=f"keep the table as {TABLE.relative_to(ROOT)}")
-    parser.add_argument("--rounded", type=int, metavar="COUNT", help="so many pairs of rounded hulls, only by status")
-    parser.add_argument("--soak", type=int, metavar="COUNT", help="so many cases in one process, only memory watched")
 
 
 def main(chosen: Namespace) -> bool:
     """True if a rule is broken."""
     np.seterr(all="ignore")
-    if chosen.rounded:
-        false = list(rounded_pairs.false_statuses(chosen.first, chosen.rounded))
-        print(f"{chosen.rounded} pairs, {len(false)} of a false status", *false, sep="\n")
-        return bool(false)
-    if chosen.soak:
-        return not soak(chosen.first, chosen.soak)
     done = run(islice(jobs(chosen.first, chosen.family or ()), chosen.count), chosen.workers, chosen.out)
     lines = table(done)
     print_table(lines)

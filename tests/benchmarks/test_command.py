@@ -31,7 +31,7 @@ def test_an_unknown_benchmark_is_refused(capsys):
 def test_pages_name_benchmarks_that_there_are():
     pages = [ROOT / "README.md", ROOT / ".github" / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
     named = {name for each in pages for name in re.findall(r"python benchmarks (\S+?)\b", each.read_text("utf-8"))}
-    assert set(command.COMMANDS) - {"chart", "stability", "growth"} <= named <= set(command.COMMANDS)
+    assert set(command.COMMANDS) - {"chart", "stability"} <= named <= set(command.COMMANDS)
 
 
 def test_results_are_read_as_they_were_written(tmp_path):

@@ -25,7 +25,7 @@ def test_a_pile_is_measured_part_by_part_and_its_page_is_drawn(small, tmp_path):
         assert all(boxes in us[part] for part in (*steps.PARTS, "ours", "stepSimulation", "getContactPoints"))
     page = (tmp_path / "steps.md").read_text(encoding="utf-8")
     assert "| 8 |" in page and "| 16 |" in page and "$" not in page
-    assert (tmp_path / "steps.png").stat().st_size > 10_000 and (tmp_path / "steps.svg").is_file()
+    assert (tmp_path / "steps.png").stat().st_size > 10_000
 
 
 def test_a_volume_that_is_not_that_of_a_single_call_ends_the_run(small, tmp_path, monkeypatch, capsys):

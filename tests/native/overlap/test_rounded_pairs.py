@@ -1,4 +1,4 @@
-"""The status of rounded hulls; `python benchmarks stress --rounded` tests a million pairs."""
+"""The status of rounded hulls."""
 
 import rounded_pairs
 
