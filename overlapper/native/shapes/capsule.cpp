@@ -3,6 +3,7 @@
 #include <numbers>
 #include <string>
 
+#include "shapes/cutter.h"
 #include "shapes/inscribed.h"
 #include "shapes/limits.h"
 
@@ -89,6 +90,22 @@ WidePlane Capsule::wide_tightest(const WideVector& p, const WideTriangles&) cons
   const DoubleDouble z = p.z > half ? half : p.z < -half ? -half : p.z;
   const WideVector core{{}, {}, z};
   return tangent(p - core, core, radius, wide_axis(0));
+}
+
+/// A cylinder and two half balls.
+void Capsule::give_pieces(Cutter& cutter) const {
+  if (length == 0) return cutter.whole_ball(radius);
+  const double half = length / 2;
+  cutter.begin();
+  cutter.cylinder({}, wide_axis(2), radius, half);
+  for (const double sign : {-1.0, 1.0}) cutter.cut({{{}, {}, {sign}}, {half}});
+  cutter.end();
+  for (const double sign : {-1.0, 1.0}) {
+    cutter.begin();
+    cutter.ball({{}, {}, {sign * half}}, radius);
+    cutter.cut({{{}, {}, {-sign}}, {-half}});
+    cutter.end();
+  }
 }
 
 Hull Capsule::inscribed(double tolerance) const { return make_hull(points_of_capsule(radius, length / 2, tolerance)); }

@@ -56,6 +56,7 @@ As in pybullet, `length` lies between the centres of the caps; it may be 0.)";
   WidePlane wide_ray_exit(const WideVector& origin, const WideVector& direction) const;
   WidePlane wide_tightest(const WideVector& point, const WideTriangles&) const;
 
+  void give_pieces(Cutter& cutter) const;
   Hull inscribed(double tolerance) const;
 
   double radius = 0, length = 0;

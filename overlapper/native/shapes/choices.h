@@ -13,6 +13,7 @@
 
 namespace overlapper {
 
+class Cutter;
 struct Ellipsoid;
 struct HullData;
 class WideBody;
@@ -79,6 +80,22 @@ struct CentredAtOrigin {
 /// It has no hull data.
 struct WithoutHullData {
   static const HullData* polytope() { return nullptr; }
+};
+
+/// No way cuts it into pieces.
+struct NotCut {
+  static void give_pieces(Cutter&) {}
+};
+
+/// All of it is one piece inside its facets.
+template <class S>
+struct CutByFacets {
+  void give_pieces(auto& cutter) const {
+    const S& shape = static_cast<const S&>(*this);
+    cutter.begin();
+    for (int f = 0; f < shape.facet_count(); ++f) cutter.face(*shape.unit_facet(f));
+    cutter.end();
+  }
 };
 
 struct NotRevolved {

@@ -3,6 +3,7 @@
 #include <concepts>
 
 #include "shapes/choices.h"
+#include "shapes/cutter.h"
 #include "shapes/wide_triangles.h"
 
 namespace overlapper {
@@ -69,13 +70,15 @@ concept Widened = requires(const S& s, const WideVector& v, const WideTriangles&
 
 /// What the choice of a way of measuring depends on.
 template <class S>
-concept Classified = requires(const S& s) {
+concept Classified = requires(const S& s, Cutter& cutter) {
   { S::kBounded } -> std::convertible_to<bool>;
   { S::kSmooth } -> std::convertible_to<bool>;
   { s.revolution() } -> std::same_as<std::optional<Revolution>>;  // no value unless a ball, a capsule or a cylinder
   { s.stretched() } -> std::convertible_to<const Ellipsoid*>;     // the shape, if it is an ellipsoid and not a ball
   // The polytope of a hull, or the core of a rounded hull; null for other shapes.
   { s.polytope() } -> std::convertible_to<const HullData*>;
+  // Parts of balls and cylinders within planes. A stretched ball gives the ball of radius 1.
+  { s.give_pieces(cutter) };
 };
 
 template <class S>

@@ -2,6 +2,7 @@
 
 #include <numbers>
 
+#include "shapes/cutter.h"
 #include "shapes/inscribed.h"
 #include "shapes/limits.h"
 
@@ -58,6 +59,13 @@ WidePlane Cylinder::wide_tightest(const WideVector& p, const WideTriangles&) con
   const DoubleDouble past_cap = abs(p.z) - DoubleDouble{length / 2}, past_side = norm(across(p)) - DoubleDouble{radius};
   if (!(past_cap < past_side)) return {DoubleDouble{sign(p.z)} * wide_axis(2), {length / 2}};
   return tangent(across(p), {}, radius, wide_axis(0));
+}
+
+void Cylinder::give_pieces(Cutter& cutter) const {
+  cutter.begin();
+  cutter.cylinder({}, wide_axis(2), radius, length / 2);
+  for (const double sign : {-1.0, 1.0}) cutter.face({{{}, {}, {sign}}, {length / 2}});
+  cutter.end();
 }
 
 Hull Cylinder::inscribed(double tolerance) const {

@@ -48,6 +48,7 @@ struct Cylinder : Bounded,
   WidePlane wide_ray_exit(const WideVector& origin, const WideVector& direction) const;
   WidePlane wide_tightest(const WideVector& point, const WideTriangles&) const;
 
+  void give_pieces(Cutter& cutter) const;
   Hull inscribed(double tolerance) const;
 
   double radius = 0, length = 0;

@@ -4,6 +4,7 @@
 #include <array>
 #include <numbers>
 
+#include "shapes/cutter.h"
 #include "shapes/inscribed.h"
 #include "shapes/limits.h"
 
@@ -174,6 +175,8 @@ WidePlane Ellipsoid::wide_tightest(const WideVector& point, const WideTriangles&
   // Where the slack is least, an error of the normal changes it only to second order: doubles are accurate enough.
   return wide_supporting(half_axes, wide(ways_out(rounded(point))[0]));
 }
+
+void Ellipsoid::give_pieces(Cutter& cutter) const { cutter.whole_ball(ball() ? half_axes.x : 1); }
 
 Hull Ellipsoid::inscribed(double tolerance) const {
   std::vector<Vec3> points = points_of_capsule(1, 0, tolerance);

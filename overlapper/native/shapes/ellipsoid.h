@@ -64,6 +64,7 @@ as closely as `tolerance` asks.)";
   WidePlane wide_ray_exit(const WideVector& origin, const WideVector& direction) const;
   WidePlane wide_tightest(const WideVector& point, const WideTriangles&) const;
 
+  void give_pieces(Cutter& cutter) const;
   Hull inscribed(double tolerance) const;
 
   Vec3 half_axes;

@@ -11,7 +11,13 @@ class Mesh;
 struct Solid;
 
 /// { x : dot(plane.normal, x) <= plane.offset }. Unbounded: its support is infinite in all directions but one.
-struct HalfSpace : Flat, WithoutHullData, NotRevolved, NotStretched, PolytopeCore, OrderedByFields<HalfSpace> {
+struct HalfSpace : Flat,
+                   WithoutHullData,
+                   CutByFacets<HalfSpace>,
+                   NotRevolved,
+                   NotStretched,
+                   PolytopeCore,
+                   OrderedByFields<HalfSpace> {
   static constexpr bool kBounded = false;
   static constexpr const char* kName = "HalfSpace";
   static constexpr const char* kAbout = R"(The closed half-space { x : normal · x <= offset }.

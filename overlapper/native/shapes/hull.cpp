@@ -1,7 +1,10 @@
 #include "shapes/hull.h"
 
+#include <algorithm>
 #include <limits>
 
+#include "geometry/cancellation.h"
+#include "shapes/cutter.h"
 #include "shapes/mesh.h"
 #include "shapes/solid.h"
 #include "shapes/wide_body.h"
@@ -10,6 +13,9 @@ namespace overlapper {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// If facets hold their corners only but for rounding, the planes of at most so many triangles are faces instead.
+constexpr size_t kMostTriangles = 256;
 
 /// The plane among `planes` with the largest `value(plane)`.
 template <class Value>
@@ -21,6 +27,12 @@ Plane best_plane(const std::vector<Plane>& planes, Value value) {
     if (v > largest) largest = v, best = i;
   }
   return planes[best];
+}
+
+WidePlane plane_through(const HullData& hull, const std::array<int, 3>& corners) {
+  const auto [a, b, c] = corners;
+  const WideVector normal = unit(wide_normal(hull.corners[a], hull.corners[b], hull.corners[c]));
+  return {normal, dot(normal, wide(hull.corners[a]))};
 }
 
 }  // namespace
@@ -56,10 +68,38 @@ std::optional<WidePlane> Hull::wide_facet(int f) const {
 }
 
 std::optional<WidePlane> Hull::unit_facet(int f) const {
-  const auto& [i, j, k] = data->facet_corners[f];
-  if (i < 0) return std::nullopt;
-  const WideVector normal = unit(wide_normal(data->corners[i], data->corners[j], data->corners[k]));
-  return WidePlane{normal, dot(normal, wide(data->corners[i]))};
+  const auto& corners = data->facet_corners[f];
+  if (corners[0] < 0) return std::nullopt;
+  return plane_through(*data, corners);
+}
+
+double Hull::unexact() const {
+  const bool exact = std::ranges::none_of(data->facet_corners, [](const auto& corners) { return corners[0] < 0; });
+  return exact ? 0 : std::max(data->flatness, 0x1p-52 * data->radius);
+}
+
+WidePlane Hull::plane_through_corners(int f) const {
+  const Plane& plane = data->planes[f];
+  if (data->facet_corners[f][0] < 0) return {unit(wide(plane.normal)), {plane.offset}};
+  return plane_through(*data, data->facet_corners[f]);
+}
+
+/// One piece, inside the planes of facets. If these are not exact, it is inside the planes of all triangles, unless
+/// too many planes matter.
+void Hull::give_pieces(Cutter& cutter) const {
+  const double inexact = unexact();
+  cutter.begin();
+  if (inexact > 0 && data->triangles.size() <= kMostTriangles) {
+    for (const auto& triangle : data->triangles) cutter.face(plane_through(*data, triangle));
+    if (cutter.few()) return cutter.end();
+    cutter.begin_again();
+  }
+  for (int f = 0; f < facet_count() && !cutter.empty(); ++f) {
+    cancellation_point();
+    if (!cutter.within(facet(f))) cutter.face(plane_through_corners(f));
+  }
+  cutter.off(inexact);
+  cutter.end();
 }
 
 void Hull::place(Solid& solid, const Pose* pose, double beyond) const {

@@ -1,11 +1,14 @@
 #include "shapes/rounded_hull.h"
 
+#include <algorithm>
 #include <cfloat>
 #include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <string>
 
+#include "geometry/cancellation.h"
+#include "shapes/cutter.h"
 #include "shapes/limits.h"
 #include "shapes/sphere.h"
 #include "shapes/wide_body.h"
@@ -188,6 +191,114 @@ WidePlane RoundedHull::wide_tightest(const WideVector& point, const WideTriangle
 
 void RoundedHull::append_wide_planes(const WideBody& body, std::vector<WidePlane>& planes) const {
   body.append_triangles(radius, planes);
+}
+
+namespace {
+
+/// Cuts what surrounds the core. Parts that the region does not reach are left out.
+class RoundedCutter {
+ public:
+  RoundedCutter(const RoundedHull& rounded, Cutter& cutter)
+      : core_(rounded.core),
+        hull_(*core_.data),
+        radius_(rounded.radius),
+        cutter_(cutter),
+        near_(cutter.region(radius_)) {}
+
+  /// A prism on the facet.
+  void cut_facet(int f) {
+    const auto ring = hull_.facet(f);
+    const Plane& plane = hull_.planes[f];
+    if (!near(ring)) return;
+    if (cutter_.beyond({plane.normal, plane.offset + radius_}) || cutter_.beyond({-plane.normal, -plane.offset}))
+      return;
+    cutter_.begin();
+    const auto [normal, offset] = core_.plane_through_corners(f);
+    cutter_.cut({-normal, -offset});
+    cutter_.face({normal, offset + DoubleDouble{radius_}});
+    for (size_t i = 0; i < ring.size() && !cutter_.empty(); ++i) {
+      const Vec3 a = hull_.vertices[ring[i]], b = hull_.vertices[ring[(i + 1) % ring.size()]];
+      cut_through(unit(cross(wide_difference(b, a), normal)), a);
+    }
+    cutter_.end();
+  }
+
+  /// A wedge of a cylinder along the edge.
+  void cut_edge(const Edge& edge) {
+    const Vec3 a = hull_.vertices[edge.from], b = hull_.vertices[edge.to], way = unit(b - a);
+    const Vec3 out_left = hull_.planes[edge.left].normal, out_right = hull_.planes[edge.right].normal;
+    if (beyond(way, b) || beyond(-way, a) || beyond(cross(out_left, way), a) || beyond(cross(way, out_right), a))
+      return;
+    const WideVector between = wide_difference(b, a), along = unit(between);
+    cutter_.begin();
+    cutter_.cylinder(DoubleDouble{0.5} * (wide(a) + wide(b)), along, radius_, rounded(norm(between)) / 2);
+    cut_through(-along, a);
+    cut_through(along, b);
+    // The left facet lies to the left of the edge seen from outside: beyond it, the other way.
+    if (!cutter_.empty()) cut_through(unit(cross(core_.plane_through_corners(edge.left).normal, along)), a);
+    if (!cutter_.empty()) cut_through(unit(cross(along, core_.plane_through_corners(edge.right).normal)), a);
+    cutter_.end();
+  }
+
+  /// A wedge of a ball at a vertex. `beside` has the vertex with each vertex that it shares an edge with.
+  void cut_vertex(std::span<const std::pair<int, int>> beside) {
+    const Vec3 vertex = hull_.vertices[beside[0].first];
+    for (const auto& [_, other] : beside)
+      if (beyond(unit(hull_.vertices[other] - vertex), vertex)) return;
+    cutter_.begin();
+    cutter_.ball(wide(vertex), radius_);
+    for (const auto& [_, other] : beside) cut_through(unit(wide_difference(hull_.vertices[other], vertex)), vertex);
+    cutter_.end();
+  }
+
+  bool near(std::span<const int> vertices) const {
+    Vec3 lower = hull_.vertices[vertices[0]], upper = lower;
+    for (const int v : vertices.subspan(1)) {
+      lower = min(lower, hull_.vertices[v]), upper = max(upper, hull_.vertices[v]);
+    }
+    return lower.x <= near_.upper.x && lower.y <= near_.upper.y && lower.z <= near_.upper.z &&
+           upper.x >= near_.lower.x && upper.y >= near_.lower.y && upper.z >= near_.lower.z;
+  }
+
+ private:
+  bool beyond(Vec3 normal, Vec3 point) const { return cutter_.beyond({normal, dot(normal, point)}); }
+  void cut_through(const WideVector& normal, Vec3 point) { cutter_.cut({normal, dot(normal, wide(point))}); }
+
+  const Hull& core_;
+  const HullData& hull_;
+  double radius_;
+  Cutter& cutter_;
+  Bounds near_;
+};
+
+}  // namespace
+
+/// The core, a prism on every facet, a wedge of a cylinder along every edge, and a wedge of a ball at every vertex.
+void RoundedHull::give_pieces(Cutter& cutter) const {
+  const int facets = core.facet_count();
+  cutter.off(core.unexact());
+  cutter.begin();
+  for (int f = 0; f < facets && !cutter.empty(); ++f) {
+    cancellation_point();
+    if (!cutter.within(core.facet(f))) cutter.cut(core.plane_through_corners(f));
+  }
+  cutter.end();
+  RoundedCutter around(*this, cutter);
+  for (int f = 0; f < facets; ++f) around.cut_facet(f);
+  std::vector<std::pair<int, int>> beside;
+  for (const Edge& edge : core.edges()) {
+    cancellation_point();
+    const std::array<int, 2> ends{edge.from, edge.to};
+    if (!around.near(ends)) continue;
+    around.cut_edge(edge);
+    for (const int i : {0, 1})
+      if (around.near(std::span(ends).subspan(i, 1))) beside.push_back({ends[i], ends[1 - i]});
+  }
+  std::ranges::sort(beside);
+  for (size_t i = 0, end; i < beside.size(); i = end) {
+    for (end = i + 1; end < beside.size() && beside[end].first == beside[i].first;) ++end;
+    around.cut_vertex(std::span(beside).subspan(i, end - i));
+  }
 }
 
 Hull RoundedHull::inscribed(double) const {

@@ -54,6 +54,7 @@ no certificate, and neither does it with an ellipsoid that it overlaps.)";
   WidePlane wide_tightest(const WideVector& point, const WideTriangles&) const;
   void append_wide_planes(const WideBody& body, std::vector<WidePlane>& planes) const;
 
+  void give_pieces(Cutter& cutter) const;
   Hull inscribed(double tolerance) const;
 
   Hull core;

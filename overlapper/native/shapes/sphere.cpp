@@ -2,6 +2,7 @@
 
 #include <numbers>
 
+#include "shapes/cutter.h"
 #include "shapes/inscribed.h"
 #include "shapes/limits.h"
 
@@ -30,6 +31,8 @@ WidePlane Sphere::wide_ray_exit(const WideVector& origin, const WideVector& dire
 WidePlane Sphere::wide_tightest(const WideVector& point, const WideTriangles&) const {
   return tangent(point, {}, radius, wide_axis(2));
 }
+
+void Sphere::give_pieces(Cutter& cutter) const { cutter.whole_ball(radius); }
 
 Hull Sphere::inscribed(double tolerance) const { return make_hull(points_of_capsule(radius, 0, tolerance)); }
 

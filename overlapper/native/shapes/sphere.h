@@ -42,6 +42,7 @@ struct Sphere : Bounded,
   WidePlane wide_ray_exit(const WideVector& origin, const WideVector& direction) const;
   WidePlane wide_tightest(const WideVector& point, const WideTriangles&) const;
 
+  void give_pieces(Cutter& cutter) const;
   Hull inscribed(double tolerance) const;
 
   double radius = 0;

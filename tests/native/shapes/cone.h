@@ -14,6 +14,7 @@ namespace overlapper {
 struct Cone : Bounded,
               Smooth,
               WithoutHullData,
+              NotCut,
               NotRevolved,
               NotStretched,
               CurvedCore,

@@ -38,9 +38,6 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
 /// Cuts a body into pieces. Pieces and walls that `other` does not reach are left out, and so are pieces outside
 /// `common`, the polytope around the common set, if known. Bodies are about a reference, at `reference` in the world.
 /// Pieces are relative to the point `inside`, in the same coordinates as the bodies.
-///
-/// A capsule is a cylinder and two half balls. A rounded hull is its core, a prism on every facet, a wedge of a
-/// cylinder along every edge, and a wedge of a ball at every vertex.
 void cut(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
          const WideVector& inside, Pieces& result);
 
