@@ -15,14 +15,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
-def unfinished(place: Path, number: int = 1) -> Path:
-    """The name beside `place` of what is not to take it, or not yet."""
+def unfinished(place: Path, number: int = 1, ending: str | None = None) -> Path:
+    """The name beside `place` of what is not to take it, or not yet; `ending` is that of `place` by default."""
     more = f"-{number}" if number > 1 else ""
-    return place.with_name(f"{place.stem}.unfinished{more}{place.suffix}")
+    return place.with_name(f"{place.stem}.unfinished{more}{place.suffix if ending is None else ending}")
 
 
-def claim(place: Path, folder: bool = False) -> Path:
-    """A new and empty file beside `place`, or a folder, to be written and then moved to it.
+def claim(place: Path, ending: str | None = None) -> Path:
+    """A new and empty file beside `place`, to be written and then moved to it; `ending` is that of `place` by default.
 
     OSError if there can be none, or if `place` is what no file should replace: a folder, a device.
     """
@@ -33,12 +33,9 @@ def claim(place: Path, folder: bool = False) -> Path:
             raise OSError(reason, os.strerror(reason), str(place))
     number = 1
     while True:
-        path = unfinished(place, number)
+        path = unfinished(place, number, ending)
         try:
-            if folder:
-                path.mkdir()
-            else:
-                os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+            os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
             return path
         except FileExistsError:
             number += 1

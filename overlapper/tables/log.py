@@ -29,9 +29,9 @@ class Log:
     this package and of pybullet, what `bodies` was told of surfaces and concave meshes, and `settings`: what else is
     worth knowing, as `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
 
-    A step is on disk when `add` returns. The table grows beside its place, as `run.unfinished.parquet`, and takes it at
-    the end of the `with`, or by `close()`, also if Ctrl-C or sys.exit() ends the loop. It stays where it is after an
-    error, and when the process is killed, and is a table like any other; `unfinished` says where.
+    A step is on disk when `add` returns. The table grows beside its place, as `run.unfinished.csv`, and takes it at the
+    end of the `with`, or by `close()`, also if Ctrl-C or sys.exit() ends the loop. It stays where it is after an error,
+    and when the process is killed, and is a table like any other; `unfinished` says where. Parquet grows as CSV, too.
 
     ValueError for another ending or `per`, OSError if there can be no such file, ImportError without the library that
     writes it.

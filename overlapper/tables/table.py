@@ -105,7 +105,7 @@ def rows(
         table.append(
             {
                 "step": step,
-                "time_s": time,
+                "time_s": float(time),
                 **a[contact.bodyA, contact.linkA, contact.shapeA],
                 **b[contact.bodyB, contact.linkB, contact.shapeB],
                 "status": contact.overlap.status,
@@ -144,7 +144,7 @@ def link_rows(
         table.append(
             {
                 "step": step,
-                "time_s": time,
+                "time_s": float(time),
                 "bodyA": pair.bodyA,
                 "linkA": pair.linkA,
                 "nameA": names[pair.bodyA, pair.linkA],

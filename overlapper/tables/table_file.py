@@ -2,7 +2,7 @@
 
 Every file says in its metadata what wrote it and with which settings; the units are in the names of the columns. A
 table grows beside its place (`overlapper.whole_file`) and takes it when it is closed. What a killed run has finished is
-in `run.unfinished.csv`, and is a table of its own.
+in `run.unfinished.csv`, and is a table of its own. That of a Parquet file is a CSV file, too.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import csv
 import errno
 import hashlib
 import itertools
+import math
 import os
 import re
-import shutil
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
@@ -26,7 +26,7 @@ from overlapper import __version__
 from overlapper.install import hint
 from overlapper.printable import first_line, printable
 from overlapper.tables.table import COLUMNS, FORCES, POSE, Row, Value
-from overlapper.whole_file import claim, settle
+from overlapper.whole_file import beside, claim, settle
 
 KNOWN = COLUMNS | FORCES
 
@@ -74,6 +74,32 @@ class Table(Protocol):
     def leave(self) -> Path | None: ...
 
 
+class Seal:
+    """The number of rows of a table and a digest of the lines that they are in CSV, and how many bytes those are."""
+
+    def __init__(self, text: bytes = b"", rows: int = 0, before: Seal | None = None) -> None:
+        self.rows, self.size = rows, len(text)
+        self._digest: Any = before._digest.copy() if before else hashlib.sha256()
+        self._digest.update(text)
+        if before:
+            self.rows, self.size = self.rows + before.rows, self.size + before.size
+
+    @classmethod
+    def of(cls, columns: Sequence[str], rows: Iterable[Iterable[Value]] = ()) -> Seal:
+        """The seal of a whole table, of rows in the order of the columns."""
+        seal = cls(_text([",".join(columns)]))
+        for row in rows:
+            seal = seal.further(_text([_line(row)]), 1)
+        return seal
+
+    def further(self, text: bytes, rows: int = 0) -> Seal:
+        """The seal of this and further lines. This one stays as it is, as a signal may come at any time."""
+        return Seal(text, rows, self)
+
+    def __str__(self) -> str:
+        return f"{self.rows:,}, sha256 {self._digest.hexdigest()}"
+
+
 class CsvTable:
     """Comma-separated values below lines of metadata that begin with #; a step is handed to the system at once.
 
@@ -84,7 +110,7 @@ class CsvTable:
         self, path: Path, metadata: Mapping[str, str] | None = None, columns: Iterable[str] = tuple(COLUMNS)
     ) -> None:
         self._columns, self._place = list(columns), path
-        self._path = claim(path)
+        self._path = claim(path, ".csv")
         self._empty = True
         try:
             # Written in one call a step, so that a kill has no half-filled buffer to lose.
@@ -93,39 +119,44 @@ class CsvTable:
             self._path.unlink()
             raise
         try:
-            self._write(f"# {name}: {printable(value)}" for name, value in (metadata or {}).items())
-            self._seal = self._file.tell()
-            self._write([_seal()])
+            heading = _text(f"# {name}: {printable(value)}" for name, value in (metadata or {}).items())
+            self._sealed_at = len(heading)
+            self._write(heading + _text([_seal_line("unfinished")]), 0)
             self._body = self._file.tell()
-            self._write([",".join(self._columns)])
+            self._seal = Seal.of(self._columns)
+            self._write(_text([",".join(self._columns)]), self._body)
         except BaseException:
             self.leave()
             raise
 
     def write(self, rows: Iterable[Row]) -> None:
-        lines = [",".join(_cell(row.get(column)) for column in self._columns) for row in rows]
+        lines = [_line([row.get(column) for column in self._columns]) for row in rows]
+        self._grow(_text(lines), len(lines))
         self._empty = self._empty and not lines
-        self._write(lines)
 
     def comment(self, text: str) -> None:
         """A line that readers of the rows pass over."""
-        self._write([f"# {text}"])
+        self._grow(_text([f"# {text}"]))
 
-    def _write(self, lines: Iterable[str]) -> None:
-        unwritten = memoryview("".join(f"{line}\n" for line in lines).encode())
+    def _grow(self, text: bytes, rows: int = 0) -> None:
+        """Add lines. A signal may end this in the middle; the next lines, or the end, then take their place."""
+        self._write(text, self._body + self._seal.size)
+        self._seal = self._seal.further(text, rows)
+
+    def _write(self, text: bytes, place: int) -> None:
+        self._file.seek(place)
+        unwritten = memoryview(text)
         while unwritten:
             unwritten = unwritten[self._file.write(unwritten) :]
 
+    def _finish(self) -> None:
+        self._file.truncate(self._body + self._seal.size)
+        self._write(_text([_seal_line(str(self._seal))]), self._sealed_at)
+        self._file.close()
+
     def close(self) -> None:
         try:
-            self._file.seek(self._body)
-            body = self._file.read()
-            # The last line has no end if a signal came in the middle of it.
-            body = body[: body.rfind(b"\n") + 1]
-            self._file.truncate(self._body + len(body))
-            self._file.seek(self._seal)
-            self._write([_seal(body)])
-            self._file.close()
+            self._finish()
             settle(self._path, self._place)
         except BaseException:
             self.leave()
@@ -138,9 +169,16 @@ class CsvTable:
         return None if self._empty else self._path
 
 
-def _seal(body: bytes | None = None) -> str:
+def _text(lines: Iterable[str]) -> bytes:
+    return "".join(f"{line}\n" for line in lines).encode()
+
+
+def _line(row: Iterable[Value]) -> str:
+    return ",".join([_cell(value) for value in row])
+
+
+def _seal_line(told: str) -> str:
     """The line that tells whether all below it is there; of the same length before that is known."""
-    told = "unfinished" if body is None else f"{_count(body):,}, sha256 {hashlib.sha256(body).hexdigest()}"
     return f"# rows: {told:>84}"
 
 
@@ -171,12 +209,23 @@ def _csv_text(path: Path) -> str:
         return text[: text.rfind("\n") + 1]
     body = text[seal.end() + 1 :].encode()
     if hashlib.sha256(body).hexdigest() != seal[2]:
-        rows, there = int(seal[1].replace(",", "")), _count(body)
-        what = f"{there:,} of its {rows:,} rows are there" if there != rows else "a line of it is another"
-        raise ValueError(
-            f"{path} is not as it was written: {what} (if that is as it should be, take out its line `# rows`)"
-        )
+        other = _other(path, seal[1], _count(body))
+        raise ValueError(f"{other} (if that is as it should be, take out its line `# rows`)")
     return text
+
+
+def _other(path: Path, written: str, there: int) -> ValueError:
+    """The error for a table that is not as it was written; `written` is its number of rows then, as text."""
+    what = f"{there:,} of its {written} rows are there" if f"{there:,}" != written else "a line of it is another"
+    return ValueError(f"{path} is not as it was written: {what}")
+
+
+def _sealed(path: Path, metadata: Mapping[str, str], columns: Sequence[str], rows: list[Row]) -> list[Row]:
+    """The rows of a table that is no CSV, if its seal fits; earlier versions wrote the number of rows, or nothing."""
+    told = metadata.get("rows")
+    if told is None or told == str(len(rows)) or told == str(Seal.of(columns, (row.values() for row in rows))):
+        return rows
+    raise _other(path, told.partition(", sha256")[0][:20], len(rows))
 
 
 def _csv_content(path: Path) -> Content:
@@ -241,79 +290,51 @@ def _checked(row: Row) -> Row:
     return row
 
 
-class ParquetTable:
+class ParquetTable(CsvTable):
     """Parquet by pyarrow.
 
-    A Parquet file cannot be read before its end is written. So a run writes whole files into the folder
-    `run.unfinished.parquet`, which readers take for one table, and `close` makes the one file of them.
+    A Parquet file cannot be read before its end is written, and a file for each step would take a millisecond. So the
+    table grows as CSV, in `run.unfinished.csv`, and `close` makes a Parquet file of it.
     """
 
-    PART = 4_000  # rows, above which the next file is begun: the last one is written anew every step, in milliseconds
     GROUP = 20_000  # rows; a row group of a few megabytes, as Parquet's readers expect
 
     def __init__(
         self, path: Path, metadata: Mapping[str, str] | None = None, columns: Mapping[str, type] = COLUMNS
     ) -> None:
         self._arrow: Any = _arrow()
-        pyarrow = self._arrow
-        kinds = {int: pyarrow.int32(), float: pyarrow.float64(), str: pyarrow.string()}
-        self._schema = pyarrow.schema([(name, kinds[kind]) for name, kind in columns.items()], metadata)
-        self._place, self._empty = path, True
-        self._folder = claim(path, folder=True)
-        # Beside the folder, whose every file some readers take for a part of the table: a kill may leave half of one.
-        self._begun = self._folder.with_name(f".{self._folder.name}")
-        self._count = 0
-        self._last = self._schema.empty_table()
-        try:
-            self._replace_last()
-        except BaseException:
-            self.leave()
-            raise
-
-    def write(self, rows: Iterable[Row]) -> None:
-        step = self._arrow.Table.from_pylist(list(rows), schema=self._schema)
-        if not len(step):
-            return
-        if len(self._last) >= self.PART:
-            self._count, self._last = self._count + 1, self._schema.empty_table()
-        self._last = self._arrow.concat_tables([self._last, step])
-        self._replace_last()
-        self._empty = False
-
-    def _replace_last(self) -> None:
-        with _named(self._place, self._arrow.lib.ArrowException):
-            self._arrow.parquet.write_table(self._last, self._begun, write_page_checksum=True)
-        os.replace(self._begun, self._folder / f"{self._count:06}.parquet")
+        self._metadata, self._kinds = metadata or {}, columns
+        super().__init__(path, metadata, columns)
 
     def close(self) -> None:
         try:
-            with (
-                _named(self._place, self._arrow.lib.ArrowException),
-                self._arrow.parquet.ParquetWriter(self._begun, self._schema, write_page_checksum=True) as writer,
-            ):
-                for group in self._groups():
-                    writer.write_table(group)
-            settle(self._begun, self._place)
+            self._finish()
+            with _named(self._place, self._arrow.lib.ArrowException), beside(self._place) as begun:
+                self._convert(begun)
         except BaseException:
-            self._begun.unlink(missing_ok=True)
             self.leave()
             raise
-        shutil.rmtree(self._folder, ignore_errors=True)  # all of it is in the table
+        with suppress(OSError):  # all of it is in the table
+            self._path.unlink()
 
-    def leave(self) -> Path | None:
-        self._begun.unlink(missing_ok=True)
-        if self._empty:
-            shutil.rmtree(self._folder)
-        return None if self._empty else self._folder
-
-    def _groups(self) -> Iterator[Any]:
-        group = self._schema.empty_table()
-        for part in sorted(self._folder.glob("[0-9]*.parquet")):
-            group = self._arrow.concat_tables([group, self._arrow.parquet.read_table(part, schema=self._schema)])
-            if len(group) >= self.GROUP:
-                yield group
-                group = self._schema.empty_table()
-        yield group
+    def _convert(self, path: Path) -> None:
+        """Write the rows of the CSV file as Parquet."""
+        pyarrow, parquet = self._arrow, self._arrow.parquet
+        kinds = {int: pyarrow.int32(), float: pyarrow.float64(), str: pyarrow.string()}
+        fields = [(name, kinds[kind]) for name, kind in self._kinds.items()]
+        schema = pyarrow.schema(fields, {**self._metadata, "rows": str(self._seal)})
+        cells = pyarrow.csv.ConvertOptions(
+            column_types=dict(fields), null_values=[""], strings_can_be_null=True, quoted_strings_can_be_null=False
+        )
+        with self._path.open("rb") as file, parquet.ParquetWriter(path, schema, write_page_checksum=True) as writer:
+            file.seek(self._body)
+            waiting: list[Any] = []
+            for batch in pyarrow.csv.open_csv(file, convert_options=cells):
+                waiting.append(batch)
+                if sum(map(len, waiting)) >= self.GROUP:
+                    writer.write_table(pyarrow.Table.from_batches(waiting).cast(schema))
+                    waiting = []
+            writer.write_table(pyarrow.Table.from_batches(waiting, pyarrow.schema(fields)).cast(schema))
 
 
 @contextmanager
@@ -341,6 +362,7 @@ class SqliteTable:
     ) -> None:
         self._columns = list(columns)
         self._place, self._empty = path, True
+        self._seal = Seal.of(self._columns)
         self._path = claim(path)
         # Whoever writes takes care that no two threads do so at once.
         self._connection = sqlite3.connect(self._path, check_same_thread=False)
@@ -361,16 +383,21 @@ class SqliteTable:
 
     def write(self, rows: Iterable[Row]) -> None:
         blanks = ", ".join("?" * len(self._columns))
-        cells = [[row.get(name) for name in self._columns] for row in rows]
+        cells = [[_in_sqlite(row.get(name)) for name in self._columns] for row in rows]
         with _named(self._place, sqlite3.Error), self._connection:
             self._connection.executemany(f"INSERT INTO overlaps VALUES ({blanks})", cells)
+        self._seal = self._seal.further(_text(map(_line, cells)), len(cells))
         self._empty = self._empty and not cells
 
     def close(self) -> None:
         try:
             with _named(self._place, sqlite3.Error):
+                (count,) = self._connection.execute("SELECT count(*) FROM overlaps").fetchone()
+                if count != self._seal.rows:  # a signal has come between a step and its seal
+                    rows = self._connection.execute("SELECT * FROM overlaps ORDER BY rowid")
+                    self._seal = Seal.of(self._columns, rows)
                 with self._connection:
-                    self._connection.execute("INSERT INTO metadata SELECT 'rows', count(*) FROM overlaps")
+                    self._connection.execute("REPLACE INTO metadata VALUES ('rows', ?)", (str(self._seal),))
                 self._connection.execute("PRAGMA journal_mode = DELETE")
                 self._connection.close()
             # A log that an earlier database has left would be taken for one of the new.
@@ -388,6 +415,13 @@ class SqliteTable:
             for ending in ("", "-wal", "-shm", "-journal"):
                 self._path.with_name(self._path.name + ending).unlink(missing_ok=True)
         return None if self._empty else self._path
+
+
+def _in_sqlite(value: Value) -> Value:
+    """The value as SQLite gives it back: it has no NaN and no negative zero."""
+    if type(value) is float:
+        return None if math.isnan(value) else value + 0.0
+    return value
 
 
 # The kinds of table, by the ending of the file's name: of a path, of metadata, and of columns by name with their types.
@@ -409,6 +443,7 @@ def must_be_a_table(path: Path) -> None:
 def _arrow() -> Any:
     try:
         import pyarrow
+        import pyarrow.csv
         import pyarrow.parquet
     except ImportError as error:
         raise ImportError(f"a .parquet table needs {hint('pyarrow')}") from error
@@ -419,12 +454,22 @@ def read_metadata(path: Path) -> dict[str, str]:
     """The metadata of a table: the versions and the settings that wrote it, by name. ValueError if it is no table."""
     if path.suffix == ".parquet":
         with _opened_parquet(path) as dataset:
-            found = (dataset.schema.metadata or {}).items()
-            return {name.decode(errors="replace"): value.decode(errors="replace") for name, value in found}
+            return _texts(dataset.schema.metadata)
     if path.suffix == ".sqlite":
         with _opened_sqlite(path) as connection:
-            return {str(name): str(value) for name, value in connection.execute("SELECT name, value FROM metadata")}
+            return _said(connection)
     return _heading(_csv_text(path).splitlines())
+
+
+def _said(connection: sqlite3.Connection) -> dict[str, str]:
+    """The metadata of a database."""
+    return {str(name): str(value) for name, value in connection.execute("SELECT name, value FROM metadata")}
+
+
+def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
+    """The metadata of a Parquet schema."""
+    found = (metadata or {}).items()
+    return {name.decode(errors="replace"): value.decode(errors="replace") for name, value in found}
 
 
 def read_table(path: Path) -> list[Row]:
@@ -432,17 +477,15 @@ def read_table(path: Path) -> list[Row]:
     if path.suffix == ".parquet":
         with _opened_parquet(path) as dataset:
             _check_columns(path, dataset.schema.names)
-            return [_checked(row) for row in dataset.read().to_pylist()]
+            rows = [_checked(row) for row in dataset.read().to_pylist()]
+            return _sealed(path, _texts(dataset.schema.metadata), dataset.schema.names, rows)
     if path.suffix == ".sqlite":
         with _opened_sqlite(path) as connection:
             cursor = connection.execute("SELECT * FROM overlaps ORDER BY rowid")
             columns = [description[0] for description in cursor.description]
             _check_columns(path, columns)
             rows = [_checked(dict(zip(columns, cells))) for cells in cursor]
-            said = dict(connection.execute("SELECT name, value FROM metadata")).get("rows")
-            if said is not None and str(said) != str(len(rows)):
-                raise ValueError(f"{path} is not as it was written: {len(rows):,} of its {said!s:.20} rows are there")
-            return rows
+            return _sealed(path, _said(connection), columns, rows)
     return _csv_content(path).rows
 
 
