@@ -226,7 +226,7 @@ def write_page(found: Clashes, path: Path) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Drawn:
+class _DrawnMeshes:
     """The bodies, as views are given them."""
 
     keys: list[tuple[int, int, int]]
@@ -245,7 +245,7 @@ class _Whole:
     bounds: Array
 
 
-def _drawn(found: Clashes) -> _Drawn:
+def _drawn(found: Clashes) -> _DrawnMeshes:
     """The bodies by their parts if they clash, as what is shared is of these, and by their meshes if they do not."""
     from overlapper.viewer.tessellation import Mesh
 
@@ -263,7 +263,7 @@ def _drawn(found: Clashes) -> _Drawn:
             placed += [Placed(part) for part in body.parts]
     # A slash would make two names of one, of a body and its link.
     names = {(i, -1): body.name.replace("/", ".") for i, body in enumerate(found.bodies)}
-    return _Drawn(keys, placed, dict.fromkeys(names, GREY) | colors, names)
+    return _DrawnMeshes(keys, placed, dict.fromkeys(names, GREY) | colors, names)
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,7 +56,7 @@ def _caption(audited: PairAudit) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Drawn:
+class _DrawnRobot:
     """The bodies, as views are given them."""
 
     keys: list[tuple[int, int, int]]
@@ -81,7 +81,7 @@ class _Scene:
             (body, link): f"{robot.tree.bodies[body].replace('/', '.')}/{names[link]}" for body, link in links
         }
 
-    def at(self, values: Array) -> _Drawn:
+    def at(self, values: Array) -> _DrawnRobot:
         (positions,), (orientations,) = self._kinematics.poses(values[None])
         placed = [Placed(*each) for each in zip(self._shapes, positions, orientations)]
-        return _Drawn(self._keys, placed, self._colors, self._names)
+        return _DrawnRobot(self._keys, placed, self._colors, self._names)

@@ -14,7 +14,7 @@ import numpy as np
 
 from overlapper import Overlap, Placed
 from overlapper.shapes.drawing import triangles
-from overlapper.viewer.labels import Contact, DrawnBodies, key_of
+from overlapper.viewer.labels import DrawnBodies, DrawnContact, key_of
 from overlapper.viewer.look import FIELD_OF_VIEW, Array
 from overlapper.viewer.tessellation import bounded
 
@@ -73,13 +73,13 @@ class Framing:
         """True for a half-space, and for a shape as large as a body that is a ground."""
         return not bounded(placed.shape) or _extent(placed.bounds) >= self._ground_size
 
-    def pushed_second(self, contact: Contact) -> bool:
+    def pushed_second(self, contact: DrawnContact) -> bool:
         """True if a force is drawn on the second body: the first is a ground, or rests while the second moves."""
         if self.is_ground(contact.overlap.shapes[0]):
             return True
         return contact.bodyA not in self._moved and contact.bodyB in self._moved
 
-    def see(self, bodies: DrawnBodies, contacts: Iterable[Contact]) -> None:
+    def see(self, bodies: DrawnBodies, contacts: Iterable[DrawnContact]) -> None:
         """Add a moment: the bodies where they are now, and their contacts."""
         bounded = self._bounded(bodies)
         for key, box in bounded:

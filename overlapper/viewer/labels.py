@@ -33,7 +33,7 @@ class DrawnBodies(Protocol):
     def names(self) -> Mapping[tuple[int, int], str]: ...
 
 
-class Contact(Protocol):
+class DrawnContact(Protocol):
     """A pair of shapes, each by body, link and index within the link, and their overlap."""
 
     @property
@@ -72,13 +72,13 @@ def body_paths(bodies: DrawnBodies) -> list[str]:
     return [f"{ROOT}/{'/'.join(names[body, link])}/{shape}" for body, link, shape in bodies.keys]
 
 
-def key_of(contact: Contact) -> Key:
+def key_of(contact: DrawnContact) -> Key:
     return contact.bodyA, contact.linkA, contact.shapeA, contact.bodyB, contact.linkB, contact.shapeB
 
 
 def labelled(
-    bodies: DrawnBodies, contacts: Iterable[Contact]
-) -> Iterator[tuple[Pair, tuple[LinkName, LinkName], Contact]]:
+    bodies: DrawnBodies, contacts: Iterable[DrawnContact]
+) -> Iterator[tuple[Pair, tuple[LinkName, LinkName], DrawnContact]]:
     """The name of each overlapping pair, its bodies and links, and the pair. The link of a body of one link is ""."""
     names = link_names(bodies)
     links = Counter(body for body, _ in names)

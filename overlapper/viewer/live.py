@@ -19,7 +19,7 @@ import numpy as np
 
 from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker
 from overlapper.viewer.framing import Framing
-from overlapper.viewer.labels import Contact, DrawnBodies, body_paths, key_of, labelled
+from overlapper.viewer.labels import DrawnBodies, DrawnContact, body_paths, key_of, labelled
 from overlapper.viewer.look import BODIES, OVERLAPS, Array, Look, volume_text
 from overlapper.viewer.pressure import DrawnForces, Forces, Scale, force_text
 from overlapper.viewer.recording import Recording
@@ -71,7 +71,7 @@ class Viewer:
         """The address for a browser."""
         return str(self.visualizer.url())
 
-    def show(self, bodies: DrawnBodies, contacts: Iterable[Contact], forces: Forces | None = None) -> None:
+    def show(self, bodies: DrawnBodies, contacts: Iterable[DrawnContact], forces: Forces | None = None) -> None:
         """Draw the bodies where they are now, the overlapping pairs among `contacts`, and their `forces`.
 
         This replaces the earlier drawing.
@@ -107,7 +107,9 @@ class Viewer:
                 self.visualizer[path].set_transform(pose)
                 self._poses[path] = pose
 
-    def _show_overlaps(self, stage: Stage, bodies: DrawnBodies, contacts: list[Contact], seen: DrawnForces) -> None:
+    def _show_overlaps(
+        self, stage: Stage, bodies: DrawnBodies, contacts: list[DrawnContact], seen: DrawnForces
+    ) -> None:
         for pair in self._pairs:
             self.visualizer[_path(pair)].delete()
         self._pairs = set()

@@ -18,7 +18,7 @@ from overlapper.install import hint
 from overlapper.quaternion import rotated
 from overlapper.shapes.drawing import triangles
 from overlapper.viewer.framing import Framing, View
-from overlapper.viewer.labels import Contact, DrawnBodies, Pair, key_of, labelled
+from overlapper.viewer.labels import DrawnBodies, DrawnContact, Pair, key_of, labelled
 from overlapper.viewer.look import (
     BODIES,
     BOTTOM,
@@ -59,7 +59,7 @@ _Row = tuple[Pair, Overlap, "Press | None"]
 def save(
     path: str | Path,
     bodies: DrawnBodies,
-    contacts: Iterable[Contact],
+    contacts: Iterable[DrawnContact],
     title: str = "",
     close: bool = False,
     looks: tuple[Look, Look] = (BODIES, OVERLAPS),

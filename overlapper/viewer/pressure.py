@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from overlapper import Overlap
 from overlapper.shapes.drawing import polytope_edges, triangles
 from overlapper.viewer.framing import Framing
-from overlapper.viewer.labels import Contact, DrawnBodies, Key, LinkName, key_of, labelled
+from overlapper.viewer.labels import DrawnBodies, DrawnContact, Key, LinkName, key_of, labelled
 from overlapper.viewer.look import Array, channels, to_draw
 
 COLORS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21908c", "#27ad81", "#5dc863", "#aadc32", "#fde725")
@@ -193,7 +193,7 @@ class DrawnForces:
     def of(
         cls,
         bodies: DrawnBodies,
-        contacts: Sequence[Contact],
+        contacts: Sequence[DrawnContact],
         forces: Forces | None,
         length: float,
         framing: Framing,
@@ -240,9 +240,9 @@ class Arrow:
 
 def arrows(
     bodies: DrawnBodies,
-    contacts: Iterable[Contact],
+    contacts: Iterable[DrawnContact],
     pressed: Mapping[Key, Press],
-    on_second: Callable[[Contact], bool] = lambda contact: False,
+    on_second: Callable[[DrawnContact], bool] = lambda contact: False,
 ) -> list[Arrow]:
     """An arrow for each pair of links, from the mean of its overlaps weighted by force; on the first or second."""
     sums: dict[tuple[LinkName, LinkName], Arrow] = {}

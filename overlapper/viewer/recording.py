@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from overlapper import Overlap, Placed
 from overlapper.shapes.table import facts
 from overlapper.viewer.framing import Framing, View
-from overlapper.viewer.labels import ROOT, Contact, DrawnBodies, LinkName, Pair, body_paths, key_of, labelled
+from overlapper.viewer.labels import ROOT, DrawnBodies, DrawnContact, LinkName, Pair, body_paths, key_of, labelled
 from overlapper.viewer.look import (
     BODIES,
     INK,
@@ -101,7 +101,7 @@ class Recording:
         self._polytopes = _Polytopes()
         self._sightings: list[tuple[int, int, int]] = []  # frame, pair, polytope
         self._numbers: list[Array] = []
-        self._contacts: dict[Pair, Contact] = {}  # the first contact of each pair
+        self._contacts: dict[Pair, DrawnContact] = {}  # the first contact of each pair
         self._presses: list[tuple[float, ...]] = []  # of each sighting
         self._depths: dict[int, float] = {}  # of polytopes
         self._usual: list[tuple[float, float]] = []  # N and Pa, in each frame that has forces
@@ -109,7 +109,7 @@ class Recording:
     def add(
         self,
         bodies: DrawnBodies,
-        contacts: Iterable[Contact],
+        contacts: Iterable[DrawnContact],
         time: float,
         name: str = "",
         forces: Forces | None = None,
