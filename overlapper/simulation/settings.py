@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
 if TYPE_CHECKING:
@@ -23,9 +24,8 @@ class Modelling:
     surface: Surface = "nominal"
 
     def __post_init__(self) -> None:
-        for name, choices in (("concave", get_args(Concave)), ("surface", get_args(Surface))):
-            if (chosen := getattr(self, name)) not in choices:
-                raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, not {chosen!r}")
+        _must_be_one_of(self.concave, "concave", Concave)
+        _must_be_one_of(self.surface, "surface", Surface)
         from overlapper.polytopes.decomposition import check_threshold
 
         check_threshold(self.concave_threshold)
@@ -33,7 +33,7 @@ class Modelling:
 
 @dataclass(frozen=True, slots=True)
 class Asking:
-    """Which pairs are measured, and how, as `simulation.Bodies.overlaps` describes it.
+    """Which pairs are measured, and how, as `simulation.Bodies.overlaps` describes it. ValueError for an invalid value.
 
     Without `pairs`, a scene says which pairs.
     """
@@ -41,6 +41,20 @@ class Asking:
     pairs: Among | None = None
     tolerance: float = 1e-3
     method: Method = "auto"
+
+    def __post_init__(self) -> None:
+        if not (self.pairs is None or (isinstance(self.pairs, str) and self.pairs in ("simulated", "all"))):
+            from overlapper.simulation.asked_pairs import listed
+
+            object.__setattr__(self, "pairs", listed(self.pairs))
+        if not (isinstance(self.tolerance, Real) and 0 < self.tolerance < 1):
+            raise ValueError(f"tolerance must be a number greater than 0 and less than 1, not {self.tolerance!r}")
+        _must_be_one_of(self.method, "method", Method)
+
+
+def _must_be_one_of(chosen: object, name: str, choices: Any) -> None:
+    if chosen not in get_args(choices):
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, get_args(choices)))}, not {chosen!r}")
 
 
 Settings = TypeVar("Settings", Modelling, Asking)
@@ -58,4 +72,4 @@ def read_settings(kind: type[Settings], heading: Mapping[str, str]) -> Settings:
         for each in fields(kind)
         if heading.get(each.name, "None") != "None"
     }
-    return kind(**told)  # type: ignore[arg-type]  # texts are checked where they are used
+    return kind(**told)  # type: ignore[arg-type]  # an invalid text is refused
