@@ -40,7 +40,7 @@ def write_table(audit: Audit, path: Path, settings: Mapping[str, Any], page: Map
     OSError if the file cannot be written.
     """
     texts = {name: str(value) for name, value in settings.items()}
-    table = TABLES[path.suffix](path, origin() | {"robot": audit.robot.name} | texts, COLUMNS)
+    table = TABLES[path.suffix](path, origin("bullet") | {"robot": audit.robot.name} | texts, COLUMNS)
     try:
         table.write(_row(audit, audited, page) for audited in audit.pairs)
     except BaseException:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from overlapper.cli.refusals import Refused
+from overlapper.scenes.scene import ContactModel
 from overlapper.simulation.settings import Asking, Modelling
 
 SceneArgument = Annotated[
@@ -56,7 +57,7 @@ PairsOption = Annotated[
 ]
 
 ContactOption = Annotated[
-    Literal["bullet", "volumetric"] | None,
+    ContactModel | None,
     typer.Option(help="What pushes bodies apart: contact points, or the volumes they share; by default CONTACT."),
 ]
 
@@ -77,6 +78,29 @@ def given_parameters(settings: Sequence[str] | None) -> dict[str, str]:
             raise Refused(f"--set says {name} twice")
         given[name] = text
     return given
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """How a scene is simulated: its parameters as text, the number of its steps, and what pushes bodies apart.
+
+    None stands for what the scene says.
+    """
+
+    parameters: dict[str, str]
+    steps: int | None
+    contact: ContactModel | None
+
+
+def simulated(
+    given: SetOption = None,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Steps to simulate; by default as many as the scene says.")
+    ] = None,
+    contact: ContactOption = None,
+) -> Simulated:
+    """How a scene is simulated."""
+    return Simulated(given_parameters(given), steps, contact)
 
 
 LeastDepthOption = Annotated[

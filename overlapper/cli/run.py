@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,38 +12,33 @@ import typer
 
 from overlapper.cli.figures import show
 from overlapper.cli.options import (
-    ContactOption,
     SceneArgument,
-    SetOption,
+    Simulated,
     Written,
     asking,
     files,
-    given_parameters,
     modelling,
+    simulated,
     with_options,
 )
 from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Refused, import_engine, quiet, say, scene_refusals
 from overlapper.scenes.parameters import heading_of
-from overlapper.scenes.scene import ContactModel, Scene, load_scene
+from overlapper.scenes.scene import Scene, load_scene
 from overlapper.simulation.settings import Asking, Modelling, settings_of
 
 if TYPE_CHECKING:
     from overlapper.tables.summary import Summary
 
 
-@with_options(files=files, asked=asking, modelled=modelling)
+@with_options(simulated=simulated, files=files, asked=asking, modelled=modelling)
 def run(
     scene: SceneArgument,
     *,
-    given: SetOption = None,
-    steps: Annotated[
-        int | None, typer.Option(min=1, help="Steps to simulate; by default as many as the scene says.")
-    ] = None,
+    simulated: Simulated,
     files: Written,
     asked: Asking,
     modelled: Modelling,
-    contact: ContactOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the table.")] = False,
 ) -> None:
     """Simulate a scene and measure what its bodies have in common in every step.
@@ -67,17 +62,16 @@ def run(
 
     [bold]overlapper run kuka_jenga --check fcl --json[/bold]  compared with FCL, for a program to read
     """
-    parameters = given_parameters(given)
     written: list[Path] = []
     try:
-        chosen, summary, finished = _measure(scene, parameters, steps, files, asked, modelled, contact, written)
+        chosen, summary, finished = _measure(scene, simulated, files, asked, modelled, written)
     except Refused as refused:
         kept = f"; what came before is in {' and '.join(map(str, written))}" if written else ""
         raise Refused(f"{refused}{kept}") from refused
     if as_json:
         places = {name: str(path) for name, path in (("out", files.out), ("html", files.html)) if path in written}
         settings = settings_of(asked, modelled) | {
-            "contact": contact or chosen.contact,
+            "contact": simulated.contact or chosen.contact,
             "per": files.per,
             "check": files.check,
         }
@@ -91,12 +85,10 @@ def run(
 
 def _measure(
     name: str,
-    parameters: Mapping[str, str],
-    steps: int | None,
+    simulated: Simulated,
     files: Written,
     asked: Asking,
     modelled: Modelling,
-    contact: ContactModel | None,
     written: list[Path],
 ) -> tuple[Scene, Summary, bool]:
     """The scene, its summary, and False if the run was interrupted: then the summary ends with the last step.
@@ -109,16 +101,17 @@ def _measure(
         from overlapper.scenes.run import run as frames_of
         from overlapper.tables.outputs import outputs
         from overlapper.tables.summary import Summary
+        from overlapper.tables.table_file import origin
 
-        scene = load_scene(name, parameters)
+        scene = load_scene(name, simulated.parameters)
         fcl = stack.enter_context(Fcl()) if files.check else None
-        steps, contact = steps or scene.steps, contact or scene.contact
+        steps, contact = simulated.steps or scene.steps, simulated.contact or scene.contact
         settings = {"scene": scene.name, "steps": steps, **settings_of(asked, modelled), "contact": contact}
         summary = Summary(scene.name)
         take = stack.enter_context(
             outputs(
                 summary,
-                settings | heading_of(scene.parameters),
+                origin(scene.engine) | settings | heading_of(scene.parameters),
                 written,
                 files.out,
                 files.html,

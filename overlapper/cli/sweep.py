@@ -14,15 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from overlapper.cli.engine import working
-from overlapper.cli.options import (
-    ContactOption,
-    SceneArgument,
-    SetOption,
-    asking,
-    given_parameters,
-    modelling,
-    with_options,
-)
+from overlapper.cli.options import SceneArgument, Simulated, asking, modelling, simulated, with_options
 from overlapper.cli.refusals import Refused, import_engine, input_refusals, quiet, say, scene_refusals
 from overlapper.simulation.settings import Asking, Modelling
 
@@ -90,7 +82,7 @@ def axes(
     return Axes(grid, seeds, points, sample, ranges, sample_seed)
 
 
-@with_options(axes=axes, engine=working, asked=asking, modelled=modelling)
+@with_options(axes=axes, simulated=simulated, engine=working, asked=asking, modelled=modelling)
 def sweep(
     scene: SceneArgument,
     out: Annotated[
@@ -98,10 +90,7 @@ def sweep(
     ],
     *,
     axes: Axes,
-    given: SetOption = None,
-    steps: Annotated[
-        int | None, typer.Option(min=1, help="Steps of each task; by default as many as the scene says.")
-    ] = None,
+    simulated: Simulated,
     steps_kept: Annotated[
         str, typer.Option(metavar='summary|"every N"|all', help="Steps of which all pairs are kept, too.")
     ] = "summary",
@@ -117,7 +106,6 @@ def sweep(
     pages: Annotated[int, typer.Option(min=0, help="Pages of so many of the worst tasks, beside the summary.")] = 0,
     asked: Asking,
     modelled: Modelling,
-    contact: ContactOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the text.")] = False,
 ) -> None:
     """Run a scene with many parameters, and keep what each run came to.
@@ -141,7 +129,6 @@ def sweep(
 
     [bold]overlapper sweep box_pile --seeds 50 --out today --check piles[/bold]
     """
-    parameters = given_parameters(given)
     kept = _kept(steps_kept)
     if check and check.resolve() == out.resolve():
         raise Refused("--check and --out are the same folder")
@@ -160,11 +147,11 @@ def sweep(
         from overlapper.sweep.sweep import Sweep
 
         charts.must_be_there()
-        chosen = load_scene(scene, parameters)
+        chosen = load_scene(scene, simulated.parameters)
         must_be_no_columns(chosen.parameters)
-        space = Space(chosen.name, chosen.parameters, parameters.keys())
-        contact = contact or chosen.contact
-        study = Study.of(find_scene(scene), steps or chosen.steps, contact, asked, modelled, kept)
+        space = Space(chosen.name, chosen.parameters, simulated.parameters.keys())
+        contact = simulated.contact or chosen.contact
+        study = Study.of(find_scene(scene), simulated.steps or chosen.steps, contact, asked, modelled, kept)
         todo = Sweep(study, space.crossed(axes.of(space)))
         recorded = Recorded(check, chosen.expected, todo) if check else None
         store = stack.enter_context(todo.opened(out))

@@ -8,12 +8,13 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from overlapper.cli.options import ContactOption, SetOption, given_parameters
+from overlapper.cli.options import Simulated, simulated, with_options
 from overlapper.cli.recorded import with_progress
 from overlapper.cli.refusals import Refused, import_engine, input_refusals, quiet, say, scene_refusals
 
@@ -22,28 +23,37 @@ if TYPE_CHECKING:
     from overlapper.viewer.look import Look
 
 
-def view(
-    source: Annotated[
-        str, typer.Argument(help="A scene, by name or path, or a table of one that was written.", show_default=False)
-    ],
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What is shown: a page, a picture of a step, or a live view for a browser at `host`."""
+
+    html: Path | None
+    png: Path | None
+    live: bool
+    host: str
+    step: int | None
+    close: bool
+
+
+def shown(
     html: Annotated[Path | None, typer.Option(help="Write a page for any browser; out/<name>.html by default.")] = None,
     png: Annotated[Path | None, typer.Option(help="Draw a picture instead, without a browser.")] = None,
     live: Annotated[bool, typer.Option("--live", help="Watch it in meshcat while it is simulated instead.")] = False,
     host: Annotated[
         str, typer.Option(help="Address of this machine at which --live is seen; 0.0.0.0 shows it to the network.")
     ] = "127.0.0.1",
-    scene: Annotated[
-        str | None, typer.Option(help="The scene of a table that has no shapes, by name or path: it is run again.")
-    ] = None,
-    given: SetOption = None,
-    contact: ContactOption = None,
-    steps: Annotated[
-        int | None, typer.Option(min=1, help="Steps of a scene at most; by default as many as it says.")
-    ] = None,
     step: Annotated[
         int | None, typer.Option(min=1, help="Of the picture; by default the one in which most is shared.")
     ] = None,
     close: Annotated[bool, typer.Option("--close", help="The picture is of the largest overlap.")] = False,
+) -> Shown:
+    """What is shown."""
+    if sum(map(bool, (html, png, live))) > 1:
+        raise Refused("--html, --png and --live do not go together: one at a time")
+    return Shown(html, png, live, host, step, close)
+
+
+def looks(
     overlaps: Annotated[
         str, typer.Option(help="What is drawn of overlaps: faces, edges, vertices, marks, forces.")
     ] = "faces,marks,forces",
@@ -54,6 +64,26 @@ def view(
     bodies_opacity: Annotated[float, typer.Option(help="From 0 to 1.")] = 0.35,
     bodies_front: Annotated[str | None, typer.Option(help="Colour from outside; their own if not given.")] = None,
     bodies_back: Annotated[str | None, typer.Option(help="Colour from inside; not drawn if not given.")] = None,
+) -> tuple[Look, Look]:
+    """The looks of bodies and of overlaps."""
+    return (
+        _look("bodies", bodies, bodies_opacity, bodies_front, bodies_back),
+        _look("overlaps", overlaps, overlaps_opacity, overlaps_front, overlaps_back),
+    )
+
+
+@with_options(shown=shown, simulated=simulated, looks=looks)
+def view(
+    source: Annotated[
+        str, typer.Argument(help="A scene, by name or path, or a table of one that was written.", show_default=False)
+    ],
+    *,
+    shown: Shown,
+    scene: Annotated[
+        str | None, typer.Option(help="The scene of a table that has no shapes, by name or path: it is run again.")
+    ] = None,
+    simulated: Simulated,
+    looks: tuple[Look, Look],
 ) -> None:
     """See a scene, or a table of one: as a page with a time slider, as a picture, or live.
 
@@ -72,26 +102,20 @@ def view(
 
     [bold]overlapper view my_scene.py --live --bodies edges --overlaps-opacity 0.6[/bold]
     """
-    if sum(map(bool, (html, png, live))) > 1:
-        raise Refused("--html, --png and --live do not go together: one at a time")
-    looks = (
-        _look("bodies", bodies, bodies_opacity, bodies_front, bodies_back),
-        _look("overlaps", overlaps, overlaps_opacity, overlaps_front, overlaps_back),
-    )
     written: list[Path] = []
     finished = True
-    page = html or Path("out") / f"{Path(source).stem}.html"
+    page = shown.html or Path("out") / f"{Path(source).stem}.html"
     with quiet() as noise, scene_refusals(noise), input_refusals():
         import_engine(scene or source)
         from overlapper.scenes.playback import play
 
-        playback = play(source, steps, scene, given_parameters(given), contact)
+        playback = play(source, simulated.steps, scene, simulated.parameters, simulated.contact)
         with closing(playback.views):
-            if live:
-                _live(playback, looks, host)
-            elif png:
-                _picture(playback, png, step, close, looks)
-                written.append(png)
+            if shown.live:
+                _live(playback, looks, shown.host)
+            elif shown.png:
+                _picture(playback, shown.png, shown.step, shown.close, looks)
+                written.append(shown.png)
             else:
                 finished = _film(playback, page, looks, written)
     for remark in playback.remarks:

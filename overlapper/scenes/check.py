@@ -72,7 +72,7 @@ def record(scene: Scene) -> None:
         made = _observed(scene, read_expected(scene.expected))
     except FileNotFoundError:
         made = replay.fitted(_observed(scene, replay.wanted(scene.steps, scene.contact == "volumetric")))
-    made.write(scene.expected, origin() | heading_of(scene.parameters))
+    made.write(scene.expected, origin(scene.engine) | heading_of(scene.parameters))
 
 
 def _observed(scene: Scene, wanted: Expected) -> Expected:

@@ -156,9 +156,9 @@ def scene_of(path: Path, source: bytes) -> Scene:
     return Scene(path.stem, path, difficulty, steps, build, pairs, names, parameters, model, volumetric, named)
 
 
-def engine_in(path: Path) -> str:
-    """The ENGINE that a scene file names; the file is read, not run."""
-    found = re.search(rb"^ENGINE\s*=\s*[\"'](\w+)[\"']", path.read_bytes(), re.MULTILINE)
+def engine_in(source: bytes) -> str:
+    """The ENGINE that the text of a scene file names; the text is read, not run."""
+    found = re.search(rb"^ENGINE\s*=\s*[\"'](\w+)[\"']", source, re.MULTILINE)
     return found[1].decode() if found else "bullet"
 
 

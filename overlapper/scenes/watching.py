@@ -22,6 +22,7 @@ from overlapper.simulation.settings import Asking, Concave, Method, Modelling, S
 from overlapper.tables.frame import Frame
 from overlapper.tables.outputs import Per, can_be_written, outputs
 from overlapper.tables.summary import Summary
+from overlapper.tables.table_file import origin
 
 if TYPE_CHECKING:
     from overlapper.simulation import Recorder
@@ -147,12 +148,8 @@ class Watch:
 
     def _begun(self, bodies: AnyBodies) -> Callable[[Frame[AnyBodies]], None]:
         """The function that takes the frames; the files are there from now on."""
-        settings = {
-            "simulation": self.summary.scene,
-            "every": self.every,
-            **settings_of(self._asking),
-            **bodies.settings,
-        }
+        watched = {"simulation": self.summary.scene, "every": self.every}
+        settings = origin(bodies.engine) | watched | settings_of(self._asking) | bodies.settings
         files = outputs(self.summary, settings, self.written, self.out, self.html, self._per, self._fcl)
         return self._files.enter_context(files)
 

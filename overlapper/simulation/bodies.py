@@ -196,6 +196,11 @@ class AnyBodies:
         return dict(self._source.settings)
 
     @property
+    def engine(self) -> str:
+        """The name of the engine that simulates the bodies, as ENGINE of a scene has it."""
+        return self._source.engine
+
+    @property
     def skipped(self) -> list[Skipped]:
         """The shapes that are not modelled, one entry per body and link."""
         skipped = [each for body in self._source.bodies.values() for each in body.skipped]

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 ENGINES = {"bullet": "overlapper.simulation.bullet.engine"}
 """The module of each engine by the name that a scene's ENGINE has."""
 
+LIBRARIES = {"bullet": "pybullet"}
+"""The package whose version the headings of tables have, by the name of its engine."""
+
 Happening = Literal["began", "stepped", "ended", "run by the clock"]
 Listener = Callable[[Happening, Hashable], None]
 """Told what has happened to a simulation, and which it is."""

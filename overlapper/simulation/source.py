@@ -22,6 +22,9 @@ class Unreadable(RuntimeError):
 class Source(Protocol):
     """A simulator's answers. A class that inherits from `Source` has the plain answers, where there are any."""
 
+    engine: str = ""
+    """The name in ENGINES of the engine that simulates; empty if it is none of these."""
+
     bodies: dict[int, ModelledBody]
     """The bodies by number, sorted. `AnyBodies` replaces those of height fields as it models more of the ground."""
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from overlapper.scenes.parameters import Parameter
 from overlapper.scenes.run import run
-from overlapper.scenes.scene import ContactModel, Scene, scene_of
+from overlapper.scenes.scene import ContactModel, Scene, engine_in, scene_of
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.settings import Asking, Modelling, settings_of
 from overlapper.tables.frame import Frame
@@ -47,7 +47,9 @@ class Study:
         kept: int = 0,
     ) -> Study:
         """The study of the file as it is now."""
-        return cls(path.stem, str(path), path.read_bytes(), steps, contact, asking, modelling, kept, origin())
+        source = path.read_bytes()
+        versions = origin(engine_in(source))
+        return cls(path.stem, str(path), source, steps, contact, asking, modelling, kept, versions)
 
     @property
     def settings(self) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import closing
 
+from overlapper.scenes.scene import engine_in
 from overlapper.sweep.measures import Measures
 from overlapper.sweep.part import STEPS, TASKS, part
 from overlapper.sweep.study import Study, Task
@@ -15,8 +16,8 @@ Parts = dict[str, bytes]
 
 
 def prepared(study: Study) -> Callable[[Task], Parts]:
-    """The function that runs the tasks of a study. ValueError where this package or pybullet is of another version."""
-    here = origin()
+    """The function that runs the tasks of a study. ValueError where a package that measures is of another version."""
+    here = origin(engine_in(study.source))
     if here != dict(study.versions):
         raise ValueError(f"the sweep is of {_said(study.versions)}, but here is {_said(here)}")
     heading = study.identity()

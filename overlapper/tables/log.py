@@ -7,11 +7,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
 
+from overlapper.simulation.bodies import AnyBodies
 from overlapper.tables.outputs import StepTable
+from overlapper.tables.table_file import origin
 
 if TYPE_CHECKING:
     from overlapper.simulation import Forces
-    from overlapper.simulation.bodies import AnyBodies
     from overlapper.simulation.contacts import Contacts
 
 
@@ -25,16 +26,16 @@ class Log:
                 log.add(bodies.overlaps())
 
     `path` ends in .csv, .parquet or .sqlite. `per` says what a row is of: "shape", two shapes, or "link", two links as
-    a whole, `forces` whether there are columns of forces, which `add` is given then. The heading has the versions of
-    this package and of pybullet, what `bodies` was told of surfaces and concave meshes, and `settings`: what else is
-    worth knowing, as `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
+    a whole. `forces` says whether there are columns of forces, which `add` is given then. The heading has the versions
+    of this package and of the simulator, and what `bodies` was told of surfaces and concave meshes. `settings` are what
+    else is worth knowing, as `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
 
     A step is on disk when `add` returns. The table grows beside its place, as `run.unfinished.csv`, and takes it at the
     end of the `with`, or by `close()`, also if Ctrl-C or sys.exit() ends the loop. It stays where it is after an error,
     and when the process is killed, and is a table like any other; `unfinished` says where. Parquet grows as CSV, too.
 
-    ValueError for another ending or `per`, OSError if there can be no such file, ImportError without the library that
-    writes it.
+    ValueError for another ending or `per`, or without bodies, OSError if there can be no such file, ImportError without
+    the library that writes it.
     """
 
     def __init__(
@@ -46,12 +47,15 @@ class Log:
         forces: bool = False,
         **settings: Any,
     ) -> None:
+        if not isinstance(bodies, AnyBodies):
+            raise ValueError(f"bodies must be the Bodies of a simulation, not {bodies!r}")
         self.steps = 0
         """The number of the last step added."""
         self.unfinished: Path | None = None
         """Where the rows are that an error has kept from their place, if there are any."""
         self._bodies, self._time, self._forces = bodies, 0.0, forces
-        self._table: StepTable | None = StepTable(Path(path), {**bodies.settings, **settings}, per, forces)
+        heading = origin(bodies.engine) | bodies.settings | settings
+        self._table: StepTable | None = StepTable(Path(path), heading, per, forces)
 
     def add(
         self, contacts: Contacts, step: int | None = None, time: float | None = None, forces: Forces | None = None

@@ -12,7 +12,7 @@ from overlapper import Overlaps
 from overlapper.simulation.links import link_contacts
 from overlapper.tables.summary import Summary
 from overlapper.tables.table import COLUMNS, FORCES, PosedBodies, link_rows, rows
-from overlapper.tables.table_file import TABLES, must_be_a_table, origin
+from overlapper.tables.table_file import TABLES, must_be_a_table
 from overlapper.whole_file import must_be_writable, unfinished
 
 if TYPE_CHECKING:
@@ -42,11 +42,11 @@ def can_be_written(out: Path | None, html: Path | None, *others: Path | None) ->
 
 
 class StepTable:
-    """A table of overlaps that grows by what a step has found; the heading says what wrote it, and `settings`.
+    """A table of overlaps that grows by what a step has found; the heading has the `settings`.
 
     `per` says whether a row is of two shapes or of two links as a whole, `forces` whether there are columns of forces,
-    too. ValueError for a name of another ending than
-    those of TABLES, OSError if there can be no such file, ImportError without the library that writes it.
+    too. ValueError for a name of another ending than those of TABLES, OSError if there can be no such file, ImportError
+    without the library that writes it.
     """
 
     def __init__(self, path: Path, settings: Mapping[str, Any], per: Per = "shape", forces: bool = False) -> None:
@@ -55,9 +55,7 @@ class StepTable:
             raise ValueError(f"per must be 'shape' or 'link', not {per!r}")
         self.path, self._per = path, per
         texts = {name: str(value) for name, value in settings.items()}
-        self._table = TABLES[path.suffix](
-            path, origin() | texts | {"per": per}, COLUMNS | FORCES if forces else COLUMNS
-        )
+        self._table = TABLES[path.suffix](path, texts | {"per": per}, COLUMNS | FORCES if forces else COLUMNS)
 
     def add(
         self,

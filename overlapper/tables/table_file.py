@@ -25,6 +25,7 @@ from typing import Any, Protocol
 from overlapper import __version__
 from overlapper.install import hint
 from overlapper.printable import first_line, printable
+from overlapper.simulation.engine import LIBRARIES
 from overlapper.tables.table import COLUMNS, FORCES, POSE, Row, Value
 from overlapper.whole_file import beside, claim, settle
 
@@ -41,13 +42,13 @@ NEEDED += [part.format(side) for side in "AB" for part in POSE]
 DENSEST = 4
 
 
-def origin() -> dict[str, str]:
-    """The programs that wrote a table: the versions of this package and, if it is there, of pybullet."""
-    try:
-        simulator = {"pybullet": version("pybullet")}
-    except PackageNotFoundError:
-        simulator = {}
-    return {"overlapper": __version__, **simulator}
+def origin(engine: str = "") -> dict[str, str]:
+    """The versions of this package and, if it is installed, of the library of the engine that simulated."""
+    found = {"overlapper": __version__}
+    if engine in LIBRARIES:
+        with suppress(PackageNotFoundError):
+            found[LIBRARIES[engine]] = version(LIBRARIES[engine])
+    return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from overlapper.simulation.engine import ENGINES
 from overlapper.simulation.forces.contact import VolumetricContact
 from overlapper.sweep.study import Study, Task
 from overlapper.sweep.tasks import prepared
-from overlapper.tables.table_file import read_table
+from overlapper.tables.table_file import read_metadata, read_table
 
 SCENE = '''
 """A ball sinks into a cube."""
@@ -77,6 +77,7 @@ def test_a_loop_is_logged():
         (step, pytest.approx(0.01 * step), "ball/base") for step in range(1, 4)
     ]
     assert rows[0]["volume_m3"] < rows[2]["volume_m3"]
+    assert "pybullet" not in read_metadata(Path("own.csv"))
 
 
 def test_steps_of_others_are_watched():
@@ -91,6 +92,7 @@ def test_steps_of_others_are_watched():
     world.step()
     assert (watch.steps, watch.measured, watch.time) == (20, 20, pytest.approx(0.2))
     assert watch.written == [Path("run.csv"), Path("run.html")]
+    assert "pybullet" not in read_metadata(Path("run.csv"))
     assert {row["nameB"] for row in read_table(Path("run.csv"))} == {"cube/base"}
     assert "cube" in Path("run.html").read_text()
     (pair,) = watch.summary.pairs.values()
@@ -100,6 +102,7 @@ def test_steps_of_others_are_watched():
 def test_a_scene_is_held_against_its_expected_file():
     path = Path("sinking.py")
     assert hold(path, Path("out")).word == "new"
+    assert "pybullet" not in read_metadata(Path("expected/sinking.csv"))
     assert hold(path, Path("out")).word == "as recorded"
     path.write_text(SCENE.replace("sinks=0.02", "sinks=0.021"))
     outcome = hold(path, Path("out"))
@@ -109,6 +112,7 @@ def test_a_scene_is_held_against_its_expected_file():
 
 def test_a_task_of_a_sweep_is_done():
     study = Study.of(Path("sinking.py"), 8)
+    assert [*study.versions] == ["overlapper"]
     (written,) = prepared(study)(Task("one", {"sinks": 0.02})).values()
     (row,) = pyarrow.parquet.read_table(pyarrow.BufferReader(written)).to_pylist()
     assert row["sinks"] == 0.02

@@ -111,6 +111,12 @@ def test_a_path_that_cannot_be_written_is_refused_at_once(two_boxes, tmp_path, n
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_is_no_bodies_is_refused_at_once(tmp_path):
+    with pytest.raises(ValueError, match=r"^bodies must be the Bodies of a simulation, not None$"):
+        Log(tmp_path / "own.csv", None)
+    assert list(tmp_path.iterdir()) == []
+
+
 def ended_by(error, log, steps):
     with log:
         for contacts in steps:

@@ -26,6 +26,8 @@ from overlapper.simulation.source import Source
 class BulletSource(Source):
     """See `Source`; the arguments are those of `Bodies`."""
 
+    engine = "bullet"
+
     def __init__(
         self, client: int, modelling: Modelling, recorder: Recorder | None, given_names: Mapping[int, str]
     ) -> None:
