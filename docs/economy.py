@@ -76,7 +76,7 @@ def facets(shape: Shape) -> int:
 
 @dataclass
 class Economy:
-    """What the steps of a scene came to: for each a report, the facets of the pairs examined, and the time it took."""
+    """The work of each step of a scene: its report, the facets of the pairs examined, and the time it took."""
 
     reports: list[Report] = field(default_factory=list)
     facets_there: list[int] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""What Chromium shows of a page."""
+"""Photographs of pages in Chromium."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ READ = "document.readyState === 'complete' && !document.querySelector('#unread')
 
 @contextmanager
 def browser(width: int, height: int, scale: float = 1.0) -> Iterator[Browser]:
-    """A window of so many pixels, of which `scale` make one of the page's."""
+    """A window of `width` by `height` pixels of a page, which are `scale` times as many in a photograph."""
     if CHROMIUM is None:
         sys.exit("the pictures of the documentation need Chromium: apt-get install chromium")
     with tempfile.TemporaryDirectory() as profile:
@@ -40,6 +40,6 @@ def photograph(link: str, picture: Path, until: str = READ, size: tuple[int, int
 
 
 def save(window: Browser, picture: Path) -> None:
-    """What a window shows, as a PNG."""
+    """Save the contents of a window as a PNG."""
     Image.fromarray(window.picture().astype("uint8")).save(picture, optimize=True)
     print(picture)

@@ -174,7 +174,7 @@ def placed(shapes, spread=1.0):
 
 @st.composite
 def in_general_position(draw, shapes, low, high):
-    """Bodies of which no two share a plane, so that every facet has one owner."""
+    """Bodies that share no plane, so that every facet has one owner."""
     rng = np.random.default_rng(draw(seeds))
     chosen = draw(st.lists(shapes, min_size=low, max_size=high))
     poses = [(rng.uniform(-0.5, 0.5, 3).tolist(), quaternion(rng).tolist()) for _ in chosen]

@@ -17,7 +17,7 @@ from overlapper.verdicts.expected import DRIFT, Budget, read_expected
 from overlapper.verdicts.replay import replay
 
 TWO_CUBES = '''
-"""Two unit cubes, the second of which slides over the first by a centimetre a step."""
+"""Two unit cubes. The second one slides over the first by a centimetre a step."""
 import pybullet as p
 
 STEPS = 6

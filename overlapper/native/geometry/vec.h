@@ -66,7 +66,7 @@ inline Mat3 operator*(const Mat3& a, const Mat3& b) {
   return {apply_transposed(b, a.row0), apply_transposed(b, a.row1), apply_transposed(b, a.row2)};
 }
 
-/// Scalar last as in pybullet. Of any length but 0, it stands for the rotation M(q) / |q|², which is rational.
+/// Scalar last as in pybullet. A quaternion of any length but 0 stands for the rotation M(q) / |q|², which is rational.
 struct Quaternion {
   double x = 0, y = 0, z = 0, w = 1;
 };

@@ -4,8 +4,8 @@
 
 namespace overlapper {
 
-/// The sum head + tail, where tail is at most half an ulp of head. Of one addition or product it is exact (Knuth;
-/// Dekker); further operations are right to about 2^-100 of the larger operand.
+/// The sum head + tail, where tail is at most half an ulp of head. One addition or product of doubles is exact (Knuth;
+/// Dekker). Further operations are right to about 2^-100 of the larger operand.
 struct DoubleDouble {
   double head = 0, tail = 0;
   friend bool operator==(const DoubleDouble&, const DoubleDouble&) = default;

@@ -68,7 +68,7 @@ concept Widened = requires(const S& s, const WideVector& v, const WideTriangles&
   { s.append_wide_planes(body, planes) };  // as append_planes(), in the coordinates of the body
 };
 
-/// What the choice of a way of measuring depends on.
+/// The properties that the choice of a way of measuring depends on.
 template <class S>
 concept Classified = requires(const S& s, Cutter& cutter) {
   { S::kBounded } -> std::convertible_to<bool>;

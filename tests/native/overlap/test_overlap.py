@@ -182,7 +182,7 @@ def test_lens_has_its_depth_normal_and_centre():
     answer = overlap(Sphere(1), Placed(Sphere(1), (1, 0, 0)))
     assert answer.depth == pytest.approx(1, rel=1e-9)
     assert_allclose(answer.normal, [-1, 0, 0], atol=1e-4)
-    # What the polytope has too much is at most 3 tolerances of its volume, and no farther away than its diameter.
+    # The polytope has too much by at most 3 tolerances of its volume, and no farther away than its diameter.
     assert_allclose(answer.centroid, [0.5, 0, 0], atol=3e-3 * np.sqrt(3))
 
 
@@ -389,7 +389,7 @@ def test_nothing_is_raised_and_no_measure_is_negative(a, b):
 
 @given(st.lists(placed(solids), min_size=2, max_size=4), st.randoms(use_true_random=False))
 def test_order_of_bodies_changes_their_names_and_no_bit(bodies, random):
-    # Of two that coincide, either may be the first.
+    # Either of two bodies that coincide may be the first.
     assume(len({(repr(b.shape), *b.position.tolist(), *b.orientation.tolist()) for b in bodies}) == len(bodies))
     order = random.sample(range(len(bodies)), len(bodies))
     first = overlap(*bodies, tolerance=1e-2)

@@ -53,7 +53,7 @@ inline bool has_share(DoubleDouble share) { return share.head > 0x1p-80; }
 
 /// Rounding orders equal ratios at random, so any least ratio is good.
 inline bool leaves_sooner(const Leaving<double>& a, const Leaving<double>& b) { return a.ratio < b.ratio; }
-/// Double-doubles recognize equal ratios. Of these, the largest share keeps the basis farthest from singular.
+/// Double-doubles recognize equal ratios. The largest share among equal ratios keeps the basis farthest from singular.
 inline bool leaves_sooner(const Leaving<DoubleDouble>& a, const Leaving<DoubleDouble>& b) {
   const bool equal = b.plane >= 0 && abs(a.ratio - b.ratio).head <= 0x1p-80;
   return equal ? a.share > b.share : a.ratio < b.ratio;

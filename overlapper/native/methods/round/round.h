@@ -8,7 +8,7 @@
 
 namespace overlapper {
 
-/// How many of two bodies are of which kind.
+/// The kinds of two bodies: how many are of each.
 struct RoundTraits {
   int balls = 0, capsules = 0, cylinders = 0;
   int stretched = 0;  ///< ellipsoids whose axes differ

@@ -32,9 +32,9 @@ double reach_of_ball(double s, double depth) { return std::sqrt(depth * (2 * s -
 ///
 /// Slices across the cylinder's axis, z from the ball's centre, are lenses of two discs. Their depth is an analytic
 /// function of z times z0² − z², where z0 is how far they reach; and so, over half powers of that, are all measures of
-/// them. With z = z0 cos θ all that is integrated is an even function of θ with a period of half a turn. Of that, nodes
-/// in the middle of N equal parts are off by as little as a term of order 2 N. The nearest singularity is where slices
-/// of the ball shrink to a point: e^-0.97, for contacts as deep as are shallow.
+/// them. With z = z0 cos θ all that is integrated is an even function of θ with a period of half a turn. Its sum over
+/// nodes in the middle of N equal parts is off by as little as a term of order 2 N. The nearest singularity is where
+/// slices of the ball shrink to a point: e^-0.97, for contacts as deep as are shallow.
 SideContact ball_at_side(double r, double s, double distance, double depth) {
   constexpr int kNodes = 12;                     // of half of 24 parts
   const double d = distance, least = s - depth;  // the radius of the disc that is but touched

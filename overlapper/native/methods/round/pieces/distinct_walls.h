@@ -33,8 +33,8 @@ struct DistinctWalls {
 /// planes that count as one to `error`.
 bool is_flat(std::span<const Wall> walls, const PieceSetting& setting, double& error);
 
-/// Of coplanar walls, all but one are superseded. A face supersedes a cut, as the next piece is flat there. Of two
-/// faces the inner one stays, or that of the first body. Adds to `error` like is_flat().
+/// All but one of several coplanar walls are superseded. A face supersedes a cut, as the next piece is flat there. The
+/// inner one of two faces stays, or that of the first body. Adds to `error` like is_flat().
 void find_repeated(DistinctWalls& distinct, const PieceSetting& setting, double& error);
 
 /// Two walls of nearly one direction, and a cut that separates where each is nearer: the first wall is nearer inside.

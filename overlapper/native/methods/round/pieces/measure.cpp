@@ -57,7 +57,7 @@ std::optional<Sums> best_sums(PieceSetting setting, const Sums& none, Add add) {
     if (add(setting, again) && off(again.totals) < off(best.totals)) best = again;
   };
   const auto is_open = [&] { return !(open_volume(best.totals) <= kMostOpen * best.totals.volume); };
-  // If the surface does not close, something is hidden in an interval of which only the middle was sampled.
+  // If the surface does not close, something is hidden in an interval that was sampled in its middle only.
   setting.closely = true;
   if (is_open()) try_again();
   // Or faces and cuts lie so near each other that only rounding orders them. They then count as one.

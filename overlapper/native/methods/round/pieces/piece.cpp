@@ -36,7 +36,7 @@ int side_of(const Wall& wall, std::span<const Round> rounds) {
 }
 
 /// Whether a wall touches a ball, but for a disc that is nothing beside the whole: slices would see it come and go by
-/// rounding. What the wall cuts off counts as an error.
+/// rounding. The part that the wall cuts off counts as an error.
 bool nicks(const Wall& wall, std::span<const Round> rounds, double extent, Totals& totals) {
   const auto cut_off = [&](const Round& r) {
     const Vec3 n = rounded(wall.normal), c = rounded(r.centre);
@@ -54,7 +54,7 @@ bool nicks(const Wall& wall, std::span<const Round> rounds, double extent, Total
 }
 
 /// Drops a cylinder that holds the other round: it leaves all of that, and where it touches that from outside along a
-/// line, slices would show nothing but rounding. What sticks out counts as an error.
+/// line, slices would show nothing but rounding. The part that sticks out counts as an error.
 void drop_around(std::vector<Round>& rounds, Totals& totals) {
   if (rounds.size() < 2) return;
   for (int i = 0; i < 2; ++i) {

@@ -65,8 +65,8 @@ struct DiscChord {
   double distance2(double t) const { return height * height + t * t; }
 };
 
-/// Takes from a disc the sector from one unit vector to another, of which directions are to sum to the opposite of
-/// those of the edges.
+/// Takes from a disc the sector from one unit vector to another. The directions of its arc sum to the opposite of those
+/// of the edges.
 void add_sector(Vec3 out, Disc& disc) {
   const double cube = disc.square * std::sqrt(disc.square);
   disc.first += cube / 3 * out;
@@ -171,7 +171,7 @@ void add_border(const SeenEdge& edge, Disc& left, Disc& right) {
   if (edge.other < 0) right.around = false;
 }
 
-/// Adds the error of an edge's part inside, of which two chords make `beside` of the ball.
+/// Adds the error of an edge's part inside. The two chords make `beside` of the ball.
 void add_error(const SeenEdge& edge, const DiscChord& left, const DiscChord& right, bool from_inside, bool to_inside,
                double beside, double left_height, double r3, double misplaced_corners, double& error) {
   const double far = std::abs(edge.first) + std::abs(edge.height) + std::abs(left_height);
@@ -230,7 +230,7 @@ void add_edge(const Edge& edge, const BallAndPolyhedron& at, BallSums& sums) {
             sums.part.error);
 }
 
-/// A face of which the ball's centre is a corner.
+/// A face that has a corner at the ball's centre.
 void add_corner_at_centre(Vec3 n, Disc& disc) {
   if (disc.goes == Vec3{}) return;
   const double angle = std::atan2(dot(n, cross(disc.comes, disc.goes)), dot(disc.comes, disc.goes));

@@ -38,7 +38,7 @@ int Rings::between(int above, int below, double height) {
   return at_edge->second;
 }
 
-/// Adds what is left of a face, of which `outside` tells the corners that go. False if the face is not convex, by
+/// Adds what is left of a face; `outside` tells which of its corners go. False if the face is not convex, by
 /// rounding. Around the new face, after_ leads from each corner, counted from `before`, to the next.
 template <class Outside>
 bool Rings::cut_face(size_t f, double height, int before, Outside outside) {

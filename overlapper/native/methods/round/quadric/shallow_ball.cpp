@@ -211,7 +211,7 @@ std::optional<HighestFace> highest_face(const Polyhedron& polyhedron, Vec3 centr
 struct NearestPoint {
   bool above = true;  ///< it is in the highest face
   int edge = -1;      ///< else it is on that edge
-  int corner = -1;    ///< of which it is that end, if it is one
+  int corner = -1;    ///< the end of that edge that it is, if it is one
   double least2 = kInfinity;
 };
 

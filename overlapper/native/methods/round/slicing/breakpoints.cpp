@@ -435,8 +435,8 @@ class Settling {
     return true;
   }
 
-  /// Appends intervals from `from`, of which the last begins at the last change between two slices; `from` becomes
-  /// that. False if there are too many.
+  /// Appends intervals from `from`. The last one begins at the last change between two slices; `from` becomes that
+  /// change. False if there are too many.
   bool append_changes(double here, double there, Outline now, const Outline& last, double& from) {
     while (!(now == last)) {
       if (++events_ > kMostEvents) return false;

@@ -152,7 +152,7 @@ constexpr double kBeyondCircle = 0.999;
 
 /// Joins edges that do not share a corner by arcs. Both edges at a corner see it inside of the circle, or neither does,
 /// and there the outline turns by less than half a turn; unless the polygon is nothing but rounding, which leaves
-/// nothing. `position` counts the long edges of the polygon, of which there are so many; `before` and `after` say how
+/// nothing. `position` counts the `long_edges` of the polygon; `before` and `after` say how
 /// much of an edge's chord lies outside of the edge.
 void close_with_arcs(const Slice& slice, std::span<const int> position, int long_edges, std::span<const double> before,
                      std::span<const double> after, Outline& result) {
