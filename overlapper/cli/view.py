@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What is shown: a page, a picture of a step, or a live view for a browser at `host`."""
+    """The page, the picture of a step, or the live view at `host` that is asked for."""
 
     html: Path | None
     png: Path | None
@@ -47,7 +47,7 @@ def shown(
     ] = None,
     close: Annotated[bool, typer.Option("--close", help="The picture is of the largest overlap.")] = False,
 ) -> Shown:
-    """What is shown."""
+    """The page, picture or live view that is asked for."""
     if sum(map(bool, (html, png, live))) > 1:
         raise Refused("--html, --png and --live do not go together: one at a time")
     return Shown(html, png, live, host, step, close)
