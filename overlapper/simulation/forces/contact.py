@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-import math
-import warnings
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper import Batch, Overlaps
-from overlapper._core import ContactSolver
 from overlapper.simulation.asked_pairs import Among, listed
 from overlapper.simulation.bodies import AnyBodies
-from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning
 from overlapper.simulation.contacts import Contacts
-from overlapper.simulation.forces.forces import Forces
-from overlapper.simulation.forces.parameter import OfPair, Parameter
-from overlapper.simulation.model import Array, LinkKey
+from overlapper.simulation.forces.coming import coming, followed
+from overlapper.simulation.forces.forces import Forces, mean
+from overlapper.simulation.forces.masses import Masses
+from overlapper.simulation.forces.other_forces import OtherForces
+from overlapper.simulation.forces.parameter import Layers, OfPair
+from overlapper.simulation.forces.told import Told
+from overlapper.simulation.model import Array
 
 # A swing that turns by more than so many radians in a step is followed by backward Euler.
 COARSE = 2.0
-
-# There is no patch where the area vector is less than this part of the surface of what is shared, as to the solver.
-NO_PATCH = 1e-6
-
-# A body that moves by less than that (m, rad) in a step rests.
-STILL = 1e-9
-
-# How often a step is halved to find when what is swallowed by its end has a patch.
-BISECTIONS = 8
 
 # The most substeps of a step: contacts that are stiffer are damped.
 MOST_SUBSTEPS = 200
@@ -97,13 +87,7 @@ class VolumetricContact:
         self._among: Among = among if isinstance(among, str) else listed(among)
         bodies.update()
         bodies.link_pairs(self._among)  # says what is wrong with them
-        distributed = isinstance(friction, str) and friction == "distributed"
-        self._distributed = distributed
-        self._stiffness = Parameter("stiffness", stiffness, "Pa/m", positive=True)
-        self._dissipation = Parameter("dissipation", dissipation, "s")
-        self._friction = None
-        if friction is not None and not distributed:
-            self._friction = Parameter("friction", friction, "")  # type: ignore[arg-type]  # no other text is a number
+        self._layers = Layers(stiffness, dissipation, friction)
         whole = isinstance(substeps, (int, np.integer)) and not isinstance(substeps, bool)
         if substeps != "auto" and not (whole and int(substeps) >= 1):
             raise ValueError(f"substeps must be a whole number from 1, or 'auto', not {substeps!r}")
@@ -111,8 +95,7 @@ class VolumetricContact:
         self._mechanics = bodies.mechanics()
         self._inside = False
         self._parts: list[tuple[float, Forces]] = []  # of a step, the parts that substeps are, and their forces
-        self._after: Array | None = None  # the velocity that the last step left
-        self._warned: set[tuple[str, LinkKey, LinkKey]] = set()
+        self._told = Told(bodies)
         self._model()
         none = np.empty((0, 3))
         self._found = Forces(bodies.overlaps(pairs=[]), none, none, none, none, np.empty(0, dtype=bool), np.empty(0))
@@ -147,16 +130,16 @@ class VolumetricContact:
             while left > 1e-9 * duration:
                 if taken:
                     self._follow()
-                frequency2 = self._place(self._dynamics.solver)
-                velocity = self._dynamics.velocity()
+                frequency2 = self._place()
+                velocity = self._masses.dynamics.velocity()
                 if not self._planned:
                     # Once in a step is enough for what comes; a length that changes within a swing costs energy.
                     highest = max(frequency2.max(initial=0.0), 0.0 if taken else self._coming(duration, velocity))
                     if not taken or highest * length**2 > 1:
-                        length = left / min(_followed(highest, left), max(1, MOST_SUBSTEPS - taken))
+                        length = left / min(followed(highest, left), max(1, MOST_SUBSTEPS - taken))
                 wrenches = self._solve(length, velocity, frequency2)
                 self._mechanics.begin(length, duration, first=not taken)
-                self._dynamics.apply(wrenches, self._frames)
+                self._masses.dynamics.apply(wrenches, self._frames)
                 self._mechanics.step()
                 self._parts.append((length / duration, self._found))
                 left -= length
@@ -164,17 +147,16 @@ class VolumetricContact:
         finally:
             self._mechanics.stepped(duration)
         self.substeps = taken
-        self._after = self._dynamics.velocity()
+        self._others.left_at(self._masses.dynamics.velocity())
         self._mechanics.announce()
 
     def forces(self) -> Forces:
         """The forces with which a step of the simulator would begin, without taking it: for scripts that integrate."""
         self._refresh()
-        frequency2 = self._place(self._dynamics.solver)
+        frequency2 = self._place()
         duration = self.bodies.time_step
-        substeps = self._planned or min(_followed(frequency2.max(initial=0.0), duration), MOST_SUBSTEPS)
-        self._solve(duration / substeps, self._dynamics.velocity(), frequency2)
-        self._after = None
+        substeps = self._planned or min(followed(frequency2.max(initial=0.0), duration), MOST_SUBSTEPS)
+        self._solve(duration / substeps, self._masses.dynamics.velocity(), frequency2)
         return self._found
 
     def mean(self) -> Forces:
@@ -185,25 +167,7 @@ class VolumetricContact:
         """
         self._follow()
         contacts = self.bodies.overlaps(pairs=self._among)
-        found = contacts.overlaps
-        codes = self._codes(found)
-        area = found.gradient[:, 1, :3]
-        size = np.linalg.norm(area, axis=1)
-        directed = (size > NO_PATCH * found.area) | (found.volume == 0)
-        normal: Array = np.array(found.normal)
-        patches = directed & (size > 0)
-        normal[patches] = area[patches] / size[patches, None]
-        force, torque, slip = (np.zeros((len(found), 3)) for _ in range(3))
-        for part, forces in self._parts:
-            before = self._codes(forces.contacts.overlaps)
-            _, now, then = np.intersect1d(codes, before, assume_unique=True, return_indices=True)
-            force[now] += part * forces.force[then]
-            torque[now] += part * forces.torque[then]
-            if forces is self._parts[-1][1]:
-                slip[now] = forces.slip[then]
-                lost = ~directed[now]
-                normal[now[lost]] = forces.normal[then[lost]]
-        return Forces(contacts, force, torque, slip, normal, directed, self._parameters(found)[0])
+        return mean(contacts, self._parts, self._masses.stiffness(contacts.overlaps))
 
     @property
     def last(self) -> Forces:
@@ -261,10 +225,10 @@ class VolumetricContact:
     def _refresh(self) -> None:
         """See what has come or gone, and how heavy things are."""
         self.bodies.update()
-        if self._keys is not self.bodies.keys or self._restored != self._mechanics.restored:
+        if self._masses.are_stale():
             self._model()
-        elif self._dynamics.read():
-            self._forget()
+        elif self._masses.dynamics.read():
+            self._others = OtherForces(self._masses.dynamics.gravity)
         if self._inside and self._rules is not self.bodies.rules:
             # A script may have let pairs collide since, or made new ones.
             self._rules = self.bodies.rules
@@ -273,169 +237,46 @@ class VolumetricContact:
     def _follow(self) -> None:
         """Where the bodies are within a step, or at its end."""
         self.bodies.follow()
-        if self._keys is not self.bodies.keys:
+        if self._masses.keys is not self.bodies.keys:
             self._model()
             self._parts = []
 
-    def _codes(self, found: Overlaps) -> NDArray[np.int64]:
-        """The pairs of rows, as one number each."""
-        first, second = found.pairs.T.astype(np.int64)
-        return np.asarray(first * len(self._keys) + second)
-
     def _model(self) -> None:
         """Read the masses and joints of the bodies that there are."""
-        self._keys, self._restored = self.bodies.keys, self._mechanics.restored
-        self._dynamics = self._mechanics.dynamics(sorted({body for body, _, _ in self._keys}))
-        self._links = np.array([self._dynamics.place[body, link] for body, link, _ in self._keys], dtype=np.int64)
-        self._frames = self._dynamics.frames()
-        self._batch = Batch(self.bodies.shapes)  # for what is not yet: the one of `bodies` knows what is
-        self._forget()
-
-    def _forget(self) -> None:
-        """Forget the accelerations of before: they are of other bodies."""
-        self._after = None
-        self._before: tuple[Array, float, Array] | None = None  # velocity, duration and our part of the acceleration
-        self._other = self._dynamics.gravity
+        self._masses = Masses(self.bodies, self._mechanics, self._layers)
+        self._others = OtherForces(self._masses.dynamics.gravity)
 
     @property
     def _planned(self) -> int:
         """The substeps that were asked for; 0 if that is left to the stiffness."""
         return 0 if self._substeps == "auto" else int(self._substeps)
 
-    def _place(self, solver: ContactSolver) -> Array:
-        """Give a solver what bodies share where they are; the squares of frequencies by row."""
+    def _place(self) -> Array:
+        """Give the solver what bodies share where they are; the squares of frequencies by row."""
         self._contacts = self.bodies.overlaps(pairs=self._among)
-        self._frames = self._dynamics.frames()
-        found = self._contacts.overlaps
-        self._moduli, dissipation, friction = self._parameters(found)
-        frequency2: Array = solver.place(self._frames, found, self._links, self._moduli, dissipation, friction)
+        self._frames = self._masses.dynamics.frames()
+        solver = self._masses.dynamics.solver
+        frequency2, self._stiffness = self._masses.place(solver, self._frames, self._contacts.overlaps)
         return frequency2
 
-    def _parameters(self, found: Overlaps) -> tuple[Array, Array, Array]:
-        """Stiffness, dissipation and coefficient of friction, by row."""
-        dynamics = self._dynamics
-        links = self._links[found.pairs]
-        if self._friction is None:
-            friction = dynamics.friction[links].prod(axis=1)
-        else:
-            friction = self._friction.of(links, dynamics.links)
-        return self._stiffness.of(links, dynamics.links), self._dissipation.of(links, dynamics.links), friction
-
     def _coming(self, duration: float, velocity: Array) -> float:
-        """The square of the highest frequency of what bodies will share in a time as long as that.
-
-        A body that came in by a long step would be deeper than its speed can take it: it would be thrown back. So steps
-        are short before they have to be: before two touch, and before an edge comes down to a face.
-        """
-        solver = self._dynamics.solver.copy()
-        if self._before:
-            before, length, _ = self._before
-            velocity = velocity + duration / length * (velocity - before)
-        else:
-            velocity = velocity + duration * self._other
-        # Bodies at rest bring no new contact.
-        if np.abs(velocity).max(initial=0.0) * duration < STILL:
-            return 0.0
-        highest = 0.0
-        known: set[tuple[int, int]] | None = None
-        # A small and fast body is swallowed within the step: then it counts when it was half in, and for how long.
-        lost: set[tuple[int, int]] = set()
-        early, late, part = 0.0, 1.0, 1.0
-        for _ in range(BISECTIONS):
-            found = self._at(part * duration, velocity)
-            frequency2 = solver.place(self._frames, found, self._links, *self._parameters(found))
-            highest = max(highest, float(frequency2.max(initial=0.0)))
-            swallowed = _swallowed(found)
-            if swallowed:
-                known = _swallowed(self._contacts.overlaps) if known is None else known
-                swallowed -= known
-            if swallowed:
-                late, lost = part, swallowed
-            elif lost and lost.isdisjoint(map(tuple, found.pairs[found.volume > 0].tolist())):
-                early = part
-            else:
-                break
-            part = (early + late) / 2
-        return max(highest, (2 / (late - early) / duration) ** 2) if lost else highest
-
-    def _at(self, duration: float, velocity: Array) -> Overlaps:
-        """The overlaps after a duration in which all coordinates go on with that velocity."""
-        bodies = self.bodies
-        positions, orientations = self._dynamics.solver.ahead(
-            duration, velocity, self._links, bodies.positions, bodies.orientations
-        )
-        pairs = bodies.pairs_at(positions, orientations, self._among)
-        return self._batch.overlaps(positions, orientations, pairs, separated=False)
+        """The square of the highest frequency of what bodies will share in a time as long as that."""
+        ahead = self._others.ahead(velocity, duration)
+        return coming(self._masses, self._frames, self._contacts.overlaps, duration, ahead, self._among)
 
     def _solve(self, duration: float, velocity: Array, frequency2: Array) -> Array:
         """The forces of a step as long as that; (n, 6) force and torque on the links."""
-        dynamics = self._dynamics
-        self._other = self._others(velocity)
-        self._after = None
+        other = self._others.learnt(velocity)
         damped = frequency2 * duration**2 > COARSE**2
         if damped.any():
-            self._tell_of_substeps(damped, frequency2, duration)
+            planned = self._planned or MOST_SUBSTEPS
+            self._told.of_substeps(self._contacts, damped, frequency2, duration, planned)
         wrenches: Array
-        force, torque, slip, normal, directed, wrenches, ours, self.sweeps = dynamics.solver.solve(
-            duration, velocity, self._other, damped, self._distributed
+        force, torque, slip, normal, directed, wrenches, ours, self.sweeps = self._masses.dynamics.solver.solve(
+            duration, velocity, other, damped, self._layers.distributed
         )
-        self._found = Forces(self._contacts, force, torque, slip, normal, directed, self._moduli)
+        self._found = Forces(self._contacts, force, torque, slip, normal, directed, self._stiffness)
         if not directed.all():
-            self._tell_of_direction(~directed)
-        self._before = velocity, duration, ours
+            self._told.of_direction(self._contacts, ~directed)
+        self._others.solved(velocity, duration, ours)
         return wrenches
-
-    def _others(self, velocity: Array) -> Array:
-        """The acceleration of all coordinates by what else acts."""
-        # It is told by how velocities have changed, unless somebody has set them since.
-        if self._before and (self._after is None or np.array_equal(self._after, velocity)):
-            before, length, ours = self._before
-            # After forces() nothing may have moved; a body that rests to the last bit tells nothing new.
-            if not np.array_equal(before, velocity):
-                return (velocity - before) / length - ours
-        return self._other
-
-    def _pairs_of(self, rows: NDArray[np.bool_]) -> list[tuple[LinkKey, LinkKey]]:
-        return [((a, la), (b, lb)) for a, la, _, b, lb, _ in self._contacts.keys[rows].tolist()]
-
-    def _tell_of_substeps(self, damped: NDArray[np.bool_], frequency2: Array, duration: float) -> None:
-        for (a, b), square in zip(self._pairs_of(damped), frequency2[damped].tolist()):
-            if ("substeps", a, b) not in self._warned:
-                self._warned.add(("substeps", a, b))
-                needed = math.ceil(math.sqrt(square) * duration * max(1, self._substeps_given))
-                names = self.bodies.names
-                warnings.warn(
-                    f"{self._substeps_given} substeps are too few for the stiffness between {names[a]} and {names[b]}, "
-                    f"which swing at up to {math.sqrt(square):.0f} rad/s: {needed} would follow them; until then their "
-                    "contact loses energy",
-                    SubstepsWarning,
-                    stacklevel=4,
-                )
-
-    @property
-    def _substeps_given(self) -> int:
-        return MOST_SUBSTEPS if self._substeps == "auto" else int(self._substeps)
-
-    def _tell_of_direction(self, lost: NDArray[np.bool_]) -> None:
-        for a, b in self._pairs_of(lost):
-            if ("direction", a, b) not in self._warned:
-                self._warned.add(("direction", a, b))
-                names = self.bodies.names
-                warnings.warn(
-                    f"{names[a]} and {names[b]} share a volume without a side to push to, as one lies within the other "
-                    "or goes through it; they are pushed as they were last",
-                    NoDirectionWarning,
-                    stacklevel=4,
-                )
-
-
-def _followed(frequency2: float, duration: float) -> int:
-    """How many substeps of a duration follow a swing of that frequency, squared."""
-    return max(1, math.ceil(math.sqrt(frequency2) * duration))
-
-
-def _swallowed(found: Overlaps) -> set[tuple[int, int]]:
-    """The pairs in which one lies wholly in the other: their overlap has no patch."""
-    area = found.gradient[:, 1, :3]
-    rows = (found.volume > 0) & ((area * area).sum(axis=1) <= (NO_PATCH * found.area) ** 2)
-    return {(a, b) for a, b in found.pairs[rows].tolist()} if rows.any() else set()

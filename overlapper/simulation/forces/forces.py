@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper import Overlaps
 from overlapper.columns import FORCE_COLUMNS, FORCE_MEASURES, Columns, Tabular
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.forces.energy import energies
 from overlapper.simulation.model import Array
+
+# There is no patch where the area vector is less than this part of the surface of what is shared, as to the solver.
+NO_PATCH = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,3 +97,36 @@ class Forces(Tabular):
 
     def __repr__(self) -> str:
         return f"Forces({len(self)} pairs, {np.linalg.norm(self.force, axis=1).max(initial=0.0):.3g} N at most)"
+
+
+def mean(contacts: Contacts, parts: Sequence[tuple[float, Forces]], stiffness: Array) -> Forces:
+    """The forces on what bodies share now: their mean over the `parts` of a step, each a fraction of it and its forces.
+
+    `slip` is of the last part. `stiffness` (p,) in Pa/m is that of the contacts.
+    """
+    found = contacts.overlaps
+    count = 1 + max(int(each.pairs.max(initial=0)) for each in (found, *(part.contacts.overlaps for _, part in parts)))
+    codes = _codes(found, count)
+    area = found.gradient[:, 1, :3]
+    size = np.linalg.norm(area, axis=1)
+    directed = (size > NO_PATCH * found.area) | (found.volume == 0)
+    normal: Array = np.array(found.normal)
+    patches = directed & (size > 0)
+    normal[patches] = area[patches] / size[patches, None]
+    force, torque, slip = (np.zeros((len(found), 3)) for _ in range(3))
+    for part, forces in parts:
+        before = _codes(forces.contacts.overlaps, count)
+        _, now, then = np.intersect1d(codes, before, assume_unique=True, return_indices=True)
+        force[now] += part * forces.force[then]
+        torque[now] += part * forces.torque[then]
+        if forces is parts[-1][1]:
+            slip[now] = forces.slip[then]
+            lost = ~directed[now]
+            normal[now[lost]] = forces.normal[then[lost]]
+    return Forces(contacts, force, torque, slip, normal, directed, stiffness)
+
+
+def _codes(found: Overlaps, count: int) -> NDArray[np.int64]:
+    """The pairs of rows among so many shapes, as one number each."""
+    first, second = found.pairs.T.astype(np.int64)
+    return np.asarray(first * count + second)

@@ -4,15 +4,42 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper.simulation.mechanics import Dynamics
 from overlapper.simulation.model import Array, LinkKey
 
 OfPair = Callable[[LinkKey, LinkKey], float]
 """The value for a pair of links ((body, link), (body, link)), the lesser first."""
+
+
+class Layers:
+    """The elastic layers of the bodies: stiffness, dissipation and friction, as `VolumetricContact` takes them.
+
+    With `distributed` friction the coefficients are those of the links.
+    """
+
+    def __init__(
+        self,
+        stiffness: float | OfPair,
+        dissipation: float | OfPair,
+        friction: float | OfPair | Literal["distributed"] | None,
+    ) -> None:
+        self.distributed = isinstance(friction, str) and friction == "distributed"
+        self._stiffness = Parameter("stiffness", stiffness, "Pa/m", positive=True)
+        self._dissipation = Parameter("dissipation", dissipation, "s")
+        self._friction = None
+        if friction is not None and not self.distributed:
+            self._friction = Parameter("friction", friction, "")  # type: ignore[arg-type]  # no other text is a number
+
+    def of(self, pairs: NDArray[np.int64], dynamics: Dynamics) -> tuple[Array, Array, Array]:
+        """Stiffness, dissipation and coefficient of friction (p,) of pairs (p, 2) of places in `dynamics.links`."""
+        links = dynamics.links
+        friction = self._friction.of(pairs, links) if self._friction else dynamics.friction[pairs].prod(axis=1)
+        return self._stiffness.of(pairs, links), self._dissipation.of(pairs, links), friction
 
 
 class Parameter:

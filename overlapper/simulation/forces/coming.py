@@ -1,0 +1,69 @@
+"""The contacts that a step will bring, and the substeps that they need."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from overlapper import Overlaps
+from overlapper.simulation.asked_pairs import Among
+from overlapper.simulation.forces.forces import NO_PATCH
+from overlapper.simulation.forces.masses import Masses
+from overlapper.simulation.layout import Pose
+from overlapper.simulation.model import Array
+
+# A body that moves by less than that (m, rad) in a step rests.
+STILL = 1e-9
+
+# How often a step is halved to find when what is swallowed by its end has a patch.
+BISECTIONS = 8
+
+
+def coming(
+    masses: Masses, frames: Sequence[Pose], now: Overlaps, duration: float, velocity: Array, among: Among
+) -> float:
+    """The square of the highest frequency (rad/s) of what bodies will share in a time as long as that (s).
+
+    `frames` are those of the links, `now` is what the bodies share in them, and all coordinates go on with `velocity`.
+
+    A body that came in by a long step would be deeper than its speed can take it: it would be thrown back. So steps
+    are short before they have to be: before two touch, and before an edge comes down to a face.
+    """
+    # Bodies at rest bring no new contact.
+    if np.abs(velocity).max(initial=0.0) * duration < STILL:
+        return 0.0
+    solver = masses.dynamics.solver.copy()
+    highest = 0.0
+    known: set[tuple[int, int]] | None = None
+    # A small and fast body is swallowed within the step: then it counts when it was half in, and for how long.
+    lost: set[tuple[int, int]] = set()
+    early, late, part = 0.0, 1.0, 1.0
+    for _ in range(BISECTIONS):
+        found = masses.ahead(part * duration, velocity, among)
+        highest = max(highest, float(masses.place(solver, frames, found)[0].max(initial=0.0)))
+        swallowed = _swallowed(found)
+        if swallowed:
+            known = _swallowed(now) if known is None else known
+            swallowed -= known
+        if swallowed:
+            late, lost = part, swallowed
+        elif lost and lost.isdisjoint(map(tuple, found.pairs[found.volume > 0].tolist())):
+            early = part
+        else:
+            break
+        part = (early + late) / 2
+    return max(highest, (2 / (late - early) / duration) ** 2) if lost else highest
+
+
+def followed(frequency2: float, duration: float) -> int:
+    """How many substeps of a duration follow a swing of that frequency, squared."""
+    return max(1, math.ceil(math.sqrt(frequency2) * duration))
+
+
+def _swallowed(found: Overlaps) -> set[tuple[int, int]]:
+    """The pairs in which one lies wholly in the other: their overlap has no patch."""
+    area = found.gradient[:, 1, :3]
+    rows = (found.volume > 0) & ((area * area).sum(axis=1) <= (NO_PATCH * found.area) ** 2)
+    return {(a, b) for a, b in found.pairs[rows].tolist()} if rows.any() else set()

@@ -1,0 +1,51 @@
+"""Bodies as masses and joints, with the shapes that press."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from overlapper import Batch, Overlaps
+from overlapper._core import ContactSolver
+from overlapper.simulation.asked_pairs import Among
+from overlapper.simulation.bodies import AnyBodies
+from overlapper.simulation.forces.parameter import Layers
+from overlapper.simulation.layout import Pose
+from overlapper.simulation.mechanics import Mechanics
+from overlapper.simulation.model import Array
+
+
+class Masses:
+    """The masses and joints of the bodies that there are; stale once bodies have come or gone, or were put back."""
+
+    def __init__(self, bodies: AnyBodies, mechanics: Mechanics, layers: Layers) -> None:
+        self._bodies, self._mechanics, self._layers = bodies, mechanics, layers
+        self.keys, self._restored = bodies.keys, mechanics.restored
+        self.dynamics = mechanics.dynamics(sorted({body for body, _, _ in self.keys}))
+        self._links = np.array([self.dynamics.place[body, link] for body, link, _ in self.keys], dtype=np.int64)
+        self._batch = Batch(bodies.shapes)  # for what is not yet: the one of `bodies` knows what is
+
+    def are_stale(self) -> bool:
+        return self.keys is not self._bodies.keys or self._restored != self._mechanics.restored
+
+    def stiffness(self, found: Overlaps) -> Array:
+        """(p,) Pa/m by row."""
+        return self._layers.of(self._links[found.pairs], self.dynamics)[0]
+
+    def place(self, solver: ContactSolver, frames: Sequence[Pose], found: Overlaps) -> tuple[Array, Array]:
+        """Give a solver what bodies share where their links have these frames.
+
+        Returns by row the squares of frequencies (rad²/s²) and the stiffness (Pa/m).
+        """
+        layers = self._layers.of(self._links[found.pairs], self.dynamics)
+        return solver.place(frames, found, self._links, *layers), layers[0]
+
+    def ahead(self, duration: float, velocity: Array, among: Among) -> Overlaps:
+        """The overlaps after a duration (s) in which all coordinates go on with that velocity."""
+        bodies = self._bodies
+        positions, orientations = self.dynamics.solver.ahead(
+            duration, velocity, self._links, bodies.positions, bodies.orientations
+        )
+        pairs = bodies.pairs_at(positions, orientations, among)
+        return self._batch.overlaps(positions, orientations, pairs, separated=False)

@@ -1,0 +1,56 @@
+"""The warnings of volumetric contact, each told once for a pair of links."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper.simulation.bodies import AnyBodies
+from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning
+from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.model import Array, LinkKey
+
+
+class Told:
+    """The pairs of links that users were warned of. Warnings name the line that calls the caller's caller."""
+
+    def __init__(self, bodies: AnyBodies) -> None:
+        self._bodies = bodies
+        self._known: set[tuple[type[Warning], LinkKey, LinkKey]] = set()
+
+    def of_substeps(
+        self, contacts: Contacts, damped: NDArray[np.bool_], frequency2: Array, duration: float, substeps: int
+    ) -> None:
+        """Warn of the rows that are `damped`, as `substeps` of that duration (s) are too long for their frequencies."""
+        for row, a, b in self._new(SubstepsWarning, contacts, damped):
+            frequency = math.sqrt(frequency2[row])
+            needed = math.ceil(frequency * duration * max(1, substeps))
+            warnings.warn(
+                f"{substeps} substeps are too few for the stiffness between {a} and {b}, which swing at up to "
+                f"{frequency:.0f} rad/s: {needed} would follow them; until then their contact loses energy",
+                SubstepsWarning,
+                stacklevel=4,
+            )
+
+    def of_direction(self, contacts: Contacts, lost: NDArray[np.bool_]) -> None:
+        """Warn of the rows that have `lost` their direction."""
+        for _, a, b in self._new(NoDirectionWarning, contacts, lost):
+            warnings.warn(
+                f"{a} and {b} share a volume without a side to push to, as one lies within the other "
+                "or goes through it; they are pushed as they were last",
+                NoDirectionWarning,
+                stacklevel=4,
+            )
+
+    def _new(self, kind: type[Warning], contacts: Contacts, rows: NDArray[np.bool_]) -> Iterator[tuple[int, str, str]]:
+        """The rows whose pairs were not warned of yet, and the names of their links."""
+        names = self._bodies.names
+        for row in np.flatnonzero(rows).tolist():
+            a, la, _, b, lb, _ = contacts.keys[row].tolist()
+            if (kind, (a, la), (b, lb)) not in self._known:
+                self._known.add((kind, (a, la), (b, lb)))
+                yield row, names[a, la], names[b, lb]
