@@ -97,6 +97,10 @@ def sweep(
     limit: Annotated[
         float | None, typer.Option(min=0.001, help="Seconds that a task may take; then it has failed.")
     ] = None,
+    memory: Annotated[
+        int | None,
+        typer.Option(min=1, help="Megabytes that a task may take, on Linux; then it has failed."),
+    ] = None,
     retry: Annotated[bool, typer.Option("--retry", help="Do tasks again that have failed.")] = False,
     engine: AbstractContextManager[Executor],
     check: Annotated[
@@ -156,7 +160,7 @@ def sweep(
         recorded = Recorded(check, chosen.expected, todo) if check else None
         store = stack.enter_context(todo.opened(out))
         working = stack.enter_context(engine)
-        reached, finished = _run(todo, store, working, limit, retry)
+        reached, finished = _run(todo, store, working, limit, memory, retry)
         compared = recorded.compare(store) if recorded and finished else None
         done = store.done & todo.tasks.keys()
         left_out = LeftOut.of(todo, store.rows("tasks"))
@@ -175,7 +179,9 @@ def _kept(text: str) -> int:
     raise Refused(f"--steps-kept must be summary, 'every N' or all, not {text!r}")
 
 
-def _run(todo: Sweep, store: Store, engine: Executor, limit: float | None, retry: bool) -> tuple[Reached, bool]:
+def _run(
+    todo: Sweep, store: Store, engine: Executor, limit: float | None, memory: int | None, retry: bool
+) -> tuple[Reached, bool]:
     """How far it came; False if it was interrupted."""
     from overlapper.sweep.sweep import Progress as Reached
 
@@ -202,7 +208,7 @@ def _run(todo: Sweep, store: Store, engine: Executor, limit: float | None, retry
             progress.update(bar, completed=now.total - now.missing, rate=rate)
 
         try:
-            todo.run(store, engine, limit, retry, heard)
+            todo.run(store, engine, limit, retry, heard, memory)
         except KeyboardInterrupt:
             return reached, False
     return reached, True

@@ -17,7 +17,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any, ParamSpec, TypeVar, cast
 
-from overlapper.jobs.worker import Ended, Worker, forget_words
+from overlapper.jobs.worker import Ended, Worker, forget_words, signal_name
 from overlapper.printable import first_line
 
 P = ParamSpec("P")
@@ -103,7 +103,7 @@ class Confined:
             return Unanswered(f"took longer than {self.seconds:g} s")
         if OUT_OF_MEMORY.search(ended.words):
             return Unanswered(f"needed more than {self.megabytes:,} MB")
-        name = signal.Signals(-ended.code).name if ended.code is not None and ended.code < 0 else ""
+        name = signal_name(-ended.code) if ended.code is not None and ended.code < 0 else ""
         if ended.code is None:
             return Unanswered(f"had a process that {ended}")
         return Unanswered(str(ended).replace("ended with", "ended its process with", 1), name)

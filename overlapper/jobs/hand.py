@@ -6,7 +6,6 @@ What is done is a `Job`, and nothing here knows of scenes.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import faulthandler
 import os
 import re
@@ -21,16 +20,18 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, Literal
 
+from overlapper.jobs.descendants import signalled_at_the_end_of_the_parent
+from overlapper.jobs.surroundings import Surroundings
 from overlapper.jobs.worker import START_LIMIT, Ended, NotStarted, Worker, forget_words
-from overlapper.printable import first_line
-
-DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
+from overlapper.printable import encodable, first_line, shortened
 
 # s that a process has beyond the limit to end itself, which it does with a traceback.
 GRACE = 10.0
 
 # An item fails once its process has died this often: the first time, somebody else may have killed the process.
 TRIES = 2
+
+TRACEBACK = 20_000  # characters
 
 TIMED_OUT = re.compile(r"^Timeout \(\d", re.MULTILINE)  # of faulthandler
 
@@ -40,13 +41,14 @@ class Job:
     """The function to call with every item. `prepare`, named by module and name, makes it from `setup` in each process.
 
     It must find the same bits of an item in whatever process, after whatever others. Paths are meant from `folder`,
-    where there is such a folder.
+    where there is such a folder. `megabytes` is the memory that a process may take beyond that of a new one, on Linux.
     """
 
     module: str
     prepare: str
     setup: Any
     folder: str = field(default_factory=os.getcwd)
+    megabytes: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +59,14 @@ class Done:
     seconds: float
 
 
+What = Literal["raised", "hung", "died"]
+
+
 @dataclass(frozen=True, slots=True)
 class Failed:
     """An item without a result: a sentence, and all that is known of where it failed."""
 
-    what: Literal["raised", "hung", "died"]
+    what: What
     sentence: str
     traceback: str
 
@@ -76,6 +81,7 @@ class _Work:
 
 
 _call: Callable[[Any], Any] | None = None
+_surroundings: Surroundings | None = None
 
 
 def answers(request: Job | _Work) -> Iterator[Outcome | str]:
@@ -87,14 +93,15 @@ def answers(request: Job | _Work) -> Iterator[Outcome | str]:
         assert _call
         for item in request.items:
             yield _outcome(_call, item, request.limit)
+            if _surroundings and not _surroundings.restore():
+                sys.exit()  # the next item is done by a new process
 
 
 def _begun(job: Job) -> str:
-    global _call
+    global _call, _surroundings
     # Whoever asks may be killed while this process hangs in an item. It is asked for by the thread that reads its
     # replies, which lives as long.
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
+    signalled_at_the_end_of_the_parent(signal.SIGKILL)
     faulthandler.enable()
     warnings.simplefilter("ignore")
     with contextlib.suppress(OSError):
@@ -103,6 +110,7 @@ def _begun(job: Job) -> str:
         _call = getattr(import_module(job.module), job.prepare)(job.setup)
     except Exception as error:
         return first_line(error)
+    _surroundings = Surroundings()
     return ""
 
 
@@ -112,11 +120,24 @@ def _outcome(call: Callable[[Any], Any], item: Any, limit: float | None) -> Outc
     if limit:
         faulthandler.dump_traceback_later(limit, exit=True)  # also where C does not let Python have a turn
     try:
-        return Done(call(item), time.monotonic() - start)
-    except Exception as error:
-        return Failed("raised", f"{type(error).__name__}: {first_line(error)}", traceback.format_exc())
+        with warnings.catch_warnings():
+            return Done(call(item), time.monotonic() - start)
+    except BaseException as error:  # an exit or an interruption is the item's, too
+        return _failed("raised", f"{type(error).__name__}: {first_line(error)}", _trace())
     finally:
         faulthandler.cancel_dump_traceback_later()
+
+
+def _trace() -> str:
+    try:
+        return traceback.format_exc()
+    except BaseException as error:  # of the exception's own words
+        return f"the traceback cannot be written: {type(error).__name__}"
+
+
+def _failed(what: What, sentence: str, words: str) -> Failed:
+    """A failure whose words can be written to any table, and fill none."""
+    return Failed(what, encodable(sentence), shortened(encodable(words), TRACEBACK))
 
 
 class Hand:
@@ -156,7 +177,7 @@ class Hand:
 
     def _started(self) -> Worker:
         try:
-            worker = Worker(answers)
+            worker = Worker(answers, megabytes=self._job.megabytes)
             worker.send(self._job)
             complaint = worker.receive(START_LIMIT)
         except Ended as ended:
@@ -191,5 +212,5 @@ class Hand:
 def _told(ended: Ended, limit: float | None) -> Failed:
     words = ended.words.strip()
     if ended.limit or (limit and TIMED_OUT.search(words)):
-        return Failed("hung", f"it took longer than {limit:g} s", words)
-    return Failed("died", f"its process {ended}", words)
+        return _failed("hung", f"it took longer than {limit:g} s", words)
+    return _failed("died", f"its process {ended}", words)

@@ -25,24 +25,28 @@ from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
+from overlapper.jobs.descendants import MARK, guard, kill_group, kill_marked, new_mark
 from overlapper.printable import first_line
 
 START_LIMIT = 60.0  # s, for a new Python to import a module on a machine that is busy
 
 GLANCE = 0.2  # s after which a silent process is looked at: what it has started may hold its pipe open
 LEAVE = 5.0  # s that a process has to end once it has closed its pipe
+WORDS = 1 << 16  # bytes that are kept of what a process writes to stderr, the last ones
 
 # The messages of C++ and Python for an uncaught exception.
 UNCAUGHT = r"what\(\): *(.*)|^(\w*(?:Error|Exception): .*)"
 
 END = object()
 
+_words = 2  # in the process: another number of its stderr, which nobody else closes
+
 
 class Ended(Exception):
     """The process says no more; the text tells why, as the end of a sentence.
 
-    `code` is its exit code, minus the signal that ended it, or None if it was killed for taking longer than `limit`
-    seconds. `words` is all that it wrote to stderr.
+    `code` is its exit code, or minus the signal that ended it. It is None if the process was killed: for taking longer
+    than `limit` seconds, or for closing its pipe. `words` is the end of what it wrote to stderr.
     """
 
     def __init__(self, why: str, code: int | None, words: str = "", limit: float | None = None) -> None:
@@ -66,9 +70,10 @@ class Worker:
     def __init__(
         self, answers: Callable[[Any], Iterator[Any]], cause: str = UNCAUGHT, megabytes: int | None = None
     ) -> None:
+        mark = new_mark()
         where = f"{answers.__module__!r}, {answers.__name__!r}, {megabytes}"
         program = f"import sys; sys.path[:] = {sys.path!r}; from overlapper.jobs.worker import serve; serve({where})"
-        self._cause = cause
+        self._cause, self._mark = cause, mark
         self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
         with contextlib.ExitStack() as started:
             try:
@@ -79,6 +84,7 @@ class Worker:
                     stdout=subprocess.PIPE,
                     stderr=self._words,
                     start_new_session=True,
+                    env={**os.environ, MARK: mark},
                 )
                 started.enter_context(self.process)
                 started.callback(self.kill)
@@ -91,7 +97,7 @@ class Worker:
             started.pop_all()
         # Also when the worker is forgotten and when Python exits, so that nothing is left behind.
         files = self._requests, replies, self._words
-        self.close = weakref.finalize(self, _end, os.getpid(), self.process, reader, files)
+        self.close = weakref.finalize(self, _end, os.getpid(), self.process, mark, reader, files)
         try:
             self.receive(START_LIMIT)
         except BaseException:
@@ -109,7 +115,7 @@ class Worker:
 
     def kill(self) -> None:
         """End the process and all that it has started, from any thread."""
-        _kill(self.process)
+        _kill(self.process, self._mark)
 
     def send(self, request: Any) -> None:
         with contextlib.suppress(BrokenPipeError):  # the missing reply will tell
@@ -132,12 +138,15 @@ class Worker:
         patience = time.monotonic() + LEAVE
         while not _is_over(self.process) and time.monotonic() < patience:
             time.sleep(0.01)
+        closed = not _is_over(self.process)
         self.kill()
         code = self.process.wait()
-        how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-        self._words.seek(0)
+        self._words.seek(max(self._words.seek(0, os.SEEK_END) - WORDS, 0))
         words = self._words.read().decode(errors="replace")
-        said = ["".join(groups).strip().rstrip(".") for groups in re.findall(self._cause, words, re.MULTILINE)]
+        if closed:
+            return Ended("closed the pipe of its answers and went on", None, words)
+        how = f"signal {signal_name(-code)}" if code < 0 else f"exit code {code}"
+        said = [first_line("".join(groups)) for groups in re.findall(self._cause, words, re.MULTILINE)]
         return Ended(f"ended with {how}" + (f" ({said[-1]})" if said else ""), code, words)
 
 
@@ -152,21 +161,20 @@ def _is_over(process: subprocess.Popen[bytes]) -> bool:
             return True
     over = process.poll() is not None
     if over:
-        _kill_group(process.pid)
+        kill_group(process.pid)
     return over
 
 
-def _kill(process: subprocess.Popen[bytes]) -> None:
+def signal_name(number: int) -> str:
+    """As "SIGKILL"; signals of real time have numbers alone."""
+    return signal.Signals(number).name if number in signal.Signals.__members__.values() else str(number)
+
+
+def _kill(process: subprocess.Popen[bytes], mark: str) -> None:
     if process.returncode is None:
-        _kill_group(process.pid)
+        kill_group(process.pid)
         process.kill()
-
-
-def _kill_group(leader: int) -> None:
-    """Kill what a process has started, and the process itself. Windows has no such groups."""
-    if sys.platform != "win32":
-        with contextlib.suppress(ProcessLookupError, PermissionError):  # macOS refuses it for a process that has ended
-            os.killpg(leader, signal.SIGKILL)
+        kill_marked(mark)
 
 
 class _Replies(io.RawIOBase):
@@ -202,10 +210,12 @@ def _forward(process: subprocess.Popen[bytes], arrived: queue.SimpleQueue[Any]) 
     arrived.put(END)
 
 
-def _end(owner: int, process: subprocess.Popen[bytes], reader: threading.Thread, files: Iterable[IO[bytes]]) -> None:
+def _end(
+    owner: int, process: subprocess.Popen[bytes], mark: str, reader: threading.Thread, files: Iterable[IO[bytes]]
+) -> None:
     if os.getpid() != owner:  # in a fork, which must leave the process to whoever started it
         return
-    _kill(process)
+    _kill(process, mark)
     process.wait()
     reader.join()
     for file in files:
@@ -217,10 +227,17 @@ def serve(module: str, name: str, megabytes: int | None) -> None:
     """The process: requests on standard input; on standard output a greeting, then the replies to each request."""
     # Ctrl-C is for whoever asks, who may want another answer before the end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    replies = os.fdopen(os.dup(1), "wb")
+    guard()
+    global _words
+    requests, replies, _words = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"), os.dup(2)
+    pipe = os.fstat(replies.fileno())
+    with open(os.devnull) as nothing:
+        os.dup2(nothing.fileno(), 0)  # whoever asks for input must not read the requests
     os.dup2(2, 1)  # whatever else gets printed must not mix with the replies
 
     def say(reply: Any) -> None:
+        if not os.path.samestat(os.fstat(replies.fileno()), pipe):  # closed by others, and the number is another file's
+            os._exit(1)
         pickle.dump(reply, replies)
         replies.flush()
 
@@ -229,7 +246,7 @@ def serve(module: str, name: str, megabytes: int | None) -> None:
     say("ready")
     with contextlib.suppress(EOFError):
         while True:
-            for reply in answers(pickle.load(sys.stdin.buffer)):
+            for reply in answers(pickle.load(requests)):
                 say(reply)
 
 
@@ -250,7 +267,20 @@ def _limit(megabytes: int | None) -> None:
 
 
 def forget_words() -> None:
-    """In the process: drop what it has written to stderr, which would be mistaken for words about the next request."""
-    sys.stderr.flush()
+    """In the process: drop what it has written to stderr, which would be mistaken for words about the next request.
+
+    Standard streams that were closed or replaced meanwhile are there again.
+    """
+    for name, number in (("stdout", 1), ("stderr", 2)):
+        with contextlib.suppress(Exception):  # whatever somebody has put there
+            getattr(sys, name).flush()
+        os.dup2(_words, number)
+        stream = getattr(sys, f"__{name}__")
+        if stream is None or stream.closed:
+            stream = io.TextIOWrapper(
+                io.FileIO(number, "w", closefd=False), "utf-8", "backslashreplace", write_through=True
+            )
+            setattr(sys, f"__{name}__", stream)
+        setattr(sys, name, stream)
     os.ftruncate(2, 0)
     os.lseek(2, 0, os.SEEK_SET)

@@ -23,6 +23,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any, Literal, get_args
 
+from overlapper.printable import LONGEST, first_line
 from overlapper.scenes.parameters import Parameter, described, parameters_of, values_of
 from overlapper.simulation.engine import ENGINES
 
@@ -130,6 +131,8 @@ def load_scene(name_or_path: str | Path, given: Mapping[str, str] | None = None)
 
 def scene_of(path: Path, source: bytes) -> Scene:
     """The scene that the text of a file is. SceneError says what is wrong with it."""
+    if not re.search(rb"\bSTEPS\b|\bimport \*", source):  # not run: a script may do anything, for ever
+        raise SceneError(f"{path} is no scene, as it has no STEPS: overlapper watch {path} runs a script as it is")
     module = _imported(path, source)
     steps, build = getattr(module, "STEPS", None), getattr(module, "build", None)
     if not isinstance(steps, int) or steps < 1:
@@ -203,5 +206,6 @@ def broken(path: Path, what: str, error: Exception) -> SceneError:
     if isinstance(error, SyntaxError):
         lines, reason = [error.lineno], error.msg
     where = f" at line {lines[-1]}" if lines else ""
-    said = f": {reason}" if str(reason) else ""
-    return SceneError(f"the scene {path} {what}{where}: {type(error).__name__}{said}")
+    kind = type(error).__name__
+    said = first_line(reason, LONGEST // 2)
+    return SceneError(f"the scene {path} {what}{where}: {kind}" + (f": {said}" if said != kind else ""))

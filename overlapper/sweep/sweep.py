@@ -57,11 +57,12 @@ class Sweep:
         limit: float | None = None,
         retry: bool = False,
         heard: Callable[[Progress], object] = lambda progress: None,
+        megabytes: int | None = None,
     ) -> Progress:
         """Do what is missing in the store, and with `retry` what has failed; `heard` is told of every task.
 
-        Tasks fail that raise, take longer than `limit` seconds, or end their process, and stop no other. NotStarted if
-        no task can be run, OSError if a part cannot be written.
+        Tasks fail that raise, take longer than `limit` seconds, take more memory than `megabytes`, or end their
+        process. They stop no other. NotStarted if no task can be run, OSError if a part cannot be written.
         """
         progress = Progress(len(self.tasks), before=len(self.tasks.keys() & store.done))
         missing = [task for name, task in self.tasks.items() if name not in store.done]
@@ -71,7 +72,7 @@ class Sweep:
         heard(progress)
         if not missing:
             return progress
-        job = Job(tasks.__name__, tasks.prepared.__name__, self.study)
+        job = Job(tasks.__name__, tasks.prepared.__name__, self.study, megabytes=megabytes)
         with closing(engine.outcomes(job, missing, limit)) as outcomes:
             for number, outcome in outcomes:
                 task = missing[number]
