@@ -24,6 +24,8 @@ from overlapper.simulation.naming import labels, link_names
 from overlapper.simulation.report import Report
 from overlapper.simulation.source import Source
 
+NOWHERE = "it has no finite pose within 1e25 m: the simulation has diverged"
+
 Which = TypeVar("Which", bound="AnyBodies")
 
 
@@ -250,7 +252,7 @@ class AnyBodies:
         return known[named]
 
     def _lost(self, id: int) -> Skipped:
-        return Skipped(id, BASE, self._labels[id], "it has no finite pose: the simulation has diverged", True)
+        return Skipped(id, BASE, self._labels[id], NOWHERE, diverged=True)
 
     def _arrange(self) -> None:
         bodies = self._source.bodies
@@ -266,6 +268,6 @@ class AnyBodies:
         self._grounds.follow(self._layout, placed)
 
     def _pose(self) -> set[int]:
-        """Place all bodies; those that have no finite pose."""
+        """Place all bodies; those that have no usable pose."""
         nowhere = self._layout.pose()
         return nowhere | self._left_out.pose() if self._nowhere else nowhere

@@ -13,6 +13,8 @@ from overlapper import Batch, Shape, _core
 from overlapper.shapes.table import facts
 from overlapper.simulation.model import BASE, Array, LinkKey, ModelledBody
 
+FARTHEST = 1e25  # m, beyond which the core measures nothing
+
 Pose = Sequence[Sequence[float]]
 """Begins with a position in m and a quaternion xyzw."""
 
@@ -70,14 +72,14 @@ class Layout:
         return np.array([_reach(self.shapes[row]) for row in rows])
 
     def pose(self) -> set[int]:
-        """Place the shapes where their colliders are now. Returns the bodies with a shape that has no finite pose."""
+        """Place the shapes where their colliders are now. Returns the bodies with a shape that has no usable pose."""
         self._read = self.poses.read()
         self.positions, self.orientations = _core.world_poses(
             self._read, self._places, self._local_positions, self._local_orientations
         )
-        if math.isfinite(self.positions.sum() + self.orientations.sum()):
+        if np.abs(self.positions).max(initial=0.0) < FARTHEST and math.isfinite(self.orientations.sum()):
             return set()
-        finite = np.isfinite(self.positions).all(axis=1) & np.isfinite(self.orientations).all(axis=1)
+        finite = (np.abs(self.positions) < FARTHEST).all(axis=1) & np.isfinite(self.orientations).all(axis=1)
         return {*self.owners[~finite].tolist()}
 
 

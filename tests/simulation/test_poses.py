@@ -75,7 +75,7 @@ def test_a_body_without_a_finite_pose_is_named_once_and_left_out_until_it_has_on
     lost = box(client, position=[5, 0, 0])
     bodies = Bodies(client)
     p.resetBasePositionAndOrientation(lost, *pose, physicsClientId=client)
-    with pytest.warns(SkippedShapeWarning, match=rf"box#{lost} \(body {lost}, .* no finite pose: .* diverged") as told:
+    with pytest.warns(SkippedShapeWarning, match=rf"box#{lost} \(body {lost}, .* no finite pose .* diverged") as told:
         bodies.update()
     assert len(told) == 1 and told[0].filename == __file__
     for _ in range(2):

@@ -1,5 +1,7 @@
 """Volumetric contact: forces from overlaps, in place of Bullet's contact points."""
 
+import warnings
+
 import numpy as np
 import pybullet
 import pytest
@@ -52,3 +54,57 @@ def test_a_falling_body_bounces_back_to_about_the_same_height(client, stiffness,
                 elif rising:
                     break
         assert 0.75 * height < rising[-1][0] < 1.15 * height
+
+
+@pytest.mark.parametrize("speed", [np.nan, 1e200])
+@pytest.mark.parametrize("substeps", ["auto", 3])
+def test_a_body_without_a_finite_velocity_has_no_contacts_and_the_others_go_on(client, speed, substeps):
+    """Of two stacks of a cube on a slab, the cube of the second is lost: the first goes on."""
+    heights = []
+    for lost in (False, True):
+        pybullet.resetSimulation(physicsClientId=client)
+        pybullet.setGravity(0, 0, -G, physicsClientId=client)
+        slab, cube = (
+            pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[side, side, 0.05], physicsClientId=client)
+            for side in (0.1, 0.05)
+        )
+        for x in (0, 1):
+            pybullet.createMultiBody(0, slab, -1, [x, 0, 0], physicsClientId=client)
+            pybullet.createMultiBody(1, cube, -1, [x, 0, 0.0999], physicsClientId=client)
+        contact = VolumetricContact(Bodies(client), substeps=substeps)
+        with contact, warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            for step in range(6):
+                if lost and step == 2:
+                    pybullet.resetBaseVelocity(3, [speed] * 3, physicsClientId=client)
+                contact.step()
+        heights.append(pybullet.getBasePositionAndOrientation(1, physicsClientId=client)[0])
+        pairs = contact.pairs[:, [0, 3]].tolist()
+        if lost:
+            words = [str(each.message) for each in told]
+            assert len(words) == 2 and words[0].startswith(
+                "box#3/link0 (body 3, link -1) has no contacts: its velocity is not finite"
+            )
+            assert words[1].startswith("box#3 (body 3, link -1) is left out")
+            assert pairs == [[0, 1]] and contact.on(3)[0].tolist() == [0, 0, 0]
+            assert [each.body for each in contact.bodies.skipped if each.diverged] == [3]
+        else:
+            assert pairs == [[0, 1], [2, 3]] and not told
+    assert heights[0] == pytest.approx(heights[1], abs=1e-6)
+
+
+def test_the_force_on_what_is_not_there_is_refused(client):
+    box = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
+    for x in (0, 0.5):
+        pybullet.createMultiBody(1, box, -1, [x, 0, 0], physicsClientId=client)
+    contact = VolumetricContact(Bodies(client))
+    with contact:
+        contact.step()
+    assert contact.on(1)[0].tolist() == contact.on(1, -1)[1].tolist() == [0, 0, 0]
+    for asked, sentence in (
+        ((99,), "there is no body 99 in the simulation"),
+        ((-5,), "there is no body -5 in the simulation"),
+        ((0, 7), "body 0 has no link 7"),
+    ):
+        with pytest.raises(ValueError, match=f"^{sentence}$"):
+            contact.on(*asked)

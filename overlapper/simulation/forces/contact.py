@@ -63,6 +63,8 @@ class VolumetricContact:
     are those of a whole step, too. Motors that were told before, unless a recorder has heard it, are as much stronger
     as substeps are shorter.
 
+    A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning; the others go on.
+
     What has no direction, as a body that lies wholly within another or goes through a plate, is pushed where it was
     pushed last, or along the least translation that frees it, with one NoDirectionWarning for each pair.
 
@@ -130,8 +132,8 @@ class VolumetricContact:
             while left > 1e-9 * duration:
                 if taken:
                     self._follow()
-                frequency2 = self._place()
-                velocity = self._masses.dynamics.velocity()
+                velocity, lost = self._velocity()
+                frequency2 = self._place(lost)
                 if not self._planned:
                     # Once in a step is enough for what comes; a length that changes within a swing costs energy.
                     highest = max(frequency2.max(initial=0.0), 0.0 if taken else self._coming(duration, velocity))
@@ -147,16 +149,17 @@ class VolumetricContact:
         finally:
             self._mechanics.stepped(duration)
         self.substeps = taken
-        self._others.left_at(self._masses.dynamics.velocity())
+        self._others.left_at(self._masses.velocity()[0])
         self._mechanics.announce()
 
     def forces(self) -> Forces:
         """The forces with which a step of the simulator would begin, without taking it: for scripts that integrate."""
         self._refresh()
-        frequency2 = self._place()
+        velocity, lost = self._velocity()
+        frequency2 = self._place(lost)
         duration = self.bodies.time_step
         substeps = self._planned or min(followed(frequency2.max(initial=0.0), duration), MOST_SUBSTEPS)
-        self._solve(duration / substeps, self._masses.dynamics.velocity(), frequency2)
+        self._solve(duration / substeps, velocity, frequency2)
         return self._found
 
     def mean(self) -> Forces:
@@ -210,7 +213,10 @@ class VolumetricContact:
         return self._found.slip
 
     def on(self, body: int, link: int | None = None) -> tuple[Array, Array]:
-        """Force (3,) in N and torque (3,) in N m about the world's origin, by all pairs, on a body or a link of it."""
+        """Force (3,) in N and torque (3,) in N m about the world's origin, by all pairs, on a body or a link of it.
+
+        ValueError if there is no such body or link.
+        """
         return self._found.on(body, link)
 
     def __len__(self) -> int:
@@ -251,9 +257,18 @@ class VolumetricContact:
         """The substeps that were asked for; 0 if that is left to the stiffness."""
         return 0 if self._substeps == "auto" else int(self._substeps)
 
-    def _place(self) -> Array:
-        """Give the solver what bodies share where they are; the squares of frequencies by row."""
+    def _velocity(self) -> tuple[Array, set[int]]:
+        """The velocities of all coordinates; the bodies that have none that is finite, which are told."""
+        velocity, lost = self._masses.velocity()
+        self._told.of_velocity(lost)
+        return velocity, lost
+
+    def _place(self, lost: set[int]) -> Array:
+        """Give the solver what all but the `lost` bodies share where they are; the squares of frequencies by row."""
         self._contacts = self.bodies.overlaps(pairs=self._among)
+        if lost:
+            of_lost = np.isin(self._contacts.keys[:, [0, 3]], [*lost]).any(axis=1)
+            self._contacts = self._contacts[np.flatnonzero(~of_lost)]
         self._frames = self._masses.dynamics.frames()
         solver = self._masses.dynamics.solver
         frequency2, self._stiffness = self._masses.place(solver, self._frames, self._contacts.overlaps)

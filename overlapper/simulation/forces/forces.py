@@ -64,8 +64,14 @@ class Forces(Tabular):
     def on(self, body: int, link: int | None = None) -> tuple[Array, Array]:
         """Force (3,) in N and torque (3,) in N m about the world's origin, by all pairs, on a body or a link of it.
 
-        Forces between links of a body cancel, unless one link is asked for.
+        Forces between links of a body cancel, unless one link is asked for. ValueError if there is no such body or
+        link.
         """
+        known = self.contacts.names
+        if not any(id == body for id, _ in known):
+            raise ValueError(f"there is no body {body} in the simulation")
+        if link is not None and (body, link) not in known:
+            raise ValueError(f"body {body} has no link {link}")
         force, moment = np.zeros(3), np.zeros(3)
         keys, centre = self.pairs, np.nan_to_num(self.centre)
         for first, sign in ((0, 1.0), (3, -1.0)):

@@ -11,7 +11,7 @@ from overlapper._core import ContactSolver
 from overlapper.simulation.asked_pairs import Among
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.forces.parameter import Layers
-from overlapper.simulation.layout import Pose
+from overlapper.simulation.layout import FARTHEST, Pose
 from overlapper.simulation.mechanics import Mechanics
 from overlapper.simulation.model import Array
 
@@ -40,6 +40,20 @@ class Masses:
         """
         layers = self._layers.of(self._links[found.pairs], self.dynamics)
         return solver.place(frames, found, self._links, *layers), layers[0]
+
+    def velocity(self) -> tuple[Array, set[int]]:
+        """The velocities of all coordinates, 0 where they are not finite; the bodies that such velocities move."""
+        velocity = self.dynamics.velocity()
+        finite = np.abs(velocity) < FARTHEST
+        if finite.all():
+            return velocity, set()
+        bodies = self._bodies
+        positions, orientations = self.dynamics.solver.ahead(
+            bodies.time_step, velocity, self._links, bodies.positions, bodies.orientations
+        )
+        known = np.asarray((np.abs(positions) < FARTHEST).all(axis=1) & np.isfinite(orientations).all(axis=1))
+        lost = {body for (body, _, _), placed in zip(self.keys, known.tolist()) if not placed}
+        return np.where(finite, velocity, 0.0), lost
 
     def ahead(self, duration: float, velocity: Array, among: Among) -> Overlaps:
         """The overlaps after a duration (s) in which all coordinates go on with that velocity."""

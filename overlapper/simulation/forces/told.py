@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.simulation.bodies import AnyBodies
-from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning
+from overlapper.simulation.cautions import NoDirectionWarning, SkippedShapeWarning, SubstepsWarning
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.model import Array, LinkKey
 
 
 class Told:
-    """The pairs of links that users were warned of. Warnings name the line that calls the caller's caller."""
+    """The pairs of links and the bodies that users were warned of.
+
+    Warnings name the line that calls the caller's caller.
+    """
 
     def __init__(self, bodies: AnyBodies) -> None:
         self._bodies = bodies
         self._known: set[tuple[type[Warning], LinkKey, LinkKey]] = set()
+        self._lost: set[int] = set()
 
     def of_substeps(
         self, contacts: Contacts, damped: NDArray[np.bool_], frequency2: Array, duration: float, substeps: int
@@ -43,6 +47,18 @@ class Told:
                 f"{a} and {b} share a volume without a side to push to, as one lies within the other "
                 "or goes through it; they are pushed as they were last",
                 NoDirectionWarning,
+                stacklevel=4,
+            )
+
+    def of_velocity(self, lost: Iterable[int]) -> None:
+        """Warn of the bodies that have no finite velocity."""
+        for body in sorted(set(lost) - self._lost):
+            self._lost.add(body)
+            link, name = next((link, name) for (id, link), name in sorted(self._bodies.names.items()) if id == body)
+            warnings.warn(
+                f"{name} (body {body}, link {link}) has no contacts: its velocity is not finite, as the simulation has "
+                "diverged",
+                SkippedShapeWarning,
                 stacklevel=4,
             )
 
