@@ -15,7 +15,7 @@ from typing import BinaryIO, NoReturn, TextIO
 from overlapper.jobs.worker import NotStarted
 from overlapper.printable import first_line, printable
 from overlapper.scenes.scene import SceneError, engine_in, find_scene
-from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning
+from overlapper.simulation.cautions import NoDirectionWarning, SubstepsWarning, UnknownBodyWarning
 from overlapper.simulation.engine import engine
 
 LIBC = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
@@ -78,13 +78,13 @@ def quiet() -> Iterator[BinaryIO]:
     """Keeps stdout for the answer: what Python prints goes to stderr, what C prints (as pybullet) to the file given."""
     with tempfile.TemporaryFile() as noise, redirect_stdout(sys.stderr), warnings.catch_warnings(), diverted(1, noise):
         warnings.simplefilter("ignore", UserWarning)  # of shapes left out: the summary names them
-        _tell_of_forces()
+        _tell_some_warnings()
         yield noise
 
 
-def _tell_of_forces() -> None:
-    """Write the warnings of volumetric contact to stderr, a sentence each."""
-    told, others = (NoDirectionWarning, SubstepsWarning), warnings.showwarning
+def _tell_some_warnings() -> None:
+    """Write the warnings of volumetric contact, and of names of no bodies, to stderr, a sentence each."""
+    told, others = (NoDirectionWarning, SubstepsWarning, UnknownBodyWarning), warnings.showwarning
     for category in told:
         warnings.simplefilter("always", category)
 

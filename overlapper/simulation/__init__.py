@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         SelfCollisionWarning,
         SkippedShapeWarning,
         SubstepsWarning,
+        UnknownBodyWarning,
     )
     from overlapper.simulation.contacts import Contact, Contacts
     from overlapper.simulation.forces.contact import VolumetricContact
@@ -46,6 +47,7 @@ __all__ = [
     "SkippedShapeWarning",
     "SubstepsWarning",
     "Surface",
+    "UnknownBodyWarning",
     "VolumetricContact",
     "link_contacts",
 ]
@@ -59,7 +61,13 @@ __getattr__ = lazily(
         "contacts": ("Contact", "Contacts"),
         "model": ("Decomposed", "Skipped"),
         "settings": ("Concave", "Surface"),
-        "cautions": ("NoDirectionWarning", "SelfCollisionWarning", "SkippedShapeWarning", "SubstepsWarning"),
+        "cautions": (
+            "NoDirectionWarning",
+            "SelfCollisionWarning",
+            "SkippedShapeWarning",
+            "SubstepsWarning",
+            "UnknownBodyWarning",
+        ),
         "forces.contact": ("VolumetricContact",),
         "forces.forces": ("Forces",),
         "links": ("LinkContact", "LinkContacts", "link_contacts"),

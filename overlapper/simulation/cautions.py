@@ -5,6 +5,10 @@ class SkippedShapeWarning(UserWarning):
     """A shape of the simulation is not modelled: its overlaps are not found."""
 
 
+class UnknownBodyWarning(UserWarning):
+    """A body is named that is not in the simulation."""
+
+
 class SelfCollisionWarning(UserWarning):
     """pybullet keeps links of a body apart that are no pair here: their overlaps are not looked for."""
 

@@ -25,10 +25,10 @@ class Log:
                 bodies.update()
                 log.add(bodies.overlaps())
 
-    `path` ends in .csv, .parquet or .sqlite. `per` says what a row is of: "shape", two shapes, or "link", two links as
-    a whole. `forces` says whether there are columns of forces, which `add` is given then. The heading has the versions
-    of this package and of the simulator, and what `bodies` was told of surfaces and concave meshes. `settings` are what
-    else is worth knowing, as `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
+    `path` ends in .csv, .parquet or .sqlite; its folder is made if there is none. `per` says what a row is of: "shape",
+    two shapes, or "link", two links as a whole. `forces` says whether there are columns of forces, which `add` is given
+    then. The heading has the versions of this package and of the simulator, and what `bodies` was told of surfaces and
+    concave meshes. `settings` are what else is worth knowing, as `Log("run.csv", bodies, tolerance=1e-6, mu=0.5)`.
 
     A step is on disk when `add` returns. The table grows beside its place, as `run.unfinished.csv`, and takes it at the
     end of the `with`, or by `close()`, also if Ctrl-C or sys.exit() ends the loop. It stays where it is after an error,
@@ -49,6 +49,7 @@ class Log:
     ) -> None:
         if not isinstance(bodies, AnyBodies):
             raise ValueError(f"bodies must be the Bodies of a simulation, not {bodies!r}")
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
         self.steps = 0
         """The number of the last step added."""
         self.unfinished: Path | None = None

@@ -5,7 +5,7 @@ import pybullet as p
 import pytest
 from simulated import DATA, box
 
-from overlapper.simulation import Bodies, Recorder
+from overlapper.simulation import Bodies, Recorder, UnknownBodyWarning
 from overlapper.simulation.naming import body_name
 
 
@@ -77,11 +77,14 @@ def test_without_a_recorder_meshes_and_shapes_say_what_a_body_is(client):
 def test_a_given_name_is_used_everywhere(client):
     crates = [box(client, position=[0.9 * x, 0, 0]) for x in range(3)]
     names = {crates[0]: "crate", np.int64(crates[1]): "crate", 99: "of nobody yet"}
-    bodies = Bodies(client, names=names)
+    with pytest.warns(
+        UnknownBodyWarning, match=r"^names has bodies that are not in the simulation: 99: 'of nobody yet'$"
+    ):
+        bodies = Bodies(client, names=names)
     assert set(bodies.names.values()) == {"crate#0/link0", "crate#1/link0", "box/link0"}
     assert [(each.bodyA, each.bodyB) for each in bodies.overlaps(pairs=[("crate#1", "box")])] == [(1, 2)]
     p.resetBasePositionAndOrientation(crates[0], [np.nan] * 3, [0, 0, 0, 1], physicsClientId=client)
-    with pytest.warns(UserWarning, match=r"^crate \(body 0"):
+    with pytest.warns(UserWarning, match=r"^crate#0 \(body 0"):
         bodies.update()
 
 

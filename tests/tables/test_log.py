@@ -33,6 +33,12 @@ def build(client):
 '''
 
 
+def test_the_folder_of_a_log_is_made(client, tmp_path):
+    with Log(tmp_path / "new" / "folder" / "own.csv", Bodies(client)) as log:
+        assert log.steps == 0
+    assert [each.name for each in (tmp_path / "new" / "folder").iterdir()] == ["own.csv"]
+
+
 @pytest.fixture
 def two_boxes(client):
     """Bodies that share 0.1 m in x."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
+
+import numpy as np
 
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.bullet.recorder import Recorder
 from overlapper.simulation.bullet.source import BulletSource
+from overlapper.simulation.cautions import UnknownBodyWarning
 from overlapper.simulation.naming import named
 from overlapper.simulation.settings import Concave, Modelling, Surface
 
@@ -43,8 +47,9 @@ class Bodies(AnyBodies):
     Height fields that a recorder has noted are modelled as the prisms below their triangles, near what may meet them;
     behind what moves away they are released. `report()` counts all triangles, and as read those modelled.
 
-    A body is called by the `names` given, by its number; else by the stem of its file, which a recorder hears, by the
-    name of its robot, or by its mesh or kind of shape, whichever says most.
+    A body is called by the `names` given, by its number; an UnknownBodyWarning names those that are not there yet.
+    Other bodies are called by the stem of their file, which a recorder hears, by the name of their robot, or by their
+    mesh or kind of shape, whichever says most.
 
     That a body collides with itself, and no recorder has heard of it, is seen in pybullet's contact points. overlaps()
     says so with one SelfCollisionWarning.
@@ -57,7 +62,8 @@ class Bodies(AnyBodies):
     them apart. Bodies that another process adds to a shared simulation are noticed after `pybullet.syncBodyInfo()`. To
     those that loadBullet brings pybullet gives no ids; they are counted in `skipped`.
 
-    ValueError if `physicsClientId` is not connected, the recorder is of another client, or a name is invalid.
+    TypeError if `physicsClientId` is no whole number. ValueError if it is not connected, the recorder is of another
+    client, or a name is invalid.
     RuntimeError if the physics server writes where this process cannot read.
     """
 
@@ -71,12 +77,18 @@ class Bodies(AnyBodies):
         recorder: Recorder | None = None,
         names: Mapping[int, str] | None = None,
     ) -> None:
+        if not isinstance(physicsClientId, int | np.integer):
+            raise TypeError(f"physicsClientId must be what pybullet.connect() returned, not {physicsClientId!r}")
         if recorder and recorder.physicsClientId != physicsClientId:
             raise ValueError(f"recorder is of client {recorder.physicsClientId}, not of {physicsClientId}")
         self.physicsClientId = physicsClientId
         self._recorder = recorder
         modelling = Modelling(concave, concave_threshold, surface)
-        super().__init__(BulletSource(physicsClientId, modelling, recorder, named(names)))
+        given = named(names)
+        super().__init__(BulletSource(physicsClientId, modelling, recorder, given))
+        if strange := sorted(given.keys() - self._source.bodies.keys()):
+            told = ", ".join(f"{body}: {given[body]!r}" for body in strange)
+            warnings.warn(f"names has bodies that are not in the simulation: {told}", UnknownBodyWarning, stacklevel=2)
 
     @property
     def recorder(self) -> Recorder | None:

@@ -32,6 +32,13 @@ def test_a_client_that_was_never_connected_is_named():
         Bodies(17)
 
 
+def test_what_is_no_client_is_refused_and_leaves_nothing_behind():
+    program = "from overlapper.simulation import Bodies\ntry: Bodies('x')\nexcept TypeError as error: print(error)\n"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout == "physicsClientId must be what pybullet.connect() returned, not 'x'\n"
+    assert "ignored" not in done.stderr
+
+
 def test_a_client_that_takes_over_an_id_is_read_afresh(client):
     box(client)
     bodies = Bodies(client)
