@@ -110,15 +110,16 @@ $(VENV)/run $(VENV)/dev: pyproject.toml | $(VENV)/built
 # Another build of the core in its own environment, by the name of its CMake option. A .pth file adds the packages of
 # $(VENV). Python does not read .pth files in that folder, so the package itself is not found there. Only clang has
 # libFuzzer.
-build/coverage/dev: OPTION := OVERLAPPER_COVERAGE
-build/sanitized/dev: OPTION := OVERLAPPER_MORE_SHAPES=$(CURDIR)/$(CONE);OVERLAPPER_SANITIZE
-build/sanitized/dev: COMPILER := CC=clang CXX=clang++
+build/coverage/dev: OPTION := OVERLAPPER_COVERAGE=ON
+build/sanitized/dev: OPTION := OVERLAPPER_MORE_SHAPES=$(CURDIR)/$(CONE);OVERLAPPER_SANITIZE=address,undefined
+build/threads/dev: OPTION := OVERLAPPER_SANITIZE=thread
+build/sanitized/dev build/threads/dev: COMPILER := CC=clang CXX=clang++
 build/sanitized/dev: $(CONE)
-build/coverage/dev build/sanitized/dev: build/%/dev: $(VENV)/dev $(VENV)/built
+build/coverage/dev build/sanitized/dev build/threads/dev: build/%/dev: $(VENV)/dev $(VENV)/built
 	@$(VENV)/bin/python -m venv build/$*/venv
 	@$(VENV)/bin/python -c 'import sys; print(*(path for path in sys.path if path.endswith("site-packages")), sep="\n")' \
 	  >"$$(build/$*/venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/others.pth"
-	@$(COMPILER) SKBUILD_CMAKE_DEFINE="$(if $(SKBUILD_CMAKE_DEFINE),$(SKBUILD_CMAKE_DEFINE);)$(OPTION)=ON" \
+	@$(COMPILER) SKBUILD_CMAKE_DEFINE="$(if $(SKBUILD_CMAKE_DEFINE),$(SKBUILD_CMAKE_DEFINE);)$(OPTION)" \
 	  SKBUILD_BUILD_DIR=build/$*/native build/$*/venv/bin/python -m pip install --quiet --disable-pip-version-check \
 	  --no-deps --editable .
 	@touch $@

@@ -272,7 +272,7 @@ def _check_columns(path: Path, columns: Sequence[str]) -> None:
     if not columns:
         raise ValueError(f"{path} is not a table of overlaps: it has no columns")
     if strangers or lacking or len(set(columns)) < len(columns):
-        words = f"a column {min(strangers)!r}" if strangers else f"no column {lacking[0]!r}" if lacking else "one twice"
+        words = f"a column {min(strangers)[:60]!r}" if strangers else f"no column {lacking[0]!r}" if lacking else "one twice"
         raise ValueError(f"{path} is not a table of overlaps: it has {words}")
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from overlapper import Shape
 from overlapper.polytopes.shape_text import shape_of, text_of
+from overlapper.printable import printable
 from overlapper.tables.still import Still
 from overlapper.tables.table import COLUMNS, Key, Row
 from overlapper.tables.table import FORCES as FORCE_COLUMNS
@@ -152,13 +153,13 @@ def budgets_in(metadata: Mapping[str, str], path: Path) -> dict[str, Budget]:
             continue
         name = heading.removeprefix("budget ")
         if name not in (known := ROUNDING | DRIFT | FORCES):
-            raise ValueError(f"{path} has a budget of {name!r}, which is none of {', '.join(known)}")
+            raise ValueError(f"{path} has a budget of {name[:60]!r}, which is none of {', '.join(known)}")
         try:
             relative, absolute = map(float, parts.groups())
         except ValueError:
             relative = math.nan
         if not (relative >= 0 and absolute >= 0):
-            told = " and ".join(parts.groups())
+            told = printable(" and ".join(parts.groups())[:60])
             raise ValueError(f"{path} has a budget of {name} that is not two numbers from 0: {told}")
         budgets[name] = Budget(relative, absolute)
     return budgets
