@@ -4,6 +4,8 @@ VENV := .venv
 PYTEST := $(VENV)/bin/pytest
 SCENE := franka_grasp
 FUZZ := -max_total_time=60
+# Of the core: overlaps, batches, and the threads of batches under ThreadSanitizer; of Python: readers of files.
+FUZZERS := overlap batch threads tables expected meshes
 MUTANTS := --seed 0 --count 200
 # A kind of shape that joins the sanitized core alone, to show that one header is enough.
 CONE := tests/native/shapes/cone.h
@@ -61,11 +63,29 @@ coverage-core: build/coverage/dev ## report the lines of the core that its own t
 mutants: $(VENV)/dev ## change one operator at a time, report which changes no test notices and what was left out
 	@$(VENV)/bin/python tests/native/mutants.py $(MUTANTS)
 
+fuzz: $(FUZZERS:%=fuzz-%) ## give the core and the readers of files inputs that reach new places, FUZZ=-max_total_time=60 s each
+
 # Inputs that reach new code are kept in build/fuzz/corpus. A failing input is written to build/fuzz.
-fuzz: build/sanitized/dev ## give the sanitized core inputs that reach new places, for FUZZ=-max_total_time=60 seconds
-	@mkdir -p build/fuzz/corpus
-	@build/sanitized/native/fuzz_overlap $(FUZZ) -timeout=20 -max_len=600 -len_control=0 -print_final_stats=1 \
-	  -verbosity=0 -artifact_prefix=build/fuzz/ build/fuzz/corpus overlapper/native/fuzz/corpus
+FUZZING = $(FUZZ) -timeout=20 -print_final_stats=1 -verbosity=0 -artifact_prefix=build/fuzz/$@- build/fuzz/corpus/$@
+fuzz-overlap fuzz-batch: fuzz-%: build/sanitized/dev | build/fuzz/corpus/fuzz-%
+	@build/sanitized/native/fuzz_$* $(FUZZING) -max_len=600 -len_control=0 overlapper/native/fuzz/corpus/$*
+
+fuzz-threads: build/threads/dev | build/fuzz/corpus/fuzz-threads
+	@build/threads/native/fuzz_batch $(FUZZING) -max_len=600 -len_control=0 overlapper/native/fuzz/corpus/batch
+
+# The sanitizer's library has empty functions of libFuzzer, so libFuzzer must come first. CPython frees little at exit.
+# The hash seed makes a run with a seed of libFuzzer the same every time.
+fuzz-tables fuzz-expected fuzz-meshes: fuzz-%: build/sanitized/native/libfuzzer.so | build/fuzz/corpus/fuzz-%
+	@LD_PRELOAD="$$PWD/$< $$(clang++ -print-file-name=libclang_rt.asan-x86_64.so) $$(clang++ -print-file-name=libstdc++.so.6)" \
+	  ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0 PYTHONHASHSEED=0 build/sanitized/venv/bin/python \
+	  tests/fuzz/readers.py $* $(FUZZING) -rss_limit_mb=1500 tests/fuzz/corpus/$*
+
+build/sanitized/native/libfuzzer.so: build/sanitized/dev
+	@clang++ -shared -o $@ -Wl,--whole-archive $$(clang++ -print-file-name=libclang_rt.fuzzer_no_main-x86_64.a) \
+	  -Wl,--no-whole-archive
+
+build/fuzz/corpus/%:
+	@mkdir -p $@
 
 pictures: $(VENV)/dev ## make the pictures of README and docs again, of which something has changed
 	@$(VENV)/bin/python docs/pictures.py

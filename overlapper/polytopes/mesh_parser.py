@@ -165,12 +165,24 @@ def _must_fit(path: Path) -> None:
 
 
 def _gltf(path: Path) -> Any:
-    """The JSON of a glTF scene, which in .glb is the first chunk."""
+    """The JSON of a glTF scene, which in .glb is the first chunk. ValueError if a chunk is longer than the file."""
     data = path.read_bytes()
-    if path.suffix.lower() == ".glb":
-        (length,) = struct.unpack_from("<I", data, 12)
-        data = data[20 : 20 + length]
-    return json.loads(data)
+    if path.suffix.lower() != ".glb":
+        return json.loads(data)
+    (first, end), *_ = list(_chunks(data))
+    return json.loads(data[first:end])
+
+
+def _chunks(data: bytes) -> Iterator[tuple[int, int]]:
+    """Where the chunks of a .glb file begin and end."""
+    (total,) = struct.unpack_from("<I", data, 8)
+    end = 12
+    while end < total:
+        (length,) = struct.unpack_from("<I", data, end)
+        begin, end = end + 8, end + 8 + length
+        if end > len(data):
+            raise ValueError(f"it has a chunk of {length:,} bytes, and room for {len(data) - begin:,}")
+        yield begin, end
 
 
 def _must_be_there(path: Path, scene: Any, size: int) -> None:

@@ -272,7 +272,8 @@ def _check_columns(path: Path, columns: Sequence[str]) -> None:
     if not columns:
         raise ValueError(f"{path} is not a table of overlaps: it has no columns")
     if strangers or lacking or len(set(columns)) < len(columns):
-        words = f"a column {min(strangers)[:60]!r}" if strangers else f"no column {lacking[0]!r}" if lacking else "one twice"
+        stranger = min(strangers, default="")[:60]
+        words = f"a column {stranger!r}" if strangers else f"no column {lacking[0]!r}" if lacking else "one twice"
         raise ValueError(f"{path} is not a table of overlaps: it has {words}")
 
 
@@ -524,7 +525,7 @@ def _opened_sqlite(path: Path) -> Iterator[sqlite3.Connection]:
                 raise ValueError(sound if sound != "ok" else "the last page of the database was cut")
             kinds = dict(connection.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'"))
             for name in ("overlaps", "metadata"):
-                if not re.match(r"(?i)create\s+table\b", kinds.get(name) or ""):
+                if not re.match(r"(?i)create\s+table\b", str(kinds.get(name))):
                     raise ValueError(f"it has no table {name!r}")
             yield connection
     except (sqlite3.Error, ValueError, OverflowError) as error:

@@ -181,6 +181,8 @@ def _stills(content: Content) -> dict[int, Still]:
             users, _, words = said.popleft()[1].removeprefix(SHAPES).partition(": ")
             shape = shape_of(words)
             known |= {_key(user): shape for user in users.split()}
+        if step in stills:
+            raise ValueError(f"the rows of step {step} are not all together")
         try:
             stills[step] = Still.recorded(rows, known)
         except KeyError as error:

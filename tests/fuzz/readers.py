@@ -1,6 +1,6 @@
 """Fuzzers of readers: a file with any bytes is read, or refused in one sentence that names the file.
 
-    python tests/fuzz/readers.py tables|expected|meshes [options of libFuzzer] CORPUS...
+    make fuzz FUZZERS="tables expected meshes"
 
 The first letter of an input is the form of the file, the rest is its content. atheris sees which lines of Python an
 input reaches. With OVERLAPPER_FUZZ_PRINT set, each answer is printed.
@@ -19,7 +19,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import atheris
+import atheris  # libFuzzer itself comes by LD_PRELOAD, beside AddressSanitizer
+
+# atheris cannot see into modules from the finder of an editable installation, so the finder is the last to be asked. It
+# still finds the core.
+sys.meta_path.sort(key=lambda finder: "ScikitBuild" in type(finder).__name__)
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 with atheris.instrument_imports(include=["overlapper", "trimesh"]):
     from overlapper.polytopes import mesh_file
@@ -153,6 +158,7 @@ def main(arguments: list[str]) -> None:
             print(said)
         return -1 if said is None else 0  # such an input joins no corpus
 
+    mesh_file.confined = lambda parse, *arguments: parse(*arguments)  # not in another process, where nobody counts
     warnings.simplefilter("ignore")
     logging.disable()  # of trimesh
     atheris.Setup([arguments[0], *arguments[2:]], ask)

@@ -198,6 +198,15 @@ def test_a_scene_that_counts_numbers_that_are_nowhere_is_refused(tmp_path):
     assert refusal(tmp_path / "x.glb").startswith("it counts 400,000,000 numbers in ")
 
 
+def test_a_chunk_that_is_longer_than_its_file_is_refused(written, tmp_path):
+    whole = bytearray(written["glb"])
+    (first,) = struct.unpack_from("<I", whole, 12)
+    room = len(whole) - 28 - first  # behind the two heads of the file, and those of two chunks
+    struct.pack_into("<I", whole, 20 + first, 4_000_000_000)
+    (tmp_path / "x.glb").write_bytes(whole)
+    assert refusal(tmp_path / "x.glb") == f"it has a chunk of 4,000,000,000 bytes, and room for {room}"
+
+
 def test_numbers_in_a_file_beside_the_scene_are_there(tmp_path):
     (tmp_path / "x.bin").write_bytes(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32).tobytes())
     (tmp_path / "x.gltf").write_text(json.dumps(scene(3, uri="x.bin")))

@@ -112,6 +112,48 @@ def test_an_invalid_shape_is_refused_in_one_sentence(text, reason):
     assert shape_text.LARGEST < 60_000_000
 
 
+def sqlite_of_bytes(data):
+    """The database, with the statement that made its table as bytes in place of text."""
+    with closing(sqlite3.connect(data)) as connection, connection:
+        connection.execute("PRAGMA writable_schema = ON")
+        connection.execute("UPDATE sqlite_master SET sql = CAST(sql AS BLOB) WHERE name = 'metadata'")
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "reason"),
+    [
+        ("t.csv", (b"volume_m3", b"volume\x1b" + b"m" * 5000), "has a column 'volume"),
+        (
+            "expected.csv",
+            (b"budget volume: relative 1e-09", b"budget volume: relative 1\x1b\0"),
+            "two numbers from 0: 1",
+        ),
+        ("expected.csv", (b"budget volume", b"budget " + b"v" * 5000), "which is none of"),
+        ("expected.csv", (b"\n1,0,-1,0,2,", b"\n3,0,-1,0,2,"), "are not all together"),
+    ],
+)
+def test_a_refusal_is_short_and_can_be_printed(written, tmp_path, name, changes, reason):
+    """The rows of a step 3 come between those of step 1, and others of step 1 behind them."""
+    path = tmp_path / name
+    text = written[name].replace(*changes)
+    assert text != written[name]
+    first = text.index(b"# rows")
+    lines = (text[:first] + text[text.index(b"\n", first) + 1 :]).splitlines(keepends=True)
+    path.write_bytes(b"".join([*lines, lines[-4]]))
+    with pytest.raises(ValueError, match=reason) as refusal:
+        read_expected(path) if name == "expected.csv" else read_table(path)
+    said = str(refusal.value)
+    assert said.startswith(str(path)) and said.isprintable() and len(said) < len(str(path)) + 300
+
+
+def test_a_database_with_bytes_for_a_statement_is_refused(written, tmp_path):
+    path = tmp_path / "t.sqlite"
+    path.write_bytes(written["t.sqlite"])
+    sqlite_of_bytes(path)
+    with pytest.raises(ValueError, match=r"t\.sqlite is not a table of overlaps: "):
+        read_table(path)
+
+
 def test_a_database_with_cyclic_pages_is_refused(written, tmp_path):
     path = tmp_path / "t.sqlite"
     path.write_bytes(written["t.sqlite"])
