@@ -93,6 +93,18 @@ def test_concave_meshes_may_be_left_out_and_shallow_overlaps_passed_over(folder)
     assert table.sound
 
 
+def test_only_an_overlap_deeper_than_the_rounding_of_its_corners_counts(tmp_path):
+    """Corners 100 m off, written with six digits, are off by up to 0.506 mm in each coordinate, so parts by 1.75 mm."""
+    path = tmp_path / "pair.glb"
+    box = trimesh.creation.box((10, 10, 10))
+    for depth, counted in ((1.7e-3, 0), (1.8e-3, 1)):
+        pair = trimesh.Scene()
+        for name, at in (("left", 85), ("right", 95 - depth)):
+            pair.add_geometry(box, name, name, transform=trimesh.transformations.translation_matrix([at, 0, 0]))
+        pair.export(path)
+        assert len(read_asset(tmp_path, path, "m", 0.0, Modelling()).overlaps) == counted
+
+
 def test_an_error_in_one_asset_does_not_stop_the_others(folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "pybullet", None)
     table = read_asset(folder, folder / "robots" / "table.urdf", "mm", 0.0, Modelling())

@@ -257,6 +257,12 @@ def test_a_threshold_that_coacd_cannot_take_is_named(threshold):
         decompose(bent(), threshold=threshold)
 
 
+@pytest.mark.parametrize("threshold", [0.01, 1])
+def test_the_least_and_the_largest_threshold_are_taken(coacd_is, threshold):
+    coacd_is(SAW)
+    assert len(decompose(bent(), threshold=threshold).parts) == 2
+
+
 def test_triangles_of_another_shape_are_named():
     with pytest.raises(ValueError, match=r"triangles must have the shape \(t, 3, 3\)"):
         decompose(CORNERS)

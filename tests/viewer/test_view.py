@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -238,6 +239,23 @@ def test_a_ball_in_the_ground_is_pictured_with_the_plane_around_it(tmp_path):
 def test_a_playback_without_views_has_nothing_to_see():
     with pytest.raises(ValueError, match=r"^there is nothing to see: no step was simulated or recorded$"):
         largest(iter(()))
+
+
+def test_the_view_of_the_largest_overlap_is_kept_or_the_last_if_nothing_ever_overlaps():
+    @dataclass
+    class Seen:
+        volumes: tuple[float, ...]
+
+        @property
+        def contacts(self):
+            return [SimpleNamespace(overlap=SimpleNamespace(volume=volume)) for volume in self.volumes]
+
+        def kept(self):
+            return self
+
+    views = [Seen(volumes) for volumes in ((), (2.0,), (1.0, 1.5), (2.5,), (0.0,), ())]
+    assert largest(iter(views)) is views[2]
+    assert largest(iter([views[0], views[4], views[5]])) is views[5]
 
 
 def test_the_first_step_in_which_a_pair_overlaps_is_on_the_page_at_any_rate(scene_file, tmp_path):
