@@ -425,7 +425,7 @@ def test_rigid_motion_moves_the_answer_along(bodies, translation, q):
 def scaled(body, size):
     shape = body.shape
     larger = Box(shape.half_extents * size) if isinstance(shape, Box) else Hull(shape.vertices * size)
-    return Placed(larger, body.position * size, body.orientation)
+    return Placed(larger, body.position * size, body.given_orientation)
 
 
 @pytest.mark.parametrize("size", [1e-3, 2.0**-3, 1e3])
@@ -439,6 +439,24 @@ def test_every_measure_has_its_power_of_the_scale(size, a, b):
     assert_allclose(other.inertia, one.inertia * size**5, rtol=1e-8, atol=1e-9 * np.trace(one.inertia) * size**5)
     if size == 2.0**-3:  # nothing is rounded
         assert len(other.facets) == len(one.facets)
+
+
+@pytest.mark.parametrize("size", [2.0**-20, 2.0**20])
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_a_power_of_two_scales_the_error_and_leaves_the_way_as_it_is(size, count):
+    """No bound has a length of its own: nothing is rounded by such a scale, whatever the way."""
+    rng = np.random.default_rng(count)
+    ways = set()
+    for _ in range(20):
+        bodies = [
+            Placed(Box(rng.uniform(0.5, 1, 3)), rng.normal(size=3) * 0.3, rng.normal(size=4)) for _ in range(count)
+        ]
+        one, other = overlap(*bodies), overlap(*(scaled(body, size) for body in bodies))
+        ways.add(one.way)
+        assert (other.way, other.volume, other.volume_error) == (
+            one.way, one.volume * size**3, one.volume_error * size**3
+        )  # fmt: skip
+    assert "clipping" in ways
 
 
 @given(st.lists(placed(polyhedra), min_size=2, max_size=5))
