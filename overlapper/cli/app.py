@@ -33,6 +33,9 @@ def main() -> NoReturn:
     except Interrupted:
         say("overlapper: interrupted; nothing was written", sys.stderr)
         sys.exit(130)
+    except (KeyboardInterrupt, typer.Abort):
+        say("overlapper: interrupted", sys.stderr)
+        sys.exit(130)
     except Refused as error:
         give_up(str(error))
     except MemoryError:

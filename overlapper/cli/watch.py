@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -34,11 +34,16 @@ def watch(
     script: Annotated[
         Path, typer.Argument(help="A Python script that steps pybullet.", show_default=False, metavar="SCRIPT.py")
     ],
+    context: typer.Context,
     arguments: Annotated[
         list[str] | None, typer.Argument(help="Arguments of the script.", show_default=False, metavar="[ARGS]...")
     ] = None,
     *,
     every: Annotated[int, typer.Option(min=1, help="Steps from one that is measured to the next.")] = 1,
+    names: Annotated[
+        list[str] | None,
+        typer.Option("--name", metavar="BODY=NAME", help="A name for a body by its number; may be repeated."),
+    ] = None,
     files: Written,
     asked: Asking,
     modelled: Modelling,
@@ -52,7 +57,8 @@ def watch(
     Options of the watch stand before the script, those of the script behind it. Its output, its arguments, its exit
     code and Ctrl-C are as without the watch, whose own words go to stderr when the script has ended. Each client that
     the script steps is a simulation with a table of its own: the second is in FILE-2. The exit code is 2 where the
-    script's would be 0 and something could not be measured or written.
+    script's would be 0 and something was not measured or written: nothing at all, shapes that are not modelled, bodies
+    that have diverged, or steps in other processes.
 
     Examples:
 
@@ -60,12 +66,15 @@ def watch(
 
     [bold]overlapper watch --out run.parquet --html run.html --every 10 my_script.py[/bold]  and files, every tenth step
 
+    [bold]overlapper watch --name 1=gripper --name 2=cup my_script.py[/bold]  bodies by names of your own
+
     [bold]overlapper watch --direct my_script.py[/bold]  a script that opens a window, on a machine without a screen
     """
     if not script.is_file():
         raise Refused(f"there is no script {script}")
     asked = replace(asked, pairs=asked.pairs or "simulated")
     how = {"every": every, **settings_of(asked, modelled), "per": files.per, "check": files.check}
+    how["names"] = _named(names or ())
     try:
         from overlapper.reference import Fcl
         from overlapper.scenes.watching import Watches
@@ -88,11 +97,41 @@ def watch(
         sentence = f"{script} asks pybullet for a window, and there is no screen to show it on, so pybullet ends it"
         tell_of_windows(lambda: say(f"overlapper: {sentence}: --direct runs it without one", sys.stderr))
     # An exception that ends the script must not be mistaken for one of ours.
-    return lambda: _run(script, arguments or [], Watches(script.name, files.out, files.html, how), how, as_json)
+    astray = _astray(context, arguments or [])
+    watches = Watches(script.name, files.out, files.html, how)
+    return lambda: _run(script, arguments or [], astray, watches, how, as_json)
 
 
-def _run(script: Path, arguments: list[str], watches: Watches, how: Mapping[str, Any], as_json: bool) -> int:
+def _named(given: Sequence[str]) -> dict[int, str]:
+    """The names of --name by the numbers of bodies."""
+    names: dict[int, str] = {}
+    for each in given:
+        number, _, name = each.partition("=")
+        if not (number.isascii() and number.isdigit() and name.strip()):
+            raise Refused(f"--name must be BODY=NAME, such as 3=duck, not {each!r}")
+        if int(number) in names:
+            raise Refused(f"--name says {number} twice")
+        names[int(number)] = name
+    return names
+
+
+def _astray(context: typer.Context, arguments: Sequence[str]) -> list[str]:
+    """Options of ours among the arguments of the script, of those that do not stand before it as well."""
+    ours = {option for each in context.command.params for option in each.opts if option.startswith("--")}
+    before = {each.partition("=")[0] for each in sys.argv[: len(sys.argv) - len(arguments)]}
+    return [name for each in arguments if (name := each.partition("=")[0]) in ours - before]
+
+
+def _run(
+    script: Path,
+    arguments: list[str],
+    astray: Sequence[str],
+    watches: Watches,
+    how: Mapping[str, Any],
+    as_json: bool,
+) -> int:
     from overlapper.scenes.script import end_as, run_script
+    from overlapper.scenes.watching import interrupted_later
 
     process = os.getpid()
     try:
@@ -102,18 +141,34 @@ def _run(script: Path, arguments: list[str], watches: Watches, how: Mapping[str,
         say(f"overlapper: {script}: {error.strerror}", sys.stderr)
         return 2
     if os.getpid() == process:
-        watches.end(failed=isinstance(ended, Exception))
         interrupted = isinstance(ended, KeyboardInterrupt)
-        with suppress(BrokenPipeError):
-            if not as_json:
-                _show(watches, interrupted)
-            _say_what_failed(script, watches)
-            if as_json:
-                _say_json(watches, how, not interrupted)
-    if watches.failed and (ended is None or (isinstance(ended, SystemExit) and not ended.code)):
+        try:
+            with interrupted_later():
+                watches.end(failed=isinstance(ended, Exception))
+            with suppress(BrokenPipeError):
+                _tell(watches, _not_watched(script, watches, how, astray), how, not interrupted, as_json)
+        except KeyboardInterrupt:
+            say("overlapper: interrupted; the files are written", sys.stderr)
+            ended = ended or SystemExit(130)
+    well = ended is None or (isinstance(ended, SystemExit) and not ended.code)
+    if well and os.getpid() == process and not watches.complete:
         return 2
     end_as(ended)
     return 0
+
+
+def _tell(watches: Watches, not_watched: Sequence[str], how: Mapping[str, Any], finished: bool, as_json: bool) -> None:
+    if not as_json:
+        _show(watches, not finished)
+    for sentence in not_watched:
+        say(f"overlapper: {sentence}", sys.stderr)
+    if as_json:
+        simulations = [
+            watch.summary.as_dict() | {"measured": watch.measured, "written": [str(path) for path in watch.written]}
+            for watch in watches.all
+        ]
+        told = {"settings": how, "simulations": simulations, "not_watched": not_watched, "finished": finished}
+        say(json.dumps(told), sys.stderr)
 
 
 def _show(watches: Watches, interrupted: bool) -> None:
@@ -138,25 +193,31 @@ def _show(watches: Watches, interrupted: bool) -> None:
         say(f"Interrupted after step {watches.all[-1].steps}; what came before is kept.", sys.stderr)
 
 
-def _say_json(watches: Watches, how: Mapping[str, Any], finished: bool) -> None:
-    simulations = [
-        watch.summary.as_dict() | {"measured": watch.measured, "written": [str(path) for path in watch.written]}
-        for watch in watches.all
-    ]
-    say(json.dumps({"settings": how, "simulations": simulations, "finished": finished}), sys.stderr)
-
-
-def _say_what_failed(script: Path, watches: Watches) -> None:
+def _not_watched(script: Path, watches: Watches, how: Mapping[str, Any], astray: Sequence[str]) -> list[str]:
+    """A sentence for all that was asked for and is not in the answer, but for shapes, which the summaries name."""
+    told = []
     for watch, error in watches.failed:
         kept = f"; what came before is in {' and '.join(map(str, watch.written))}" if watch.written else ""
         reason = first_line(error)
         if isinstance(error, OSError):
             reason = f"cannot write {error.filename or 'the results'}: {error.strerror or error}"
-        say(f"overlapper: {watch.summary.scene} was watched up to step {watch.steps}: {reason}{kept}", sys.stderr)
-    if watches.all or watches.failed:
-        return
+        told.append(f"{watch.summary.scene} was watched up to step {watch.steps}: {reason}{kept}")
+    if not (watches.all or watches.failed):
+        told.append(f"nothing was measured: {script} {_steps(watches)}")
+    if watches.stepped_elsewhere:
+        told.append(f"{script} stepped simulations in other processes, which are not watched")
+    for body, name in how["names"].items() if watches.all else ():
+        if all(body in watch.unnamed for watch in watches.all):
+            told.append(f"--name {body}={name}: there is no body {body}")
+    for name in dict.fromkeys(astray):
+        told.append(f"{name} stands behind {script}, and was an argument of it: options of the watch stand before it")
+    return told
+
+
+def _steps(watches: Watches) -> str:
     if watches.steps:
-        say(f"overlapper: nothing was measured: {script} made {watches.steps} steps, fewer than --every", sys.stderr)
-    else:
-        clock = ", and simulations in real time are not stepped by calls" if watches.in_real_time else ""
-        say(f"overlapper: nothing was measured: {script} never called pybullet.stepSimulation{clock}", sys.stderr)
+        return f"made {watches.steps} steps, fewer than --every"
+    if watches.stepped_elsewhere:
+        return "made no step in its own process"
+    clock = ", and simulations in real time are not stepped by calls" if watches.in_real_time else ""
+    return f"never called pybullet.stepSimulation in its own process{clock}"

@@ -8,6 +8,7 @@ import threading
 import warnings
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from mmap import mmap
 from pathlib import Path
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from overlapper.reference import Fcl
 from overlapper.simulation.asked_pairs import Among
 from overlapper.simulation.bodies import AnyBodies
-from overlapper.simulation.cautions import SelfCollisionWarning, SkippedShapeWarning
+from overlapper.simulation.cautions import SkippedShapeWarning, UnknownBodyWarning
 from overlapper.simulation.engine import Happening
 from overlapper.simulation.engine import engine as engine_of
 from overlapper.simulation.settings import Asking, Concave, Method, Modelling, Surface, settings_of
@@ -133,8 +134,8 @@ class Watch:
 
     def _measure(self) -> None:
         if self._bodies is None:
-            # The summary names what is left out. Only what is told here is not said.
-            for kind in (SkippedShapeWarning, SelfCollisionWarning):
+            # The summary names what is left out, and `unnamed` the names of no body.
+            for kind in (SkippedShapeWarning, UnknownBodyWarning):
                 warnings.filterwarnings("ignore", category=kind, module=rf"{__name__}$")
             self._bodies = self._simulation.bodies(**settings_of(self._modelling), names=self._names)
         else:
@@ -152,6 +153,12 @@ class Watch:
         settings = origin(bodies.engine) | watched | settings_of(self._asking) | bodies.settings
         files = outputs(self.summary, settings, self.written, self.out, self.html, self._per, self._fcl)
         return self._files.enter_context(files)
+
+    @property
+    def unnamed(self) -> dict[int, str]:
+        """The names given to bodies that were not in the simulation when it was last measured."""
+        there = {body for body, _ in self._bodies.names} if self._bodies else set()
+        return {body: name for body, name in (self._names or {}).items() if body not in there}
 
     def close(self) -> None:
         """End the watch: files are put in their places. OSError if one cannot be."""
@@ -200,14 +207,16 @@ class Watches:
         """The steps of all clients, measured or not."""
         self.in_real_time = False
         """Whether a simulation was let run by the clock."""
+        self._elsewhere = mmap(-1, 1)  # which forked processes write to
         self._of: dict[Hashable, Watch] = {}
         self._process = os.getpid()
         self._unlisten = engine_of("bullet").listen(self._hear)
 
     def _hear(self, happening: Happening, which: Hashable) -> None:
         if os.getpid() != self._process:
-            return
-        if happening == "began":
+            if happening == "stepped":
+                self._elsewhere[0] = 1
+        elif happening == "began":
             self._of[which] = _Kept(which, self._number, self.failed, name=self._name, **self._how)
         elif happening == "stepped":
             self.steps += 1
@@ -215,6 +224,17 @@ class Watches:
             self.in_real_time = True
         else:
             self._of.pop(which, None)
+
+    @property
+    def stepped_elsewhere(self) -> bool:
+        """Whether a process that was forked off has made steps, which are not watched."""
+        return bool(self._elsewhere[0])
+
+    @property
+    def complete(self) -> bool:
+        """Whether something was measured, and nothing was left out."""
+        left_out = self.failed or self.stepped_elsewhere or any(watch.summary.skipped for watch in self.all)
+        return bool(self.all and not left_out)
 
     def _number(self, watch: Watch) -> None:
         """Give a watch its files, as it is about to measure."""

@@ -139,7 +139,7 @@ def test_every_so_many_steps_are_measured():
     assert chosen and read_table(Path("some.csv")) == chosen
     done = watch("--out", "none.csv", "--every", "21", "script.py")
     assert said(done) == "overlapper: nothing was measured: script.py made 20 steps, fewer than --every\n"
-    assert not Path("none.csv").exists()
+    assert done.returncode == 2 and not Path("none.csv").exists()
 
 
 def test_times_follow_the_time_step():
@@ -257,20 +257,81 @@ def test_two_clients_have_a_table_each():
 def test_steps_of_a_forked_process_are_not_watched():
     script("import os\nc = steps(3)\nif os.fork() == 0:\n    steps(4)\nelse:\n    os.wait()\n    p.stepSimulation(c)")
     done = watch("--out", "own.csv", "script.py")
-    assert done.returncode == 0 and done.stderr.count("Written: own.csv") == 1
+    assert done.returncode == 2 and done.stderr.count("Written: own.csv") == 1
+    assert done.stderr.endswith("script.py stepped simulations in other processes, which are not watched\n")
     assert {row["step"] for row in read_table(Path("own.csv"))} == {1, 2, 3, 4}
+    script("import os\nif os.fork() == 0:\n    steps(4)\nelse:\n    os.wait()")
+    done = watch("--json", "script.py")
+    answer = json.loads(done.stderr.splitlines()[-1])
+    assert (
+        done.returncode == 2
+        and answer["simulations"] == []
+        and answer["not_watched"]
+        == [
+            "nothing was measured: script.py made no step in its own process",
+            "script.py stepped simulations in other processes, which are not watched",
+        ]
+    )
+
+
+def test_shapes_and_bodies_that_are_left_out_end_a_watch_with_2():
+    script("c = steps(2)\np.resetBasePositionAndOrientation(1, [float('nan')] * 3, [0, 0, 0, 1])\np.stepSimulation()")
+    done = watch("script.py")
+    assert done.returncode == 2 and "\nNot modelled from step 3 on: box#1, it has no finite pose" in done.stderr
+
+
+def test_bodies_are_named_by_the_command_and_options_of_ours_behind_the_script_are_told():
+    script("steps(3); print(sys.argv)")
+    done = watch(
+        "--name", "0=table", "--name", "1=cup", "--name=9=duck", "--every", "1", "script.py", "--out=a.csv", "--every=3"
+    )
+    assert (done.returncode, done.stdout) == (0, "['script.py', '--out=a.csv', '--every=3']\n")
+    assert "table/link0" in done.stderr and "cup/link0" in done.stderr
+    assert done.stderr.splitlines()[-2:] == [
+        "overlapper: --name 9=duck: there is no body 9",
+        "overlapper: --out stands behind script.py, and was an argument of it: options of the watch stand before it",
+    ]
+    for words, sentence in (
+        (["--name", "cup=1"], "--name must be BODY=NAME, such as 3=duck, not 'cup=1'"),
+        (["--name", "1=cup", "--name", "1=duck"], "--name says 1 twice"),
+    ):
+        done = watch(*words, "script.py")
+        assert (done.returncode, done.stdout, done.stderr) == (2, "", f"overlapper: {sentence}\n")
+
+
+INTERRUPTED = """
+import os, signal, threading, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
+def press():
+    while "overlapper.cli.summary" not in sys.modules:
+        time.sleep(0)
+    os.kill(os.getpid(), signal.SIGINT)
+steps(3)
+threading.Thread(target=press, daemon=True).start()
+"""
+
+
+def test_ctrl_c_after_the_end_of_the_script_is_one_sentence():
+    script(INTERRUPTED)
+    done = watch("--out", "own.csv", "script.py")
+    assert done.returncode == 130 and "Traceback" not in done.stderr
+    assert done.stderr.endswith("overlapper: interrupted; the files are written\n")
+    assert {row["step"] for row in read_table(Path("own.csv"))} == {1, 2, 3}
 
 
 def test_a_script_that_never_steps_gets_a_message():
     script("print('nothing'); sys.exit(3)")
     done = watch("--out", "own.csv", "script.py")
     assert (done.returncode, done.stdout) == (3, "nothing\n")
-    assert said(done) == "overlapper: nothing was measured: script.py never called pybullet.stepSimulation\n"
+    assert (
+        said(done)
+        == "overlapper: nothing was measured: script.py never called pybullet.stepSimulation in its own process\n"
+    )
     assert not Path("own.csv").exists()
     script("p.connect(p.DIRECT); p.setRealTimeSimulation(1)")
     assert said(watch("script.py")) == (
-        "overlapper: nothing was measured: script.py never called pybullet.stepSimulation, and simulations in real "
-        "time are not stepped by calls\n"
+        "overlapper: nothing was measured: script.py never called pybullet.stepSimulation in its own process, and "
+        "simulations in real time are not stepped by calls\n"
     )
 
 
