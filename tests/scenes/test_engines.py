@@ -67,6 +67,7 @@ def test_a_loop_is_logged():
     ball = world.add("ball", Sphere(0.1), (0, 0, 0))
     world.add("cube", Box([0.1] * 3), (0, 0, 0.1))
     bodies = AnyBodies(world)
+    assert bodies.engine == "scripted"
     with Log("own.csv", bodies) as log:
         for step in range(1, 4):
             world.move(ball, (0, 0, 0.01 * step))

@@ -23,7 +23,7 @@ _listeners = []
 class World(Source):
     """Bodies of one shape each, by number, which all may collide."""
 
-    time_step = 0.01
+    engine, time_step = "scripted", 0.01
 
     def __init__(self):
         self.bodies, self.frames, self._count = {}, {}, None
