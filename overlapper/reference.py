@@ -1,7 +1,7 @@
 """FCL's answer for the same shapes and poses, and who is nearer to the truth when it differs from ours.
 
-FCL (python-fcl) runs in a process of its own: its signed distance ends the process for some pairs that barely touch, by
-a C++ exception that no `except` in Python can catch.
+FCL (python-fcl) runs in a process of its own. For some pairs that barely touch, its signed distance ends the process,
+by a C++ exception that no `except` in Python can catch.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 Of unions ∪A and ∪B, inclusion–exclusion gives the volume as the sum over all sets S of A's shapes and T of B's of
 (−1)^(|S| + |T|) vol(∩S ∩ ∩T). Every term is an overlap of convex bodies with an error bound of its own, and those that
-are empty, with all that is in them, are never asked. Where many shapes lie over each other there would be 2^n
-terms; then the union is taken apart into cells: its largest member, and, beyond each face of that, what the others
-have there. The cells are disjoint by construction, whatever rounding does to the planes.
+are empty, with all that is in them, are never asked. Where many shapes lie over each other there would be 2^n terms.
+Then the union is taken apart into cells: its largest member, and, beyond each face of that, what the others have there.
+The cells are disjoint by construction, whatever rounding does to the planes.
 """
 
 from __future__ import annotations

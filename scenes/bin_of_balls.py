@@ -1,7 +1,7 @@
 """Spheres and capsules are dropped into a bin.
 
-Hard: every overlap is smooth on at least one side, lenses between spheres, caps on the walls, and the long
-shallow lenses of two capsules that lie side by side; none is a polytope, so the error bound does the talking.
+Hard: every overlap is smooth on at least one side. There are lenses between spheres, caps on the walls, and the long
+shallow lenses of two capsules that lie side by side. No overlap is a polytope, so the error bound is put to the test.
 """
 
 import random

@@ -1,7 +1,7 @@
 """A Franka arm closes on a rubber duck in a tray, squeezes it and lifts it.
 
-Hard: the fingers are wedges of many facets, the duck is five hulls that already overlap each other, and the squeeze
-is millimetres deep on a few square centimetres; the tray's sloped sides are boxes that share their edges.
+Hard: the fingers are wedges of many facets, the duck is five hulls that already overlap each other, and the squeeze is
+millimetres deep on a few square centimetres. The tray's sloped sides are boxes that share their edges.
 """
 
 import math

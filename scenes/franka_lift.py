@@ -1,7 +1,7 @@
 """A Franka arm lifts a rubber duck by friction alone, pushed apart by the volumes that they share, and holds it.
 
 Hard: nothing creeps only if the friction of two fingers sticks to the last digit while seven motors, a gear between the
-fingers and gravity pull at what they hold; the duck is five hulls that overlap each other, and the fingers are wedges.
+fingers and gravity pull at what they hold. The duck is five hulls that overlap each other, and the fingers are wedges.
 """
 
 import math

@@ -1,7 +1,7 @@
 """A KUKA arm pushes a jenga tower over.
 
-Hard: forty-five boxes of one size in perfect alignment, so that faces coincide, edges are shared by many pairs and
-every overlap is a sheet, microns thick at first; then the tower breaks and nothing is aligned any more.
+Hard: forty-five boxes of one size are in perfect alignment. Faces coincide, many pairs share an edge, and every overlap
+is a sheet, microns thick at first. Then the tower breaks, and nothing is aligned any more.
 """
 
 import math

@@ -1,7 +1,7 @@
 """A laikago drops a few millimetres and stands on its four toes.
 
-Hard: ninety-two hulls of which almost none touch anything, so that what is left out decides how long it takes; and
-four spheres in a half-space without bounds, whose shallow caps no polytope meets exactly.
+Hard: ninety-two hulls, almost all of which touch nothing, so that what is left out decides how long it takes. Four
+spheres are in a half-space without bounds, and no polytope meets their shallow caps exactly.
 """
 
 import pybullet as p

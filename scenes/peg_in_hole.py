@@ -1,6 +1,6 @@
 """A peg is pressed, a degree askew, into a hole two tenths of a millimetre too narrow for it.
 
-Hard: one cylinder against the eight walls of an octagonal hole at once, each overlap forty millimetres long and a
+Hard: one cylinder meets the eight walls of an octagonal hole at once. Each overlap is forty millimetres long and a
 fraction of a millimetre thick, curved on one side, and wedge-shaped because the peg leans.
 """
 

@@ -1,7 +1,7 @@
 """An r2d2 falls over onto the ground and a few bricks.
 
-Hard: boxes, spheres, and cylinders that are hulls of 64 points, against a half-space without bounds; at the
-impacts the overlaps are deep and long, at rest they are slivers along a whole cylinder.
+Hard: boxes, spheres, and cylinders that are hulls of 64 points, against a half-space without bounds. At the impacts the
+overlaps are deep and long. At rest they are slivers along a whole cylinder.
 """
 
 import math

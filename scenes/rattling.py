@@ -1,7 +1,7 @@
 """A cube is dropped by a millimetre, a thousandth of a radian askew, and comes to rest.
 
-Hard: contact points come and go at the corners of a face that is all but level, so that a solver of points rattles, or
-creeps for as long as one looks; what is shared is a wedge that becomes a sheet of a tenth of a millimetre.
+Hard: contact points come and go at the corners of a face that is all but level. A solver of points rattles, or creeps
+for as long as one looks. The overlap is a wedge that becomes a sheet of a tenth of a millimetre.
 """
 
 import pybullet as p

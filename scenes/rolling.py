@@ -1,6 +1,6 @@
 """A ball, a cylinder and a capsule roll over a plane and down a slope, and lose nothing to it.
 
-Hard: round bodies share slivers with what they roll on, a quarter of a millimetre deep at most; a contact that wanders
+Hard: round bodies share slivers with what they roll on, a quarter of a millimetre deep at most. A contact that wanders
 over a body must not push it back, and friction must stick where nothing else turns what rolls.
 """
 

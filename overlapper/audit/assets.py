@@ -38,8 +38,8 @@ class Asset:
 
     `failure` says why it cannot be read, "" if it can. It has so many `bodies`, of a mesh, or `links` with shapes, of a
     model, and convex `shapes`. `closed` says whether all meshes bound a volume; None of a model. `skipped` are
-    sentences on what is left out, and `excess` is the fraction by which convex parts have more volume than the mesh
-    that gains most, None if none is concave.
+    sentences on what is left out. `excess` is the fraction by which convex parts have more volume than their mesh, of
+    the mesh that gains most; None if no mesh is concave.
     """
 
     name: str

@@ -119,8 +119,8 @@ class Clashes:
 def read(paths: Sequence[Path], units: str) -> tuple[list[tuple[str, MeshPart]], list[str]]:
     """The bodies of files and folders by their names, and what is wrong with files, a sentence each.
 
-    A file is named by its path from the folder that all are in, and a body of an assembly by that of its node; the
-    nodes of an only file need no file before them. ImportError without a library that a format needs.
+    A file is named by its path from the folder that all are in. A body of an assembly is named by the path of its node,
+    behind that of the file if there are several files. ImportError without a library that a format needs.
     """
     files = list(dict.fromkeys(file for path in paths for file in _files(path)))
     folder = Path(os.path.commonpath([file.absolute().parent for file in files]))

@@ -29,9 +29,9 @@ SLACK = 1e-12  # of the largest coordinate: some thousand units in the last plac
 class Examiner:
     """Looks at blocks of configurations, and keeps one `Batch` from block to block.
 
-    Links that are adjacent overlap by design in most robots, and how depends on the joints between them alone: they are
-    asked for at rest, at the corners and in the first 512 random configurations. Those that no joint moves are asked
-    for at rest. What overlaps by a depth of `least_depth` (m) or less is taken not to.
+    Adjacent links overlap by design in most robots, and their overlap depends on the joints between them alone. They
+    are asked for at rest, at the corners and in the first 512 random configurations. Those that no joint moves are
+    asked for at rest. What overlaps by a depth of `least_depth` (m) or less is taken not to.
     """
 
     def __init__(self, robot: Robot, sampling: Sampling, tolerance: float = 1e-3, least_depth: float = 0.0) -> None:

@@ -16,8 +16,8 @@ Numbers = Sequence[Array | float]  # the components of a vector, a quaternion or
 class Kinematics:
     """Places the shapes of `robot.tree.shapes`, which are `count`, without pybullet.
 
-    Rounding: the orientations of a link are those of its parent times one quaternion, a few units in the last place off
-    for each joint from the base; positions as much times the length of the arm.
+    Rounding: the orientation of a link is that of its parent times one quaternion, and off by a few units in the last
+    place for each joint from the base. Its position is off by as much times the length of the arm.
     """
 
     def __init__(self, robot: Robot) -> None:

@@ -1,7 +1,7 @@
 """Which configurations of a robot are looked at: its rest pose, corners of its limits, then any at random.
 
-Each is known by its number, and drawn by a generator of the block that it is in, so that whoever looks at which blocks
-in which order sees the same ones.
+Each is known by its number, and drawn by a generator of the block that it is in. It is the same whoever looks at which
+blocks in which order.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ class Sampling:
     """`count` configurations of a robot, as many columns each as `robot.columns` names.
 
     Number 0 is the rest pose, in which joints are at 0, or halfway between their limits if these exclude it. Then come
-    corners, in which all joints with limits are at one of them: all corners, or, of more than 8 such joints, each joint
-    alone at either limit and 256 corners at random. Those from `first_random` on are drawn uniformly between the
-    limits, once around where a joint has none, and over all orientations of a spherical joint. ValueError if `count` is
-    less than 1 or `seed` less than 0.
+    corners, in which all joints with limits are at one of them. They are all corners or, with more than 8 such joints,
+    each joint alone at either limit and 256 corners at random. Those from `first_random` on are drawn uniformly between
+    the limits, once around where a joint has none, and over all orientations of a spherical joint. ValueError if
+    `count` is less than 1 or `seed` less than 0.
     """
 
     def __init__(self, robot: Robot, count: int, seed: int) -> None:

@@ -72,11 +72,12 @@ def audit(
 
     Its joints are placed at rest, at corners of their limits, and at random between them. Links that a joint ties, or
     joints and links without shapes alone, are adjacent: they overlap by design, and are left to themselves. The exit
-    code is 1 if a pair that is not adjacent overlaps always, or one that --against disables as one that does not
-    overlap does; 2 if the robot cannot be read; else 0.
+    code is 1 if a pair that is not adjacent overlaps always, or if a pair overlaps that --against disables as one that
+    does not. It is 2 if the robot cannot be read, else 0.
 
-    Of a folder of models and meshes it is said what loads, what is closed, what is left out and why, how much volume
-    convex parts add, and what overlaps in itself at rest. The exit code is 1 if anything is to be told.
+    For a folder of models and meshes the answer is what loads, what is closed, and what is left out and why. It says,
+    too, how much volume convex parts add, and what overlaps in itself at rest. The exit code is 1 if anything is to be
+    told.
 
     Examples:
 

@@ -140,8 +140,8 @@ def diff(
 ) -> None:
     """Say what moved from one table of overlaps to another: poses of shapes, and overlaps of pairs.
 
-    The budgets are those that the first table has in its heading, as expected files do; without any, overlaps may
-    differ by rounding, and shapes by a tenth of a millimetre and a milliradian. The exit code is 0 if nothing moved, 1
+    The budgets are those that the first table has in its heading, as expected files do. Without any, overlaps may
+    differ by rounding, and poses by a tenth of a millimetre and a milliradian. The exit code is 0 if nothing moved, 1
     if something did, and 2 if a table cannot be read.
 
     [bold]overlapper diff monday.csv tuesday.csv[/bold]

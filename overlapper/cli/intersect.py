@@ -40,8 +40,8 @@ def intersect(
 
     A mesh file gives the convex hull of its points; a database, named by its SQLAlchemy URL, every polytope that
     --query returns, or that overlapper.write_polytopes has put there. Lengths are taken for m. With --concave, volumes
-    are those of closed meshes themselves; depth, centroid and the mesh of --out are those of convex parts, of which
-    CoACD makes a concave mesh, and by how much more volume these have is said.
+    are those of closed meshes themselves. Depth, centroid and the mesh of --out are those of the convex parts that
+    CoACD makes of a concave mesh. How much more volume these have is said, too.
 
     Examples:
 

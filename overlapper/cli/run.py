@@ -43,10 +43,10 @@ def run(
 ) -> None:
     """Simulate a scene and measure what its bodies have in common in every step.
 
-    A scene is a Python file with STEPS, the number of steps, and build(client), which fills a pybullet client and may
-    return a function step(i) that is called before each step. PAIRS in it may be "all", or a list of pairs of bodies,
-    and CONTACT "volumetric": then bodies are pushed apart by the volumes that they share, and tables have the forces.
-    What build takes beside the client, as build(client, *, mass=1.0, seed=0), are parameters that --set sets.
+    A scene is a Python file with STEPS, the number of steps, and build(client), which fills a pybullet client. It may
+    return a function step(i), which is called before each step. PAIRS in it may be "all", or a list of pairs of bodies.
+    With CONTACT "volumetric", bodies are pushed apart by the volumes that they share, and tables have the forces. What
+    build takes beside the client, as build(client, *, mass=1.0, seed=0), are parameters that --set sets.
 
     Examples:
 

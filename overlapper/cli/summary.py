@@ -66,7 +66,7 @@ def remarks(summary: Summary, limit: int = 10) -> list[str]:
 
 
 def skipped_lines(skipped: Mapping[Skipped, int]) -> list[str]:
-    """What was left out, by the first step in which it was."""
+    """The shapes and tasks left out, by the first step without them."""
     return [
         f"Not modelled{f' from step {step} on' if each.diverged else ''}: {each.name}, {each.reason}."
         for each, step in skipped.items()

@@ -1,6 +1,6 @@
 """Polytopes in databases, through SQLAlchemy: SQLite files, PostgreSQL, and other databases that it has drivers for.
 
-Two tables hold them. `polytopes` has the column `id`, an integer, and any further columns that others keep there;
+Two tables hold them. `polytopes` has the column `id`, an integer, and any further columns that others keep there.
 `vertices` has `polytope_id`, `corner` (0, 1, 2, ...) and `x`, `y`, `z` in m, one row per corner. Facets are not kept,
 as the corners determine them.
 """
@@ -58,10 +58,10 @@ def read_polytopes(
     """The polytopes of a database one after the other, each with its id; however many there are, few are in memory.
 
     `url` is SQLAlchemy's, such as "sqlite:///parts.db" or "postgresql+psycopg://user@host/parts". `query` returns four
-    columns, the id (of any type) and x, y, z of a point in m, with the points of a polytope one after the other, as by
-    ORDER BY id; without it, the tables that `write_polytopes` makes are read. Inner points are welcome. A query that
-    writes is refused by SQLite and PostgreSQL; sessions of MySQL and MariaDB are told to refuse it, which no test has
-    seen them do; any other database takes back what it wrote.
+    columns: the id (of any type) and x, y, z of a point in m. The points of a polytope come one after the other, as by
+    ORDER BY id. Without a query, the tables that `write_polytopes` makes are read. Inner points are welcome. SQLite and
+    PostgreSQL refuse a query that writes. Sessions of MySQL and MariaDB are told to refuse it, which no test has seen
+    them do. Any other database takes back what it wrote.
 
     An invalid polytope (a coordinate missing, fewer than four points, all in one plane) raises ValueError with its id.
     If `on_bad` is given, `on_bad(id, reason)` is called instead, and reading goes on. Raises FileNotFoundError if there

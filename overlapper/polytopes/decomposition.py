@@ -125,9 +125,9 @@ def decompose(
     """The convex parts of the solid that (t, 3, 3) triangles bound; corners that are equal to the bit are one.
 
     `threshold`, from 0.01 (many parts) to 1 (the convex hull), is the concavity that CoACD leaves, as a part of the
-    mesh's size. A surface with open edges bounds nothing; with `enclose`, CoACD closes it first, by walls that stick
-    out by about 1/180 of the longest side, as it does with surfaces that cross themselves. A line on stderr says when
-    CoACD is started, and where its parts will be kept.
+    mesh's size. A surface with open edges bounds nothing. With `enclose`, CoACD closes it first, as it closes surfaces
+    that cross themselves, by walls that stick out by about 1/180 of the longest side. A line on stderr says when CoACD
+    is started, and where its parts will be kept.
 
     NotDecomposed if the surface is open, or CoACD is not installed, fails, or takes longer than `time_limit` seconds.
     """

@@ -17,9 +17,9 @@ Source = Literal["cube", "ball", "sphere", "halfspaces"]
 def random_polytope(n: int, source: Source = "cube", *, rng: np.random.Generator | int | None = None) -> Hull:
     """A random polytope about the origin: the hull of a cloud of n random points, or the cell between n random planes.
 
-    `source` says where they are drawn, uniformly: points in the "cube" [-1, 1]³, in the unit "ball", on the unit
-    "sphere", where every one becomes a corner, or "halfspaces" that touch the unit sphere from outside, where every one
-    becomes a facet. A cell that is unbounded or reaches beyond 10 is drawn again. Lengths are in m. `rng` is a numpy
+    `source` says where they are drawn, uniformly. Points are in the "cube" [-1, 1]³, in the unit "ball" or on the unit
+    "sphere"; "halfspaces" touch the unit sphere from outside. Every point on the sphere becomes a corner, every
+    half-space a facet. A cell that is unbounded or reaches beyond 10 is drawn again. Lengths are in m. `rng` is a numpy
     Generator, a seed, or None for another polytope each time. Raises ValueError for n below 4.
     """
     if source not in get_args(Source):

@@ -173,8 +173,8 @@ class Touching(Short):
     def volume_bound(self) -> Fraction:
         """The inradius times the surface of a box around the common part.
 
-        The inner parallel bodies of a convex set have less surface than the set, and that has less than a box around
-        it; the volume is the integral of their surfaces over depths from 0 to the inradius.
+        The inner parallel bodies of a convex set have less surface than the set, and the set has less than a box around
+        it. The volume is the integral of these surfaces over depths from 0 to the inradius.
         """
         bounded = [body for body in map(RationalBody, self.shapes) if body.facts.bounded]
         require(bool(bounded), "one of the bodies must be bounded")
@@ -286,7 +286,7 @@ class Bracketed(Short):
     """The volume that two `shapes` share, round ones among them, is not below `lower` and not above `upper`, in m³.
 
     The check computes the volume anew from the numbers of the shapes, in ball arithmetic with as many bits as it takes
-    to tell (see `overlapper.proof.volume`); it needs python-flint, whose number of bits all threads share: one check at
+    to tell (see `overlapper.proof.volume`). It needs python-flint, whose number of bits all threads share: one check at
     a time.
     """
 

@@ -3,8 +3,8 @@
 The signed distance is positive apart (the distance) and negative in overlap (minus the depth). In the Minkowski
 difference D = A - B it is the distance from the origin to the boundary of D. So every direction gives a lower bound, by
 the two support values, and every polytope with vertices in D gives an upper one. The polytope grows at its feature
-nearest to the origin (van den Bergen, Collision Detection in Interactive 3D Environments, 2003, section 4.3) until the
-bounds meet; it is built anew each time, because an arbiter is seldom asked.
+nearest to the origin until the bounds meet (van den Bergen, Collision Detection in Interactive 3D Environments, 2003,
+section 4.3). It is built anew each time, because an arbiter is seldom asked.
 
 A ball is left out of each shape that is the sum of a ball and a core, and the radii are subtracted in the end.
 

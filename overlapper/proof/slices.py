@@ -6,9 +6,9 @@ Here t is along the normal of the slices, and ρ(t)² is quadratic. So the area 
 ρ₁ and ρ₂. Its integral is elementary but for ρ₁ ρ₂. Integrals that are not elementary are computed by `acb.integral`
 (Petras; Johansson, Numerical integration in arbitrary-precision ball arithmetic, 2018), whose error is proved.
 
-The sides of a slice and their order change only at breakpoints: where three of the curves that bound slices meet in a
-point of the common body, where a line touches the disc in such a point, where parallel lines meet, or where a strip or
-the disc ends. These t are roots of polynomials with rational coefficients, of degree four or less, which FLINT
+The sides of a slice and their order change only at breakpoints. There three of the curves that bound slices meet in a
+point of the common body, or a line touches the disc in such a point. At other breakpoints parallel lines meet, or a
+strip or the disc ends. These t are roots of polynomials with rational coefficients, of degree four or less, which FLINT
 encloses. Superfluous breakpoints do no harm. Three sides of the polytope meet only in its corners, and two only in its
 edges; an edge that lies in a slice is a place where parallel lines meet. Between breakpoints too close to tell apart, a
 slice has at most the widest area.

@@ -51,8 +51,8 @@ def play(
     given: Mapping[str, str] | None = None,
     contact: ContactModel | None = None,
 ) -> Playback:
-    """The playback of a scene, by name or path, or of a table; of a scene, `steps` of it with the parameters `given`
-    and with that `contact`, by default as it says.
+    """The playback of a scene, by name or path, or of a table. For a scene, `steps`, the parameters `given` and
+    `contact` are by default as it says.
 
     A table without shapes is of the `scene` given: what a table names is not run, as tables come from anywhere. Nor is
     a scene run for longer than it says, or than `steps`, because a table goes on.

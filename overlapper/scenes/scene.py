@@ -1,11 +1,11 @@
 """Scenes: what they are, and how they are found by name or by path.
 
-A scene is a Python file with a docstring that says what is hard about it, `STEPS`, and `build(client)`, which fills the
-pybullet client and may return `step(i)`, called before every stepSimulation. What `build` takes beside the client,
-`build(client, *, mass=1.0, seed=0)`, are the scene's parameters. `PAIRS`, if it is there, says which pairs
-are looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
+A scene is a Python file with a docstring that says what is hard about it, `STEPS`, and `build(client)`. `build` fills
+the pybullet client and may return `step(i)`, which is called before every stepSimulation. What `build` takes beside the
+client, `build(client, *, mass=1.0, seed=0)`, are the scene's parameters. `PAIRS`, if it is there, says which pairs are
+looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
 apart. `CONTACT`, if it is there, says what pushes them: "bullet", as by default, or "volumetric", for
-`simulation.VolumetricContact`, or a dictionary of what that is told of its contacts, as {"stiffness": 1e8}. `NAMES`, a
+`simulation.VolumetricContact`. It may be a dictionary of the arguments of that, too, as {"stiffness": 1e8}. `NAMES`, a
 dictionary that `build` fills, has names of bodies by their numbers, as `simulation.Bodies` takes them. `ENGINE`, if it
 is there, names the simulator, "bullet" by default; `build` is called with what that engine fills.
 """

@@ -36,14 +36,14 @@ class Watch:
             ...  # any code that calls pybullet.stepSimulation()
         watch.summary.as_dict()
 
-    `out` is the table (.csv, .parquet, .sqlite), `html` the page to look at in a browser; both grow beside their places
-    and take them at the end of the `with`, by `close()`, or when the client disconnects, but stay there after an error,
-    as `written` then says. `every` is the number of steps from one that is measured to the next, `per` what the rows of
-    the table are of, check="fcl" asks FCL, too; `surface`, `concave` and `concave_threshold` are those of
-    `simulation.Bodies`, as are `names`; `pairs`, `tolerance` and `method` of `Bodies.overlaps`. What pybullet cannot be
-    asked for (pair filters, the filter mode, self-collision, height fields, files) is known if it was said after the
-    watch began, or to `recorder`. `engine` names the simulator, as ENGINE of a scene does; with another one than
-    pybullet, `physicsClientId` is what that engine calls a simulation.
+    `out` is the table (.csv, .parquet, .sqlite), `html` the page to look at in a browser. Both grow beside their places
+    and take them at the end of the `with`, by `close()`, or when the client disconnects. After an error they stay
+    beside their places, as `written` then says. `every` is the number of steps from one that is measured to the next,
+    `per` what the rows of the table are of, and check="fcl" asks FCL, too. `surface`, `concave`, `concave_threshold`
+    and `names` are those of `simulation.Bodies`, and `pairs`, `tolerance` and `method` those of `Bodies.overlaps`. What
+    pybullet cannot be asked for (pair filters, the filter mode, self-collision, height fields, files) is known if it
+    was said after the watch began, or to `recorder`. `engine` names the simulator, as ENGINE of a scene does; with
+    another one than pybullet, `physicsClientId` is what that engine calls a simulation.
 
     Steps are noticed of `pybullet.stepSimulation`, not of a name that was imported `from pybullet` before, and not in
     other processes; a simulation in real time is not stepped by calls. What cannot be measured or written raises in the

@@ -91,9 +91,9 @@ class HullFacts(Flat):
     def planes(self) -> Planes:
         """The planes of the triangles.
 
-        What is below all planes of a hull's triangles is inside of the hull of the corners: the triangles close, so
-        their surface winds about a point that is on the inner side of each, and no plane can then separate the point
-        from their corners. Points on some triangles are limits of such points, because the mean of the corners is one.
+        A point below all planes of a hull's triangles is inside of the hull of the corners. The triangles close, so
+        their surface winds about a point that is on the inner side of each. No plane can then separate the point from
+        their corners. Points on some triangles are limits of such points, because the mean of the corners is one.
         Triangles without area lie on the edges of others. The converse is not said: a hull may be larger than its
         facets.
         """

@@ -1,8 +1,8 @@
 """The collision shapes of a running pybullet simulation, and their overlaps.
 
 Shapes are read once, poses at every step. Surfaces are the nominal ones or, with surface="margin", those that Bullet
-collides with: it lays a margin of 1 mm around convex hulls (mesh shapes, and the `<cylinder>` of a URDF, which Bullet
-makes a 32-gon hull). Pairs are those that the simulator lets collide.
+collides with. Bullet lays a margin of 1 mm around convex hulls: mesh shapes, and the `<cylinder>` of a URDF, which it
+makes a 32-gon hull. Pairs are those that the simulator lets collide.
 """
 
 from typing import TYPE_CHECKING

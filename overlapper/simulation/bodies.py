@@ -88,11 +88,10 @@ class AnyBodies:
         """(n, 2) pairs of shapes whose boxes meet, as places in `keys`: each once, the lesser first, sorted.
 
         "simulated" are those that the simulator lets collide, "all" those of different bodies, whatever it does. Any
-        other choice is a list of pairs of bodies, links (body, link) or shapes (body, link, shape), as
-        [(robot, table), ((robot, 8), (robot, 3))]; it may name two links of one body, and no filter is asked. Names
-        stand for bodies and links: [("table", "panda/panda_hand")], as `names` has them. One pair of bodies or names
-        needs no list around it. A body paired with itself stands for all pairs of its links. ValueError if there is no
-        such body or link.
+        other choice is a list of pairs of bodies, links (body, link) or shapes (body, link, shape), as [(robot, table),
+        ((robot, 8), (robot, 3))]. It may name two links of one body, and no filter is asked. Names stand for bodies and
+        links: [("table", "panda/panda_hand")], as `names` has them. One pair of bodies or names needs no list around
+        it. A body paired with itself stands for all pairs of its links. ValueError if there is no such body or link.
         """
         return self.pairs_at(self.positions, self.orientations, among)
 

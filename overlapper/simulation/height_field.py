@@ -20,7 +20,7 @@ class HeightField:
     """The ground under a grid of heights, in the frame of its shape.
 
     `heights` (c, r) in m are those at x = (i - (r - 1) / 2) * spacing[0], y = (j - (c - 1) / 2) * spacing[1] for row j
-    and column i of the array. Each cell is cut into two triangles from its corner at i + 1 to the one at j + 1; the
+    and column i of the array. Each cell is cut into two triangles from its corner at i + 1 to the one at j + 1. The
     triangles of the cell (i, j) have the numbers 2 * (j * (r - 1) + i) and the next.
     """
 

@@ -19,10 +19,10 @@ class Joint:
     """A joint moves a link in its parent, or ties a base to the world without moving it.
 
     The joint's frame, at zero, is at `position` (3,) in m and `orientation` (4,) xyzw of the inertial frame of the
-    parent. A revolute joint turns it by an angle in rad about `axis` (3,), which is unit, a prismatic one moves it by
-    that many times `axis`, a spherical one turns it by a quaternion. A planar one, which pybullet never moves,
-    and what is "held" stay as they are. `offset` (3,) leads from there to the inertial frame of the link, which has the
-    same axes.
+    parent. A revolute joint turns it by an angle in rad about `axis` (3,), which is unit. A prismatic one moves it by
+    so many times `axis`. A spherical one turns it by a quaternion. A planar one, which pybullet never moves, and what
+    is "held" stay as they are. `offset` (3,) leads from there to the inertial frame of the link, which has the same
+    axes.
 
     `lower` and `upper` are the limits in rad or m; there are none if lower > upper, and of spherical joints.
     """
@@ -41,9 +41,9 @@ class Joint:
 class TreeLink:
     """A link of the body of that number, named as in the file; `parent` is its place among the links, -1 of a base.
 
-    `skipped` says what of its shapes is not modelled and why, "" if all are. `concave` is of how many convex parts its
-    concave meshes are, and `excess` the fraction by which these have more volume than the mesh that gains most; None if
-    no closed mesh is concave.
+    `skipped` says what of its shapes is not modelled and why, "" if all are. `concave` is the number of convex parts of
+    its concave meshes. `excess` is the fraction by which parts have more volume than their mesh, of the mesh that gains
+    most; None if no closed mesh is concave.
     """
 
     body: int

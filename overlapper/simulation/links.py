@@ -23,8 +23,8 @@ class LinkContact:
     """Two links whose shapes overlap or touch. True only if they overlap.
 
     `bodyA`, `linkA`, `bodyB` and `linkB` are pybullet's indices, link -1 is the base. `overlap` is what the unions of
-    their shapes share, `contacts` are the pairs of their shapes, and `deepest` is the one of them with the largest
-    depth: its depth and normal, from B to A, are those of the links where one pair of shapes overlaps, and otherwise a
+    their shapes share, `contacts` are the pairs of their shapes, and `deepest` is the pair with the largest depth.
+    Where one pair of shapes overlaps, its depth and normal, from B to A, are those of the links. Otherwise they are a
     lower bound of how far the links must be moved apart, and a first guess of where to.
     """
 

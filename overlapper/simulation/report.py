@@ -9,15 +9,15 @@ from dataclasses import dataclass
 class Report:
     """How little of a scene had to be modelled.
 
-    `bodies` and `shapes` count those of the scene, `shapes_read` those modelled. The rest is of the last `overlaps()`:
-    `pairs_possible` are the pairs of modelled shapes it was asked about, by default those that the simulator lets
-    collide, `pairs_examined` those whose boxes meet, `pairs_overlapping` those that overlap, and `pairs_widened` those
-    of them that were measured again in wider arithmetic (see `Overlap.widened`); `facets_touched` took part, and
-    `planes_asked` were asked for (see `Overlaps.planes_asked`).
+    `bodies` and `shapes` count those of the scene, `shapes_read` those modelled. The rest is of the last `overlaps()`.
+    `pairs_possible` are the pairs of modelled shapes that it was asked about, by default those that the simulator lets
+    collide. `pairs_examined` are those whose boxes meet, and `pairs_overlapping` those that overlap. `pairs_widened`
+    were measured again in wider arithmetic (see `Overlap.widened`). `facets_touched` took part, and `planes_asked` were
+    asked for (see `Overlaps.planes_asked`).
 
-    `pairs_within_margins` are the pairs of links, of those asked about, between which pybullet has contact points and
-    `overlaps()` found nothing, as the margins that Bullet lays around hulls hold them apart. With surface="margin"
-    there are none: the margins are then part of the shapes, and such pairs overlap.
+    `pairs_within_margins` are the pairs of links asked about that have contact points in pybullet and no overlap. The
+    margins that Bullet lays around hulls hold them apart. With surface="margin" there are none: the margins are then
+    part of the shapes, and such pairs overlap.
     """
 
     bodies: int

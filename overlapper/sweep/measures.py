@@ -65,8 +65,8 @@ class _Pair(PairSummary):
 def unit_wrench(pair: LinkContact) -> NDArray[np.float64]:
     """(6,) force and torque on the first of two overlapping links if pushing them into each other took a joule per m³.
 
-    That is one pascal on the surface of the second within the first: the force, in N/Pa = m², is the area of what is
-    pushed, as a vector from the second to the first; the torque, in Nm/Pa = m³, is about the origin of the world.
+    That is one pascal on the surface of the second within the first. The force, in N/Pa = m², is the area of what is
+    pushed, as a vector from the second to the first. The torque, in Nm/Pa = m³, is about the origin of the world.
     """
     about = pair.overlap.about
     assert about is not None

@@ -96,8 +96,9 @@ class Store:
             self._there.discard(FAILURES)
 
     def _put(self, data: bytes, place: str) -> None:
-        """Without waiting for the disk, which takes longer than many a task: a power cut may leave half of what is
-        seconds old, as a kill does not, and then it is done again."""
+        """It does not wait for the disk, which takes longer than many a task. A power cut, unlike a kill, may leave
+        half of what is seconds old, and then it is done again.
+        """
         # A file object would add four system calls.
         file = os.open(self._begun, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
         try:

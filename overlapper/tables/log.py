@@ -65,8 +65,9 @@ class Log:
 
         `forces` are those between these bodies, as `VolumetricContact.mean()` has them; of pairs without any they are
         empty. `step` is the one after the last by default, `time`, in s, that of so many time steps of the simulator.
-        ValueError if a step comes no later than the last, if `time` is not finite, if `contacts` are not of these
-        bodies, if there are `forces` and no columns for them, or if the log is closed; OSError if it cannot be written.
+        ValueError if a step comes no later than the last, if `time` is not finite, or if `contacts` are not of these
+        bodies. ValueError, too, if there are `forces` and no columns for them, or if the log is closed. OSError if it
+        cannot be written.
         """
         if self._table is None:
             raise ValueError(f"this Log is closed: {contacts!r} came too late")

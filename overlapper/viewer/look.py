@@ -1,9 +1,9 @@
 """How bodies and overlaps are drawn, in a live view, in a recording and in a picture.
 
 Bodies are drawn by their collision shapes, translucent and in their own colours. Each facet of an overlap has the
-colour of the shape whose surface it lies on: orange for the first of the pair, sky blue for the second, from the
-palette of Okabe and Ito, which the common kinds of colour blindness keep apart. The bodies' own colours would say less,
-for in many models everything is white or grey.
+colour of the shape whose surface it lies on: orange for the first of the pair, sky blue for the second. They are from
+the palette of Okabe and Ito, which the common kinds of colour blindness keep apart. The bodies' own colours would say
+less, for in many models everything is white or grey.
 """
 
 from __future__ import annotations

@@ -374,9 +374,9 @@ def _facet_planes(overlap: Overlap, middle: Array, unit: float) -> NDArray[np.fl
 def _look_alike(a: Overlap, b: Overlap, slack: int) -> bool:
     """True if the drawing of one overlap can stand for the other.
 
-    Neither shape has moved by more than 1/200 of the size of what they share, a pixel where that fills a quarter
-    of the page, nor has its volume or area changed by more than 3 %, as it does in a thin overlap where that is much.
-    Both are multiplied by `slack`.
+    Neither shape has moved by more than 1/200 of the size of what they share, a pixel where that fills a quarter of the
+    page. Nor has its volume or area changed by more than 3 %, as it may in a thin overlap. Both are multiplied by
+    `slack`.
     """
     changed = max(abs(b.volume / a.volume - 1), abs(b.area / a.area - 1))
     if changed >= 0.03 * slack:

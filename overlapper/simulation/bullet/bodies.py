@@ -29,20 +29,20 @@ class Bodies(AnyBodies):
     (soft bodies, flat hulls, height fields without a recorder) is in `skipped`, with one SkippedShapeWarning each.
 
     Concave meshes are decomposed into convex parts, which count as so many shapes of their link and are listed in
-    `decomposed`; `concave_threshold`, from 0.01 to 1, is the concavity that may be left (see
+    `decomposed`. `concave_threshold`, from 0.01 to 1, is the concavity that may be left (see
     overlapper.polytopes.decomposition). It takes up to minutes the first time, and needs the extra `concave`. A mesh
     whose surface is open bounds no volume and is skipped; with concave="enclose" CoACD lays walls around it. With
     concave="skip" all concave meshes are.
 
     With surface="margin" convex meshes have the margin that Bullet lays around them, 1 mm by default, so that depths
-    are those of pybullet's contact distances. Boxes and cylinders are the same either way: their margin lies inside,
-    though Bullet rounds their edges by it in most pairs, which takes up to 0.73 mm off a corner. Convex parts of
-    concave meshes have none. A margin that changes is noticed by `update()` where `getDynamicsInfo` of the base tells.
+    are those of pybullet's contact distances. Boxes and cylinders are the same either way, as their margin lies inside.
+    Bullet rounds their edges by it in most pairs, which takes up to 0.73 mm off a corner. Convex parts of concave
+    meshes have none. A margin that changes is noticed by `update()` where `getDynamicsInfo` of the base tells.
 
-    Pairs are those that pybullet lets collide, by static bases, groups and masks; a `recorder`, set up before the scene
+    Pairs are those that pybullet lets collide, by static bases, groups and masks. A `recorder`, set up before the scene
     is built, adds what pybullet cannot be asked for: pair filters, the filter mode and self-collision. `pairs` and
-    `overlaps` take other choices. Groups and masks are read again with new bodies, when a base becomes static or
-    ceases to be, and when a recorder hears of a change.
+    `overlaps` take other choices. Groups and masks are read again with new bodies, when a base becomes static or ceases
+    to be, and when a recorder hears of a change.
 
     Height fields that a recorder has noted are modelled as the prisms below their triangles, near what may meet them;
     behind what moves away they are released. `report()` counts all triangles, and as read those modelled.
@@ -57,7 +57,7 @@ class Bodies(AnyBodies):
     A body without a finite pose is left out, and in `skipped`, until it has one again.
 
     Bodies that come, go or take over the id of another are noticed by `update()`, which marks every body with a user
-    data entry; `close()`, the end of a `with` or of the last `Bodies` of a client takes the marks off. New bodies are
+    data entry. `close()`, the end of a `with` or of the last `Bodies` of a client takes the marks off. New bodies are
     read from a temporary .bullet file; if two stand at the same point, the friction of all is set and restored to tell
     them apart. Bodies that another process adds to a shared simulation are noticed after `pybullet.syncBodyInfo()`. To
     those that loadBullet brings pybullet gives no ids; they are counted in `skipped`.

@@ -24,8 +24,8 @@ class BodyMarks:
     Each has a key of its own, by which the body is told from a later one with its id. It goes when the body goes, or
     when the last reader that knows the body by it is closed or collected.
 
-    What pybullet tells of user data is what this process has heard: another's changes, and those of bodies after a
-    syncBodyInfo, only after a syncUserData, which takes as long as all the rest of an update.
+    pybullet tells of user data what this process has heard. It hears of another's changes, and of bodies after a
+    syncBodyInfo, only by a syncUserData, which takes as long as all the rest of an update.
     """
 
     def __init__(self, client: int) -> None:

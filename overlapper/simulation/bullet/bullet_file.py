@@ -1,8 +1,8 @@
 """Collision shapes out of the .bullet files that pybullet's `saveBullet` writes.
 
-A .bullet file is a memory dump that describes itself: a header, then blocks, each an array of one C struct under the
-address it had in the writing process, and at the end a block "DNA1" with the layout of every struct. Pointers
-between blocks are those old addresses.
+A .bullet file is a memory dump that describes itself. It has a header, then blocks, each an array of one C struct under
+the address it had in the writing process. The last block, "DNA1", has the layout of every struct. Pointers between
+blocks are those old addresses.
 """
 
 from __future__ import annotations

@@ -26,9 +26,9 @@ Command = tuple[str, Arguments]
 class Commands:
     """The commands of a client that depend on the length of a step, as far as they are heard.
 
-    pybullet keeps the force of a motor or a constraint as an impulse, of the length that a step has when it is told: in
-    shorter steps it would be so much stronger. Gains are parts of an error that a step takes away: in shorter steps a
-    motor would be so much faster. Forces, and torques of joints, act in one step alone.
+    pybullet keeps the force of a motor or a constraint as an impulse, by the length that a step has then. In shorter
+    steps it would be so much stronger. Gains are parts of an error that a step takes away: in shorter steps a motor
+    would be so much faster. Forces, and torques of joints, act in one step alone.
     """
 
     def __init__(self, client: int) -> None:

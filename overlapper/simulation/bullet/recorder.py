@@ -44,9 +44,9 @@ class Recorder:
         ...  # build the scene
         bodies = Bodies(client, recorder=recorder)
 
-    Set it up before the scene is built, and before `from pybullet import ...` of the functions in question: until
-    `close()`, or the end of a `with`, they are replaced in the module `pybullet`, for all clients, by ones that call
-    them and note what was asked of this client. What another process tells a shared simulation is not seen.
+    Set it up before the scene is built, and before `from pybullet import ...` of the functions in question. Until
+    `close()`, or the end of a `with`, they are replaced in the module `pybullet`, for all clients. The others call them
+    and note what was asked of this client. What another process tells a shared simulation is not seen.
     """
 
     def __init__(self, physicsClientId: int = 0) -> None:

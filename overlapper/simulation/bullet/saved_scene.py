@@ -30,7 +30,8 @@ def saved_bodies(client: int, ids: Sequence[int]) -> tuple[BulletFile, dict[int,
     """The scene as a .bullet file, the place in the file of each of `ids` but the soft ones, and whose pose is hidden.
 
     The file has no ids. Position and number of links identify a body unless another shares them or pybullet hides its
-    position, as it does of bodies of 128 links and more; then each has a friction of its own while the file is written.
+    position, as it does of bodies of 128 links and more. In these cases each body has a friction of its own while the
+    file is written.
     """
     ids = [id for id in ids if body_type(client, id) != SOFT_BODY]
     file = save(client)

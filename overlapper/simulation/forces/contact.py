@@ -34,19 +34,19 @@ class VolumetricContact:
             while ...:
                 contact.step()  # instead of pybullet.stepSimulation()
 
-    Bodies are elastic foundations (Winkler): they press with `stiffness` (Pa/m) times the depth, so that a pair is
-    pushed apart by stiffness times the volume that it shares, through that volume's centroid, along the area vector of
-    its patch. A layer of thickness t and modulus E has the stiffness E / t; two bodies in series have
-    1 / (1 / k1 + 1 / k2). A body rests as deep as its weight is stiffness times volume. What presses a body of several
-    convex parts is the sum of what presses these: as if they were one, but twice where the parts overlap each other.
+    Bodies are elastic foundations (Winkler): they press with `stiffness` (Pa/m) times the depth. A pair is pushed apart
+    by stiffness times the volume that it shares, through that volume's centroid, along the area vector of its patch. A
+    layer of thickness t and modulus E has the stiffness E / t; two bodies in series have 1 / (1 / k1 + 1 / k2). A body
+    rests as deep as its weight is stiffness times volume. What presses a body of several convex parts is the sum of
+    what presses these: as if they were one, but twice where the parts overlap each other.
 
-    `dissipation` (s) is how far pressures are ahead of the depth, in time (Kelvin and Voigt): the damping ratio of a
+    `dissipation` (s) is how far pressures are ahead of the depth, in time (Kelvin and Voigt). The damping ratio of a
     swing of angular frequency w is w * dissipation / 2, and 0 keeps the energy. `friction` is Coulomb's coefficient, by
     default that of pybullet: the product of the two links' lateralFriction. A patch resists slip and spin together, as
     an ellipsoid of force and torque; what sticks does not creep. "distributed" resists at points spread over the patch
     instead, by pybullet's coefficients, which is more exact where bodies slip and spin at once. Restitution, rolling
-    and spinning friction of pybullet are not used. Each may be a function of the pair of links, as
-    stiffness=lambda a, b: ..., of (body, link) twice, which is asked once for each pair.
+    and spinning friction of pybullet are not used. Each may be a function of the pair of links, as stiffness=lambda a,
+    b: ..., of (body, link) twice, which is asked once for each pair.
 
     A step of the simulator is taken in `substeps`, by default as many as the stiffness and the masses ask for, and
     anew in every step. Too few of them are told with one SubstepsWarning for each pair; their contacts are then solved
@@ -58,19 +58,19 @@ class VolumetricContact:
     filtered; without one they are pushed apart, too.
 
     What else acts on the bodies, as gravity, motors, constraints and forces of the script, is taken to be as it was in
-    the substep before. What a script tells motors and constraints within the `with`, and the forces that it applies, is
-    told again in each substep, so that it lasts for the whole step: pybullet keeps it as an impulse. Gains of motors
-    are those of a whole step, too. Motors that were told before, unless a recorder has heard it, are as much stronger
-    as substeps are shorter.
+    the substep before. Commands of a script to motors and constraints within the `with`, and the forces that it
+    applies, are given again in each substep. So they last for the whole step, though pybullet keeps them as impulses.
+    Gains of motors are those of a whole step, too. Motors that were told before, unless a recorder has heard it, are as
+    much stronger as substeps are shorter.
 
     A body without a finite pose or velocity has no contacts, with one SkippedShapeWarning; the others go on.
 
-    What has no direction, as a body that lies wholly within another or goes through a plate, is pushed where it was
-    pushed last, or along the least translation that frees it, with one NoDirectionWarning for each pair.
+    A body that lies wholly within another, or goes through a plate, has no direction. It is pushed where it was pushed
+    last, or along the least translation that frees it, with one NoDirectionWarning for each pair.
 
     After `step()` or `forces()` there is a row for each pair of shapes that overlaps, of the last substep, in SI units
-    and the world: `contacts`, and parallel to it `force`, `torque`, `centre`, `energy` and `slip`; `last` has them all,
-    and `mean()` the mean over the whole step.
+    and the world. The rows of `force`, `torque`, `centre`, `energy` and `slip` are parallel to `contacts`. `last` has
+    them all, and `mean()` the mean over the whole step.
 
     ValueError says what is wrong with an argument, RuntimeError at the `with` that its client is within one already.
     """

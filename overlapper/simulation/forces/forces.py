@@ -23,11 +23,11 @@ NO_PATCH = 1e-6
 class Forces(Tabular):
     """Forces between overlapping pairs of shapes, a row for each pair, in SI units and the world frame.
 
-    `contacts` are their overlaps. `force` (p, 3) in N acts on the first of each pair at `centre`, and `torque` (p, 3)
-    in N m about it: of pressures that change, and of friction that resists a spin; the opposite acts on the second.
+    `contacts` are their overlaps. `force` (p, 3) in N acts on the first of each pair at `centre`, and the opposite on
+    the second. So does `torque` (p, 3) in N m about it: of pressures that change, and of friction that resists a spin.
     `slip` (p, 3) in m/s is the velocity of the first over the second at `centre`, along the patch, at the end of the
-    step. `normal` (p, 3) is the direction of the pressures, unit, from the second to the first; where `directed` (p,)
-    is False, what is shared has none, and it is the last known. `stiffness` (p,) is in Pa/m.
+    step. `normal` (p, 3) is the direction of the pressures, unit, from the second to the first. Where `directed` (p,)
+    is False, the overlap has no direction, and `normal` is the last known. `stiffness` (p,) is in Pa/m.
 
     As a table, by `to_pandas()` and its like, they have the columns of `contacts` and those that volumetric contact
     adds to `overlapper run`.
@@ -56,8 +56,8 @@ class Forces(Tabular):
     def energy(self) -> Array:
         """(p,) J, stored in the pressures: half of stiffness times the square of the depth, over the patch.
 
-        It is found when it is first asked for: with a half-space by the depth of the centroid, otherwise as the work
-        of drawing the two apart along the normal, by 16 volumes for each pair.
+        It is found when it is first asked for. With a half-space it follows from the depth of the centroid. Otherwise
+        it is the work of drawing the two apart along the normal, by 16 volumes for each pair.
         """
         return energies(self.contacts.overlaps, self.normal, self.stiffness)
 
