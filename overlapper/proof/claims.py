@@ -198,7 +198,7 @@ class Overlapping(Short):
     A ball of radius `margin` about `point` (3,) lies in all bodies. Polygons `rings[k]` of `vertices` (n, 3),
     counter-clockwise from outside, surround the point; number k lies in plane `facet[k]`, to rounding. `pull[v]` is in
     (0, 1]: at that share of the way from `point` to vertex v lies a point of all bodies. The polytope of the vertices,
-    shrunk by `inner_scale` about `point`, therefore fits into all bodies. `planes` are those of the bodies, of which
+    shrunk by the least `pull` about `point`, therefore fits into all bodies. `planes` are those of the bodies, of which
     each bounds one of `shapes`.
     """
 
@@ -210,12 +210,6 @@ class Overlapping(Short):
     point: Exact
     margin: Fraction
     pull: Exact
-
-    @property
-    def inner_scale(self) -> Fraction:
-        """The least of `pull`."""
-        scale: Fraction = self.pull.min()
-        return scale
 
     def verify(self) -> Bounds:
         """Bounds of the volume, m³, that follow from the shapes alone; CertificateError names what does not hold."""

@@ -335,8 +335,8 @@ def test_a_facet_given_to_another_body_is_found():
 
 def test_an_inner_scale_too_large_is_found():
     claim = certificate(found(IN_COMMON["three"]))
-    assert claim.inner_scale < 1
-    larger = np.maximum(claim.pull, claim.inner_scale * (1 + Fraction(1, 10**9)))
+    assert claim.pull.min() < 1
+    larger = np.maximum(claim.pull, claim.pull.min() * (1 + Fraction(1, 10**9)))
     rejected(claim, "after its pull", pull=larger)
 
 
