@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,6 @@ from overlapper.simulation.model import LinkKey
 
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
-
-
-class Rules(Protocol):
-    """Which colliders may collide; a collider is a row of `Layout.collider_rows`."""
-
-    def allow(self, first: Indices, second: Indices) -> Mask:
-        """Whether the colliders in these rows may collide, pair by pair; first < second."""
-
-    def count(self, weights: NDArray[np.int64]) -> int:
-        """How many pairs of shapes may collide, if `weights` (n,) says how many each collider has."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,8 +35,11 @@ class Colliders:
         return cls(rows, np.array([body for body, _ in rows], dtype=int), group, mask)
 
 
-class CollisionRules:
-    """Pair filters before masks; within a body, pairs that are listed, as well as either."""
+class Rules:
+    """Which colliders may collide; a collider is a row of `Layout.collider_rows`.
+
+    Pair filters come before masks; within a body, pairs that are listed, as well as either.
+    """
 
     def __init__(
         self,

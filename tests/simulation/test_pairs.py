@@ -9,9 +9,10 @@ import pybullet as p
 import pybullet_data
 import pytest
 from pybullet_utils.bullet_client import BulletClient
+from simulated import jointed
 
 from overlapper.simulation import Bodies, Recorder, SelfCollisionWarning
-from overlapper.simulation.collision_rules import Colliders, CollisionRules
+from overlapper.simulation.collision_rules import Colliders, Rules
 
 SELF = p.URDF_USE_SELF_COLLISION
 LINK = (
@@ -196,23 +197,9 @@ def test_self_collision_is_as_the_flags_say(client, recorder, tmp_path, flags):
 
 def test_branches_of_a_robot_meet_even_where_no_link_meets_its_ancestors(client, recorder):
     shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.5] * 3, physicsClientId=client)
-    count = 4
-    robot = p.createMultiBody(
-        1,
-        shape,
-        linkMasses=[1] * count,
-        linkCollisionShapeIndices=[shape] * count,
-        linkVisualShapeIndices=[-1] * count,
-        linkPositions=[[0.1, 0, 0]] * count,
-        linkOrientations=[[0, 0, 0, 1]] * count,
-        linkInertialFramePositions=[[0, 0, 0]] * count,
-        linkInertialFrameOrientations=[[0, 0, 0, 1]] * count,
-        linkParentIndices=[0, 1, 0, 3],
-        linkJointTypes=[p.JOINT_REVOLUTE] * count,
-        linkJointAxis=[[0, 1, 0]] * count,
-        flags=SELF | p.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS,
-        physicsClientId=client,
-    )
+    axes, places, flags = [[0, 1, 0]] * 4, [[0.1, 0, 0]] * 4, SELF | p.URDF_USE_SELF_COLLISION_EXCLUDE_ALL_PARENTS
+    base = (1, shape, (0, 0, 0))
+    robot = jointed(client, p.JOINT_REVOLUTE, shape, axes, places, [0, 1, 0, 3], base=base, flags=flags)
     found = agree(client, Bodies(client, recorder=recorder))
     assert found == {((robot, a), (robot, b)) for a in (0, 1) for b in (2, 3)}
 
@@ -437,7 +424,7 @@ def test_rules_count_the_pairs_that_they_allow(seed):
     both = bool(seed % 2)
     filters = {tuple(sorted(pair)): bool(random.integers(2)) for pair in drawn} | {((77, -1), (88, -1)): True}
     within = [(a, b) for a, b in combinations(links, 2) if a[0] == b[0] in (1, 4)]
-    rules = CollisionRules(Colliders(rows, owners, group, mask), both, filters, within)
+    rules = Rules(Colliders(rows, owners, group, mask), both, filters, within)
     weights, expected = random.integers(1, 4, len(links)), 0
     first, second = np.triu_indices(len(links), 1)
     for i, j, allowed in zip(first, second, rules.allow(first, second)):

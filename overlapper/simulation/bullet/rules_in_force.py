@@ -11,7 +11,7 @@ import pybullet
 from overlapper.simulation.bullet.collider_poses import ColliderPoses
 from overlapper.simulation.bullet.known_bodies import KnownBodies
 from overlapper.simulation.bullet.recorder import Recorder
-from overlapper.simulation.collision_rules import Colliders, CollisionRules
+from overlapper.simulation.collision_rules import Colliders, Rules
 from overlapper.simulation.layout import Layout
 from overlapper.simulation.model import LinkKey
 
@@ -28,7 +28,7 @@ class RulesInForce:
         self._bodies: list[int] = []
         self._static: list[bool] = []
         self._noted = (0, 0)  # changes and masks set, as the recorder counts them
-        self.rules = CollisionRules(Colliders.of({}, {}))
+        self.rules = Rules(Colliders.of({}, {}))
 
     def follow(self, known: KnownBodies, layout: Layout, fresh: bool) -> None:
         """Take over what has changed since the last step. Filters that are `fresh` have just been read."""
@@ -48,18 +48,18 @@ class RulesInForce:
             self.rules = self._read(known, layout)
         self._layout, self._bodies, self._static, self._noted = layout, bodies, static, noted
 
-    def _read(self, known: KnownBodies, layout: Layout) -> CollisionRules:
+    def _read(self, known: KnownBodies, layout: Layout) -> Rules:
         colliders = Colliders.of(layout.collider_rows, known.filters)
         recorder = self._recorder
         if recorder is None:
-            return CollisionRules(colliders)
+            return Rules(colliders)
         within = [
             pair
             for id, flags in recorder.self_collision.items()
             if id in known.by_id
             for pair in _within(id, flags, known.by_id[id].parents, layout.collider_rows)
         ]
-        return CollisionRules(colliders, recorder.both_masks_must_agree, recorder.pair_filters, within)
+        return Rules(colliders, recorder.both_masks_must_agree, recorder.pair_filters, within)
 
 
 def _within(

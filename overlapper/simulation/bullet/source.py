@@ -15,7 +15,7 @@ from overlapper.simulation.bullet.recorder import Recorder
 from overlapper.simulation.bullet.rules_in_force import RulesInForce
 from overlapper.simulation.bullet.stepping import Stepping, time_step
 from overlapper.simulation.cautions import SelfCollisionWarning
-from overlapper.simulation.collision_rules import CollisionRules, Mask
+from overlapper.simulation.collision_rules import Mask, Rules
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.layout import Layout
 from overlapper.simulation.model import ModelledBody, Skipped
@@ -68,7 +68,7 @@ class BulletSource(Source):
     def poses(self, links: Mapping[int, Sequence[int]]) -> ColliderPoses:
         return ColliderPoses(self._client, links, self._known.hidden)
 
-    def rules(self, layout: Layout) -> CollisionRules:
+    def rules(self, layout: Layout) -> Rules:
         self._in_force.follow(self._known, layout, self._fresh)
         self._fresh = False
         return self._in_force.rules
