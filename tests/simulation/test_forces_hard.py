@@ -3,23 +3,18 @@
 import numpy as np
 import pybullet
 import pytest
+from simulated import box, ground, jointed
 
 from overlapper.simulation import Bodies, Recorder, VolumetricContact
 
 G = 9.81
 
 
-def _ground(client):
-    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-    return pybullet.createMultiBody(0, plane, physicsClientId=client)
-
-
 def _box(client, position, mass=1.0, half=0.05, velocity=(0, 0, 0)):
-    shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[half] * 3, physicsClientId=client)
-    box = pybullet.createMultiBody(mass, shape, -1, position, physicsClientId=client)
-    pybullet.changeDynamics(box, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
-    pybullet.resetBaseVelocity(box, velocity, physicsClientId=client)
-    return box
+    id = box(client, half, mass=mass, position=position)
+    pybullet.changeDynamics(id, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
+    pybullet.resetBaseVelocity(id, velocity, physicsClientId=client)
+    return id
 
 
 def _speed(client, body):
@@ -29,7 +24,7 @@ def _speed(client, body):
 @pytest.mark.parametrize("phase", [0, 0.35, 0.65, 0.95])
 @pytest.mark.parametrize(("mass", "half", "stiffness"), [(0.1, 0.05, 1e7), (0.01, 0.05, 1e7), (1, 0.05, 1e9)])
 def test_light_or_stiff_bodies_bounce_no_faster_than_they_fell(client, mass, half, stiffness, phase):
-    _ground(client)
+    ground(client)
     box = _box(client, [0, 0, half + (1 + phase) / 240], mass, half, velocity=[0, 0, -1])
     with VolumetricContact(Bodies(client), stiffness=stiffness) as contact:
         for _ in range(30):
@@ -40,7 +35,7 @@ def test_light_or_stiff_bodies_bounce_no_faster_than_they_fell(client, mass, hal
 @pytest.mark.parametrize("phase", [0, 0.25, 0.5, 0.75])
 @pytest.mark.parametrize("speed", [3, 5, 20])
 def test_fast_small_bodies_bounce_no_faster_than_they_fell(client, speed, phase):
-    _ground(client)
+    ground(client)
     box = _box(client, [0, 0, 0.005 + (1 + phase) * speed / 240], 1e-3, 0.005, velocity=[0, 0, -speed])
     with VolumetricContact(Bodies(client), stiffness=1e8) as contact:
         for _ in range(30):
@@ -51,7 +46,7 @@ def test_fast_small_bodies_bounce_no_faster_than_they_fell(client, speed, phase)
 @pytest.mark.parametrize("tilt", [0.03, 0.1, 0.2])
 def test_an_edge_that_comes_down_to_a_face_gains_no_energy(client, tilt):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
-    _ground(client)
+    ground(client)
     box = _box(client, [0, 0, 0.06], mass=0.01)
     turned = pybullet.getQuaternionFromEuler([tilt, 0, 0])
     pybullet.resetBasePositionAndOrientation(box, [0, 0, 0.06], turned, physicsClientId=client)
@@ -67,7 +62,7 @@ def test_an_edge_that_comes_down_to_a_face_gains_no_energy(client, tilt):
 
 def test_a_body_placed_in_contact_stays_there(client):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
-    _ground(client)
+    ground(client)
     box = _box(client, [0, 0, 0.05], mass=0.01)
     highest = 0.0
     with VolumetricContact(Bodies(client)) as contact:
@@ -79,23 +74,13 @@ def test_a_body_placed_in_contact_stays_there(client):
 
 def test_a_swinging_pole_is_detected_before_it_hits(client):
     """The end of the link is fast. Its speed follows from the velocity of the joint."""
-    _ground(client)
+    ground(client)
     shape = pybullet.createCollisionShape(
         *(pybullet.GEOM_BOX, 0, [0.5, 0.02, 0.02]), collisionFramePosition=[0.5, 0, 0], physicsClientId=client
     )
-    pole = pybullet.createMultiBody(
-        *(0, -1, -1, [0, 0, 0.025]),
-        linkMasses=[0.05],
-        linkCollisionShapeIndices=[shape],
-        linkVisualShapeIndices=[-1],
-        linkPositions=[[0, 0, 0]],
-        linkOrientations=[[0, 0, 0, 1]],
-        linkInertialFramePositions=[[0.5, 0, 0]],
-        linkInertialFrameOrientations=[[0, 0, 0, 1]],
-        linkParentIndices=[0],
-        linkJointTypes=[pybullet.JOINT_REVOLUTE],
-        linkJointAxis=[[0, 1, 0]],
-        physicsClientId=client,
+    turning = pybullet.JOINT_REVOLUTE
+    pole = jointed(
+        *(client, turning, shape, [[0, 1, 0]], [[0, 0, 0]]), mass=0.05, base=(0, -1, [0, 0, 0.025]), centre=[0.5, 0, 0]
     )
     pybullet.changeDynamics(pole, 0, linearDamping=0, angularDamping=0, jointDamping=0, physicsClientId=client)
     pybullet.setJointMotorControl2(pole, 0, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
@@ -110,8 +95,8 @@ def test_a_swinging_pole_is_detected_before_it_hits(client):
 
 def test_bodies_without_mass_slip_without_a_response(client):
     """Neither body has a mass. One moves at a given velocity, and friction cannot end its slip."""
-    ground, box = _ground(client), _box(client, [0, 0, 0.049], mass=0, velocity=[0.1, 0, 0])
-    with VolumetricContact(Bodies(client), pairs=[(ground, box)]) as contact:
+    plane, box = ground(client), _box(client, [0, 0, 0.049], mass=0, velocity=[0.1, 0, 0])
+    with VolumetricContact(Bodies(client), pairs=[(plane, box)]) as contact:
         contact.step()
     pressing = 1e7 * 0.01 * 1e-3
     assert contact.force[0] == pytest.approx([0.25 * pressing, 0, -pressing], rel=1e-9)
@@ -124,20 +109,20 @@ def test_fast_turning_bodies_are_pushed_wherever_pressure_is_positive(client, se
     """Torques that the patch cannot give take no force away. Without a force, velocities stay as they are."""
     stiffness, tau, pushed = 1e8, 1e-3, 0
     random = np.random.default_rng(seed)
-    _ground(client)
+    ground(client)
     boxes = [_box(client, [0.5 * k, 0, 0.0497], mass=0.25) for k in range(20)]
-    for box in boxes:
+    for each in boxes:
         tilt = [*(0.01 * random.normal(size=3)), 1]
-        at = pybullet.getBasePositionAndOrientation(box, physicsClientId=client)[0]
-        pybullet.resetBasePositionAndOrientation(box, at, tilt, physicsClientId=client)
+        at = pybullet.getBasePositionAndOrientation(each, physicsClientId=client)[0]
+        pybullet.resetBasePositionAndOrientation(each, at, tilt, physicsClientId=client)
         spin = 10 * random.normal(size=3)
-        pybullet.resetBaseVelocity(box, [0, 0, random.uniform(-0.1, 0.1)], spin, physicsClientId=client)
-    before = {box: np.ravel(pybullet.getBaseVelocity(box, physicsClientId=client)) for box in boxes}
+        pybullet.resetBaseVelocity(each, [0, 0, random.uniform(-0.1, 0.1)], spin, physicsClientId=client)
+    before = {each: np.ravel(pybullet.getBaseVelocity(each, physicsClientId=client)) for each in boxes}
     with VolumetricContact(Bodies(client), stiffness=stiffness, dissipation=tau, substeps=1) as contact:
         contact.step()
-    for row, (_, _, _, box, _, _) in enumerate(contact.pairs.tolist()):
+    for row, (_, _, _, pressed, _, _) in enumerate(contact.pairs.tolist()):
         shared = contact.contacts.overlaps
-        growing = shared.gradient[row, 1] @ before[box]
+        growing = shared.gradient[row, 1] @ before[pressed]
         pressures = stiffness * (shared.volume[row] + (1 / 240 + tau) * growing)
         assert (contact.force[row, 2] < 0) == (pressures > 0)
         pushed += pressures > 0
@@ -154,7 +139,7 @@ def _rests(client, box, contact):
 
 def test_bullet_does_not_respond_either_once_a_body_gets_a_mass(client):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
-    _ground(client)
+    ground(client)
     box = _box(client, [0, 0, 0.05], mass=0)
     with VolumetricContact(Bodies(client)) as contact:
         contact.step()
@@ -165,20 +150,20 @@ def test_bullet_does_not_respond_either_once_a_body_gets_a_mass(client):
 def test_bullet_does_not_respond_either_to_pairs_that_a_script_lets_collide(client):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
     with Recorder(client) as recorder:
-        ground, box = _ground(client), _box(client, [0, 0, 0.05])
-        pybullet.setCollisionFilterGroupMask(ground, -1, 1, 1, physicsClientId=client)
+        plane, box = ground(client), _box(client, [0, 0, 0.05])
+        pybullet.setCollisionFilterGroupMask(plane, -1, 1, 1, physicsClientId=client)
         pybullet.setCollisionFilterGroupMask(box, -1, 2, 2, physicsClientId=client)
         with VolumetricContact(Bodies(client, recorder=recorder)) as contact:
             pybullet.setCollisionFilterGroupMask(box, -1, 1, 1, physicsClientId=client)
             assert _rests(client, box, contact)
-            pybullet.setCollisionFilterPair(ground, box, -1, -1, 0, physicsClientId=client)
+            pybullet.setCollisionFilterPair(plane, box, -1, -1, 0, physicsClientId=client)
             contact.step()
-            pybullet.setCollisionFilterPair(ground, box, -1, -1, 1, physicsClientId=client)
+            pybullet.setCollisionFilterPair(plane, box, -1, -1, 1, physicsClientId=client)
             assert _rests(client, box, contact)
 
 
 def test_a_client_is_within_one_contact_at_a_time(client):
-    _ground(client)
+    ground(client)
     bodies = Bodies(client)
     told = f"^physicsClientId {client} is within a `with` of a VolumetricContact already$"
     with VolumetricContact(bodies), pytest.raises(RuntimeError, match=told), VolumetricContact(bodies):
@@ -189,7 +174,7 @@ def test_a_client_is_within_one_contact_at_a_time(client):
 
 def test_a_restored_state_forgets_everything_that_came_after_it(client):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
-    _ground(client)
+    ground(client)
     box, ways = _box(client, [0, 0, 0.05 - G / 1e5]), []
     with VolumetricContact(Bodies(client)) as contact:
         for _ in range(20):

@@ -7,7 +7,7 @@ import numpy as np
 import pybullet as p
 import pytest
 from contact_experiments import HALF, STEP, G, World, run
-from simulated import body, box
+from simulated import box, ground, jointed
 
 from overlapper.simulation import Bodies, Recorder, SubstepsWarning, VolumetricContact
 
@@ -233,7 +233,7 @@ def test_bodies_may_come_and_go_within(client, recorded):
     recorder = Recorder(client) if recorded else None
     try:
         p.setGravity(0, 0, -G, physicsClientId=client)
-        body(client, p.GEOM_PLANE, mass=0)
+        ground(client)
         first = box(client, HALF, position=(0, 0, HALF - G / 1e5))
         bodies = Bodies(client, recorder=recorder)
         with VolumetricContact(bodies) as contact:
@@ -253,7 +253,7 @@ def test_bodies_may_come_and_go_within(client, recorded):
 
 
 def test_pairs_that_a_script_has_filtered_stay_filtered(client, recorder):
-    plane = body(client, p.GEOM_PLANE, mass=0)
+    plane = ground(client)
     free, other = box(client, HALF, position=(0, 0, HALF - 1e-4)), box(client, HALF, position=(1, 0, HALF - 1e-4))
     p.setCollisionFilterPair(plane, free, -1, -1, 0, client)
     with VolumetricContact(Bodies(client, recorder=recorder)) as contact:
@@ -267,25 +267,12 @@ def test_pairs_that_a_script_has_filtered_stay_filtered(client, recorder):
 # Other commands to bodies
 
 
-def slider(world, **motor):
+def slider(world):
     """A mass of 2 kg on a rail along x, without gravity."""
     world.pull(0, 0, 0)
     shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=world.client)
-    id = p.createMultiBody(
-        0,
-        basePosition=[0, 0, 1],
-        linkMasses=[2],
-        linkCollisionShapeIndices=[shape],
-        linkVisualShapeIndices=[-1],
-        linkPositions=[[0, 0, 0]],
-        linkOrientations=[[0, 0, 0, 1]],
-        linkInertialFramePositions=[[0, 0, 0]],
-        linkInertialFrameOrientations=[[0, 0, 0, 1]],
-        linkParentIndices=[0],
-        linkJointTypes=[p.JOINT_PRISMATIC],
-        linkJointAxis=[[1, 0, 0]],
-        physicsClientId=world.client,
-    )
+    base = (0, -1, [0, 0, 1])
+    id = jointed(world.client, p.JOINT_PRISMATIC, shape, [[1, 0, 0]], [[0, 0, 0]], mass=2, base=base)
     world.undamped(id, 0.5)
     p.setJointMotorControl2(id, 0, p.VELOCITY_CONTROL, force=0, physicsClientId=world.client)
     return id

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pybullet as p
 import pytest
+from simulated import body
 
 from overlapper import Placed, Sphere, distance, penetration_depth
 from overlapper.simulation import Bodies, SkippedShapeWarning, link_contacts
@@ -35,8 +36,7 @@ def field(client, heights, scale=(1, 1, 1), position=(0, 0, 0), orientation=(0, 
 
 
 def ball(client, position, radius=0.1, mass=1):
-    shape = p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=client)
-    return p.createMultiBody(mass, shape, -1, position, physicsClientId=client)
+    return body(client, p.GEOM_SPHERE, radius=radius, mass=mass, position=position)
 
 
 def prisms(bodies, ground):

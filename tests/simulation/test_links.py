@@ -3,6 +3,7 @@
 import pybullet as p
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from simulated import body
 
 from overlapper.polytopes import decomposition
 from overlapper.simulation import Bodies, SkippedShapeWarning, link_contacts, modelling
@@ -18,11 +19,6 @@ FACES = [end[::-1] for end in ENDS] + [[k + 6 for k in end] for end in ENDS] + S
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     modelling._decomposition.cache_clear()
-
-
-def body(client, *shape, position=(0, 0, 0), mass=1, **figures):
-    collision = p.createCollisionShape(*shape, physicsClientId=client, **figures)
-    return p.createMultiBody(mass, collision, basePosition=position, physicsClientId=client)
 
 
 def bent(client, scale=1.0, faces=FACES, **frame):

@@ -3,6 +3,7 @@
 import numpy as np
 import pybullet
 import pytest
+from simulated import box, ground
 
 from overlapper.simulation import Bodies, VolumetricContact
 
@@ -13,21 +14,19 @@ STEP = 1 / 240
 @pytest.fixture
 def plane(client):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
-    shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-    return pybullet.createMultiBody(0, shape, physicsClientId=client)
+    return ground(client)
 
 
-def box(client, *position):
-    shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
-    body = pybullet.createMultiBody(1, shape, -1, position, physicsClientId=client)
-    pybullet.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
-    return body
+def cube_at(client, *position):
+    cube = box(client, 0.05, position=position)
+    pybullet.changeDynamics(cube, -1, linearDamping=0, physicsClientId=client)
+    return cube
 
 
 @pytest.mark.usefixtures("plane")
 @pytest.mark.parametrize("substeps", ["auto", 7])
 def test_the_mean_force_is_what_changes_the_momentum_in_a_step(client, substeps):
-    cube = box(client, 0, 0, 0.06)
+    cube = cube_at(client, 0, 0, 0.06)
     with VolumetricContact(Bodies(client), stiffness=1e8, substeps=substeps) as contact:
         pressed = 0
         for _ in range(240):
@@ -42,7 +41,7 @@ def test_the_mean_force_is_what_changes_the_momentum_in_a_step(client, substeps)
 
 @pytest.mark.usefixtures("plane")
 def test_forces_are_read_at_the_current_poses(client):
-    cubes = [box(client, 0.01 * k, 0, 0.051 + 0.101 * k) for k in range(3)]
+    cubes = [cube_at(client, 0.01 * k, 0, 0.051 + 0.101 * k) for k in range(3)]
     with VolumetricContact(Bodies(client), stiffness=1e8) as contact:
         for _ in range(1000):
             contact.step()
@@ -54,7 +53,7 @@ def test_forces_are_read_at_the_current_poses(client):
 
 @pytest.mark.usefixtures("plane")
 def test_a_contact_new_in_the_last_substep_has_a_normal_and_no_force(client):
-    cube = box(client, 0, 0, 0.05 + 1e-4)
+    cube = cube_at(client, 0, 0, 0.05 + 1e-4)
     pybullet.resetBaseVelocity(cube, [0, 0, -0.1], physicsClientId=client)
     with VolumetricContact(Bodies(client), substeps=1) as contact:
         contact.step()
@@ -65,9 +64,8 @@ def test_a_contact_new_in_the_last_substep_has_a_normal_and_no_force(client):
 
 @pytest.mark.usefixtures("plane")
 def test_a_mean_force_without_direction_is_along_the_last_normal(client):
-    rod = box(client, 0, 0, 0.04)
-    plate = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[1, 1, 1], physicsClientId=client)
-    outer = pybullet.createMultiBody(0, plate, -1, [0, 0, 0.5], physicsClientId=client)
+    rod = cube_at(client, 0, 0, 0.04)
+    outer = box(client, 1, mass=0, position=[0, 0, 0.5])
     with VolumetricContact(Bodies(client), pairs=[(outer, rod)]) as contact:
         with pytest.warns(UserWarning, match="without a side to push to"):
             contact.step()
@@ -79,7 +77,7 @@ def test_a_mean_force_without_direction_is_along_the_last_normal(client):
 @pytest.mark.parametrize("substeps", ["auto", 4])
 def test_reading_forces_changes_no_bit_of_later_steps(client, substeps):
     ends = []
-    cube = box(client, 0, 0, 0)
+    cube = cube_at(client, 0, 0, 0)
     for look in (False, True):
         pybullet.resetBasePositionAndOrientation(cube, [0, 0, 0.06], [0.1, 0, 0, 1], physicsClientId=client)
         pybullet.resetBaseVelocity(cube, [0, 0, 0], [0, 0, 0], physicsClientId=client)
@@ -94,7 +92,7 @@ def test_reading_forces_changes_no_bit_of_later_steps(client, substeps):
 
 @pytest.mark.usefixtures("plane")
 def test_a_body_that_loses_its_place_is_left_out_and_the_others_go_on(client):
-    stays, goes = box(client, 0, 0, 0.0499), box(client, 1, 0, 0.0499)
+    stays, goes = cube_at(client, 0, 0, 0.0499), box(client, 1, 0, 0.0499)
     with VolumetricContact(Bodies(client), substeps=3) as contact:
         contact.step()
         pybullet.applyExternalForce(goes, -1, [float("nan"), 0, 0], [1, 0, 0], pybullet.WORLD_FRAME, client)

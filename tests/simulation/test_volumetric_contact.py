@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pybullet
 import pytest
+from simulated import body, box, ground
 
 from overlapper.simulation import Bodies, VolumetricContact
 
@@ -14,11 +15,8 @@ G = 9.81
 @pytest.mark.parametrize("stiffness", [1e7, 1e8, 1e9])
 def test_a_tilted_cube_comes_to_rest_as_deep_as_its_weight_asks(client, stiffness):
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
-    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-    pybullet.createMultiBody(0, plane, physicsClientId=client)
-    box = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
-    tilted = pybullet.getQuaternionFromEuler([1e-3, 0, 0])
-    cube = pybullet.createMultiBody(1, box, -1, [0, 0, 0.051], tilted, physicsClientId=client)
+    ground(client)
+    cube = box(client, 0.05, position=[0, 0, 0.051], orientation=pybullet.getQuaternionFromEuler([1e-3, 0, 0]))
     with VolumetricContact(Bodies(client), stiffness=stiffness) as contact:
         for _ in range(3 * 240):
             contact.step()
@@ -33,10 +31,8 @@ def test_a_tilted_cube_comes_to_rest_as_deep_as_its_weight_asks(client, stiffnes
 def test_a_falling_body_bounces_back_to_about_the_same_height(client, stiffness, drop):
     """Steps are short before what comes is there: in a long one it would come in deeper than its speed can take it."""
     pybullet.setGravity(0, 0, -G, physicsClientId=client)
-    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-    pybullet.createMultiBody(0, plane, physicsClientId=client)
-    box = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
-    cube = pybullet.createMultiBody(1, box, physicsClientId=client)
+    ground(client)
+    cube = box(client, 0.05)
     pybullet.changeDynamics(cube, -1, linearDamping=0, physicsClientId=client)
     contact = VolumetricContact(Bodies(client), stiffness=stiffness, dissipation=0)
     for phase in range(4):
@@ -64,13 +60,9 @@ def test_a_body_without_a_finite_velocity_has_no_contacts_and_the_others_go_on(c
     for lost in (False, True):
         pybullet.resetSimulation(physicsClientId=client)
         pybullet.setGravity(0, 0, -G, physicsClientId=client)
-        slab, cube = (
-            pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[side, side, 0.05], physicsClientId=client)
-            for side in (0.1, 0.05)
-        )
         for x in (0, 1):
-            pybullet.createMultiBody(0, slab, -1, [x, 0, 0], physicsClientId=client)
-            pybullet.createMultiBody(1, cube, -1, [x, 0, 0.0999], physicsClientId=client)
+            body(client, pybullet.GEOM_BOX, halfExtents=[0.1, 0.1, 0.05], mass=0, position=[x, 0, 0])
+            box(client, 0.05, position=[x, 0, 0.0999])
         contact = VolumetricContact(Bodies(client), substeps=substeps)
         with contact, warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("always")
@@ -94,9 +86,8 @@ def test_a_body_without_a_finite_velocity_has_no_contacts_and_the_others_go_on(c
 
 
 def test_the_force_on_what_is_not_there_is_refused(client):
-    box = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
     for x in (0, 0.5):
-        pybullet.createMultiBody(1, box, -1, [x, 0, 0], physicsClientId=client)
+        box(client, 0.05, position=[x, 0, 0])
     contact = VolumetricContact(Bodies(client))
     with contact:
         contact.step()

@@ -51,6 +51,32 @@ def box(client, half=0.5, **options):
     return body(client, p.GEOM_BOX, halfExtents=[half] * 3, **options)
 
 
+def ground(client):
+    return body(client, p.GEOM_PLANE, mass=0)
+
+
+def jointed(
+    client, kind, shape, axes, positions, parents=None, mass=1, base=(0, -1, (0, 0, 0)), centre=(0, 0, 0), **options
+):
+    """Links of one shape at joints of one kind; `base` is the mass, the shape and the position of the base."""
+    count, (base_mass, base_shape, place) = len(axes), base
+    return p.createMultiBody(
+        *(base_mass, base_shape, -1, place),
+        linkMasses=[mass] * count,
+        linkCollisionShapeIndices=[shape] * count,
+        linkVisualShapeIndices=[-1] * count,
+        linkPositions=positions,
+        linkOrientations=[[0, 0, 0, 1]] * count,
+        linkInertialFramePositions=[centre] * count,
+        linkInertialFrameOrientations=[[0, 0, 0, 1]] * count,
+        linkParentIndices=parents or [0] * count,
+        linkJointTypes=[kind] * count,
+        linkJointAxis=axes,
+        physicsClientId=client,
+        **options,
+    )
+
+
 def two_cubes(path, gap=2):
     """An .obj file of two cubes, the second `gap` further along x."""
     text = ""

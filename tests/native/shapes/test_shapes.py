@@ -313,10 +313,14 @@ BAD = [
     (Box, (1.0,), "half_extents"),
     (Box, ("box",), "half_extents"),
     (Box, (None,), "half_extents"),
+    (Sphere, ("one",), "radius"),
+    (Sphere, (None,), "radius"),
+    (Sphere, ([1, 2],), "radius"),
     (Sphere, (0,), "radius"),
     (Sphere, (-1,), "radius"),
     (Sphere, (NAN,), "radius"),
     (Sphere, (INF,), "radius"),
+    (Capsule, ("one", 1), "radius"),
     (Capsule, (0, 1), "radius"),
     (Capsule, (NAN, 1), "radius"),
     (Capsule, (1, -1), "length"),
@@ -324,6 +328,7 @@ BAD = [
     (Capsule, (1, INF), "length"),
     (Capsule, (1, 1e25), "length"),
     (Cylinder, (-1, 1), "radius"),
+    (Cylinder, (1, None), "length"),
     (Cylinder, (1, 0), "length"),
     (Cylinder, (1, -1), "length"),
     (Cylinder, (1, NAN), "length"),
@@ -339,11 +344,13 @@ BAD = [
     (Hull, ([*CORNERS.tolist(), [0, NAN, 0]],), "vertices"),
     (Hull, ([*CORNERS.tolist(), [0, 0, -INF]],), "vertices"),
     (Hull, ("cube.obj",), "vertices"),
+    (Hull, ([["a", "b", "c"]] * 4,), "vertices"),
     (Hull, (None,), "vertices"),
     (HalfSpace, ([0, 0, 0], 1), "normal"),
     (HalfSpace, ([0, NAN, 1], 1), "normal"),
     (HalfSpace, ([0, 1], 1), "normal"),
     (HalfSpace, (None, 1), "normal"),
+    (HalfSpace, ([0, 0, 1], "ground"), "offset"),
     (HalfSpace, ([0, 0, 1], NAN), "offset"),
     (HalfSpace, ([0, 0, 1], INF), "offset"),
     (Placed, (Sphere(1), [0, 0]), "position"),
@@ -358,35 +365,9 @@ BAD = [
 
 @pytest.mark.parametrize(("make", "arguments", "name"), BAD)
 def test_bad_input_is_one_sentence_that_names_the_argument(make, arguments, name):
-    with pytest.raises((ValueError, TypeError), match=name) as caught:
+    numbers = not any(each is None or isinstance(each, str) for each in arguments)
+    with pytest.raises(ValueError if numbers else (ValueError, TypeError), match=name) as caught:
         make(*arguments)
-    assert "\n" not in str(caught.value)
-
-
-NUMERIC = [case for case in BAD if not any(a is None or isinstance(a, str) for a in case[1])]
-
-
-@pytest.mark.parametrize(("make", "arguments", "name"), NUMERIC)
-def test_numbers_that_make_no_shape_are_a_value_error(make, arguments, name):
-    with pytest.raises(ValueError, match=name):
-        make(*arguments)
-
-
-@pytest.mark.parametrize(
-    ("call", "name"),
-    [
-        (lambda: Sphere("one"), "radius"),
-        (lambda: Sphere(None), "radius"),
-        (lambda: Sphere([1, 2]), "radius"),
-        (lambda: Capsule("one", 1), "radius"),
-        (lambda: Cylinder(1, None), "length"),
-        (lambda: HalfSpace([0, 0, 1], "ground"), "offset"),
-        (lambda: Hull([["a", "b", "c"]] * 4), "vertices"),
-    ],
-)
-def test_an_argument_that_is_not_a_number_is_refused_by_name(call, name):
-    with pytest.raises((TypeError, ValueError), match=name) as caught:
-        call()
     assert "\n" not in str(caught.value)
 
 

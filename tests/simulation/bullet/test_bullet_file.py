@@ -10,12 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from simulated import CUBE, ORIENTATION, POSITION, body
 
 from overlapper.simulation.bullet import bullet_file
 from overlapper.simulation.bullet.bullet_file import BulletFile
 
-CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-POSITION, ORIENTATION = [0.1, -0.2, 0.3], p.getQuaternionFromEuler([0.3, -0.5, 0.7])
 SINGLE = 1e-6  # of what the file keeps in single precision
 
 
@@ -26,11 +25,6 @@ def saved(client, tmp_path):
         return BulletFile(tmp_path / "scene.bullet")
 
     return save
-
-
-def body(client, *shape, position=(0, 0, 0), maximal=False, **figures):
-    collision = p.createCollisionShape(*shape, physicsClientId=client, **figures)
-    return p.createMultiBody(1, collision, basePosition=position, useMaximalCoordinates=maximal, physicsClientId=client)
 
 
 def base_leaves(file, index=0):

@@ -8,6 +8,7 @@ import numpy as np
 import pybullet as p
 import pytest
 from numpy.testing import assert_allclose
+from simulated import body
 
 from overlapper import (
     Box,
@@ -138,11 +139,6 @@ def test_unsupported_uses_of_a_rounded_hull_are_refused():
 
 
 # --- Bullet's
-
-
-def body(client, *shape, position=(0, 0, 0), orientation=(0, 0, 0, 1), mass=1, **figures):
-    collision = p.createCollisionShape(*shape, physicsClientId=client, **figures)
-    return p.createMultiBody(mass, collision, -1, position, orientation, physicsClientId=client)
 
 
 def hull(client, points, **pose):

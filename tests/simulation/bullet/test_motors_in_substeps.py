@@ -3,6 +3,7 @@
 import numpy as np
 import pybullet as p
 import pytest
+from simulated import body, box
 
 from overlapper.simulation import Bodies, VolumetricContact
 
@@ -66,12 +67,10 @@ def test_a_motor_takes_a_joint_as_far_in_sixteen_substeps_as_in_a_step(client, a
 @pytest.mark.parametrize("substeps", [1, 2, 16])
 @pytest.mark.parametrize("told", ["before", "within"])
 def test_a_constraint_presses_as_hard_in_substeps_whenever_it_was_created(client, told, substeps):
-    floor = p.createCollisionShape(p.GEOM_BOX, halfExtents=[1, 1, 0.5], physicsClientId=client)
-    p.createMultiBody(0, floor, -1, [0, 0, -0.5], physicsClientId=client)
-    ball = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
-    body = p.createMultiBody(1, ball, -1, [0, 0, 0.05], physicsClientId=client)
+    body(client, p.GEOM_BOX, halfExtents=[1, 1, 0.5], mass=0, position=[0, 0, -0.5])
+    cube = box(client, 0.05, position=[0, 0, 0.05])
     constraint = p.createConstraint(
-        body, -1, -1, -1, p.JOINT_FIXED, [0, 0, 0], [0, 0, 0], [0, 0, 0.05], physicsClientId=client
+        cube, -1, -1, -1, p.JOINT_FIXED, [0, 0, 0], [0, 0, 0], [0, 0, 0.05], physicsClientId=client
     )
 
     def pull():
