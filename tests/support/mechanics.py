@@ -360,8 +360,12 @@ def broken_laws(found: Solution, tolerance: float = 1e-8) -> list[str]:
             if not distance > 0:
                 ask("spin of what has no width", twist, 0, scale)
 
-    for i, pair in enumerate(scene.pairs):
-        bases = {links.base_of[scene.on[shape]] for shape in pair}
-        highest = max((swings.get(base, 0.0) for base in bases if links.movable(base)), default=0.0)
-        ask("frequency", scene.frequency2[i], highest, max(swings.values(), default=0.0))
+    ask("frequency", scene.frequency2, highest_swings(scene, swings), max(swings.values(), default=0.0))
     return complaints
+
+
+def highest_swings(scene: Scene, swings: dict[int, float]) -> list[float]:
+    """For each pair the highest of the `swings` of its bases that can move."""
+    links = scene.links
+    bases = [{links.base_of[scene.on[shape]] for shape in pair} for pair in scene.pairs]
+    return [max((swings.get(base, 0.0) for base in each if links.movable(base)), default=0.0) for each in bases]
