@@ -66,7 +66,7 @@ def remarks(summary: Summary, limit: int = 10) -> list[str]:
 
 
 def skipped_lines(skipped: Mapping[Skipped, int]) -> list[str]:
-    """The shapes and tasks left out, by the first step without them."""
+    """A line for each shape or body that is left out; `skipped` has the first step without it."""
     return [
         f"Not modelled{f' from step {step} on' if each.diverged else ''}: {each.name}, {each.reason}."
         for each, step in skipped.items()

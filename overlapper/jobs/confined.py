@@ -62,7 +62,7 @@ class Confined:
         self._owner = os.getpid()
 
     def __call__(self, function: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T:
-        """What the function returns or raises there. Unanswered if it breaks a limit or ends its process."""
+        """Call the function there. Unanswered if it breaks a limit or ends its process."""
         if self._owner != os.getpid():
             self._owner, self._lock, self._worker = os.getpid(), threading.Lock(), None
         with self._lock:

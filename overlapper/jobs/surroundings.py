@@ -1,4 +1,4 @@
-"""What an item of a job may change in its process, and what the next item finds as it was."""
+"""The state of a process that an item of a job may change, and that the next item finds as it was."""
 
 from __future__ import annotations
 

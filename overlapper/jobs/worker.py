@@ -178,7 +178,7 @@ def _kill(process: subprocess.Popen[bytes], mark: str) -> None:
 
 
 class _Replies(io.RawIOBase):
-    """What a process writes, up to its end, even if another process holds the pipe open."""
+    """The output of a process, up to its end, even if another process holds the pipe open."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
         assert process.stdout
@@ -202,7 +202,7 @@ class _Replies(io.RawIOBase):
 
 
 def _forward(process: subprocess.Popen[bytes], arrived: queue.SimpleQueue[Any]) -> None:
-    # Of a reply that is cut off or cannot be unpickled nothing is known but that it is missing.
+    # A reply that is cut off or cannot be unpickled counts as missing.
     with contextlib.suppress(Exception):
         replies = io.BufferedReader(_Replies(process), 1 << 16)
         while True:

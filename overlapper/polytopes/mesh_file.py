@@ -90,7 +90,7 @@ def read_hull(path: str | Path) -> Hull:
 
 
 def _parsed(path: str | Path, wrong: str, parse: Callable[..., T], *arguments: str) -> T:
-    """What a function of `mesh_parser` makes of a file. ValueError says what is `wrong` and why."""
+    """The result of a function of `mesh_parser` for a file. ValueError says what is `wrong` and why."""
     _must_be_a_file(Path(path), wrong)
     try:
         return confined(parse, Path(path).absolute(), *arguments)

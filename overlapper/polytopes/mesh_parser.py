@@ -105,7 +105,7 @@ def hull(path: Path) -> tuple[Hull, bool, float]:
 
 @contextmanager
 def _scene(path: Path, **options: Any) -> Iterator[Any]:
-    """What trimesh makes of a file, and meanwhile no warning about figures that `Hull` refuses."""
+    """The file as trimesh reads it, and meanwhile no warning about figures that `Hull` refuses."""
     import trimesh
 
     _must_fit(path)

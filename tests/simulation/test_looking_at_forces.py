@@ -92,7 +92,7 @@ def test_reading_forces_changes_no_bit_of_later_steps(client, substeps):
 
 @pytest.mark.usefixtures("plane")
 def test_a_body_that_loses_its_place_is_left_out_and_the_others_go_on(client):
-    stays, goes = cube_at(client, 0, 0, 0.0499), box(client, 1, 0, 0.0499)
+    stays, goes = cube_at(client, 0, 0, 0.0499), cube_at(client, 1, 0, 0.0499)
     with VolumetricContact(Bodies(client), substeps=3) as contact:
         contact.step()
         pybullet.applyExternalForce(goes, -1, [float("nan"), 0, 0], [1, 0, 0], pybullet.WORLD_FRAME, client)

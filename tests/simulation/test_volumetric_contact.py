@@ -55,7 +55,7 @@ def test_a_falling_body_bounces_back_to_about_the_same_height(client, stiffness,
 @pytest.mark.parametrize("speed", [np.nan, 1e200])
 @pytest.mark.parametrize("substeps", ["auto", 3])
 def test_a_body_without_a_finite_velocity_has_no_contacts_and_the_others_go_on(client, speed, substeps):
-    """Of two stacks of a cube on a slab, the cube of the second is lost: the first goes on."""
+    """There are two stacks of a cube on a slab. The cube of the second is lost, and the first goes on."""
     heights = []
     for lost in (False, True):
         pybullet.resetSimulation(physicsClientId=client)

@@ -73,7 +73,7 @@ def raises(error):
 
 
 def surroundings():
-    """What a task before this one may have changed in the process."""
+    """The state of the process, which a task before this one may have changed."""
     assert os.getcwd() == FOLDER and "MISDEED" not in os.environ
     assert signal.getsignal(signal.SIGTERM) == signal.getsignal(signal.SIGUSR1) == signal.SIG_DFL
     assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] > 3
@@ -150,7 +150,7 @@ def build(client, *, deed="nothing", again=0):
 
 DONE = "done", ""
 
-# What a sweep must say: done, or how the task failed, and a pattern of the sentence.
+# The words that a sweep must say: done, or how the task failed, and a pattern of the sentence.
 MUST_SAY = {
     "fork and die": ("died", r"its process ended with signal SIGABRT"),
     "fork and exit": ("died", r"its process ended with exit code 3"),

@@ -242,7 +242,7 @@ def test_a_long_parquet_table_has_few_and_large_row_groups(tmp_path):
 
 
 def test_every_value_comes_back_from_every_kind_of_table(tmp_path):
-    """What CSV, Parquet and SQLite are given is what they give back; SQLite has no NaN and no negative zero."""
+    """CSV, Parquet and SQLite give back what they were given; SQLite has no NaN and no negative zero."""
     odd = [5e-324, -1.7976931348623157e308, 0.1, 1 / 3, math.inf, -math.inf, -0.0, math.nan, None]
     names = ["NA", "null", "nan", "true", "1", " a ", 'a "b", c', "#", "ä€𝄞", "a\\nb", "inf", "N/A", None]
     made = [

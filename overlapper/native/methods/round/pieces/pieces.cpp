@@ -17,8 +17,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Mat3 rounded(const WideMatrix& m) { return {rounded(m.row0), rounded(m.row1), rounded(m.row2)}; }
 
-/// Places the pieces of a body in the world, in double-double. What matters is the polytope around the common set or,
-/// if it is not known, the other body.
+/// Places the pieces of a body in the world, in double-double. Only what is near the polytope around the common set
+/// matters or, if that is not known, near the other body.
 class PlacingCutter final : public Cutter {
  public:
   PlacingCutter(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
