@@ -270,27 +270,30 @@ class BallAndTube(Slices):
         rest = thick - thin - away * away - 2 * away * radius
         tube_is_thin = self.thin <= self.thick
         least = root(min(self.thin, self.thick))
+        pi, turned = arb.pi(), acb(0, 1)
         excess, least_square = arb(abs(self.thick - self.thin)), least * least
 
         def slice_(angle: acb, analytic: bool) -> acb:
-            cosine, sine = angle.cos(), angle.sin()
-            half_sine = (angle / 2).sin()
+            cosine = angle.cos()
             long_square = excess + least_square * cosine * cosine
             long = long_square.sqrt(analytic=analytic)
             short = least * cosine
             tube, disc = (short, long) if tube_is_thin else (long, short)
-            less = 2 * radius * half_sine**2 if tube_is_thin else least_square * sine * sine / (radius + tube)
+            if tube_is_thin:
+                less = 2 * radius * (angle / 2).sin() ** 2
+            else:
+                less = least_square * angle.sin() ** 2 / (radius + tube)
             height = away + tube
             reach = (rest + 2 * away * less).sqrt(analytic=analytic)
-            other = acb(0, 1) * reach
+            other = turned * reach
             if height.real.mid() >= 0:
-                turn = -acb(0, 1) * ((height + other) / disc).log(analytic=analytic)
+                turn = -turned * ((height + other) / disc).log(analytic=analytic)
             else:
-                turn = arb.pi() + acb(0, 1) * ((other - height) / disc).log(analytic=analytic)
+                turn = pi + turned * ((other - height) / disc).log(analytic=analytic)
             found = (disc * disc * turn - height * reach) * short
             if not analytic and not found.is_finite():
                 # Near a pole of the ball the angle has no bounds: the area is between 0 and that of the disc.
-                return acb((arb.pi() * disc * disc * short).real.union(arb(0)))
+                return acb((pi * disc * disc * short).real.union(arb(0)))
             return found
 
         ends = [arb.atan2(t, (least * least - t * t).nonnegative_part().sqrt()) for t in (low, high)]

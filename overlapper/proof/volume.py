@@ -252,5 +252,5 @@ def proved_bounds(a: Placed, b: Placed, is_narrow: Callable[[Bounds], bool]) -> 
         bounds = common.bounds(bits)
         if bounds and is_narrow(bounds):
             return bounds
-        bits *= 2
+        bits += bits // 2
     raise CertificateError("the common volume could not be bounded: the bodies may only touch")
