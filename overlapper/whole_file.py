@@ -3,16 +3,25 @@
 What is being written to `run.csv` is in `run.unfinished.csv`, or, if another run is at it or was killed there, in
 `run.unfinished-2.csv`, and so on. A name that is taken is never written to, so that no run disturbs another, and
 nothing that a run has left is lost.
+
+Pages, meshes and the like are written at once, to a hidden file that is locked meanwhile. A part of a page is of no
+use: the next run takes over what a killed one has left. Without locks (Windows, some network disks) it stays.
 """
 
 from __future__ import annotations
 
 import errno
+import itertools
 import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # on Windows
+    fcntl = None  # type: ignore[assignment]
 
 
 def unfinished(place: Path, number: int = 1, ending: str | None = None) -> Path:
@@ -26,21 +35,61 @@ def claim(place: Path, ending: str | None = None) -> Path:
 
     OSError if there can be none, or if `place` is what no file should replace: a folder, a device.
     """
+    _must_be_replaceable(place)
+    number = 1
+    while True:
+        path = unfinished(place, number, ending)
+        try:
+            os.close(_opened(path, place, os.O_EXCL))
+            return path
+        except FileExistsError:
+            number += 1
+
+
+def _must_be_replaceable(place: Path) -> None:
     with suppress(FileNotFoundError):
         kind = place.stat().st_mode
         if not stat.S_ISREG(kind):
             reason = errno.EISDIR if stat.S_ISDIR(kind) else errno.EINVAL
             raise OSError(reason, os.strerror(reason), str(place))
-    number = 1
-    while True:
-        path = unfinished(place, number, ending)
+
+
+def _opened(path: Path, place: Path, flags: int) -> int:
+    """A file that is made if it is not there. FileExistsError is of the file, any other OSError of its place."""
+    try:
+        return os.open(path, os.O_RDWR | os.O_CREAT | flags, 0o666)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(place)) from error
+
+
+def _own(place: Path) -> tuple[Path, int | None]:
+    """An empty file beside `place` and the descriptor that locks it: a new file, or what a killed process has left."""
+    for number in itertools.count(1) if fcntl else ():
+        path = place.with_name(f".{place.stem}.begun-by-overlapper-{number}{place.suffix}")
+        descriptor = _opened(path, place, 0)
         try:
-            os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-            return path
-        except FileExistsError:
-            number += 1
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            raise OSError(error.errno, error.strerror, str(place)) from error
+            os.close(descriptor)
+            if isinstance(error, BlockingIOError):
+                continue
+            path.unlink(missing_ok=True)
+            break  # this file system has no locks
+        # Another process may have moved the file to its place since it was opened.
+        if path.exists() and os.path.samestat(os.fstat(descriptor), path.stat()):
+            os.ftruncate(descriptor, 0)
+            return path, descriptor
+        os.close(descriptor)
+    return claim(place), None
+
+
+def _disown(path: Path, lock: int | None, remove: bool) -> None:
+    if remove:
+        path.unlink(missing_ok=True)
+    if lock is not None:
+        os.close(lock)
 
 
 def settle(written: Path, place: Path) -> None:
@@ -60,15 +109,19 @@ def settle(written: Path, place: Path) -> None:
 @contextmanager
 def beside(place: str | Path) -> Iterator[Path]:
     """An empty file to be written, which takes its place when the block ends; if that raises, all is as it was."""
-    path = claim(Path(place))
+    place = Path(place)
+    _must_be_replaceable(place)
+    path, lock = _own(place)
+    moved = False
     try:
         yield path
-        settle(path, Path(place))
-    except BaseException:
-        path.unlink(missing_ok=True)
-        raise
+        settle(path, place)
+        moved = True
+    finally:
+        _disown(path, lock, remove=not moved)
 
 
 def must_be_writable(place: Path) -> None:
     """OSError if a file could not be put there: better now than after a run."""
-    claim(place).unlink()
+    _must_be_replaceable(place)
+    _disown(*_own(place), remove=True)

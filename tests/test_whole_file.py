@@ -4,17 +4,20 @@ import builtins
 import errno
 import io
 import os
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
-from overlapper import Box, Hull
+from overlapper import Box, Hull, whole_file
 from overlapper.polytopes.mesh_file import write_mesh
 from overlapper.tables.still import Still
 from overlapper.tables.table_file import TABLES, read_table
 from overlapper.verdicts.expected import DRIFT, ROUNDING, Expected
 from overlapper.viewer import Recording, picture
-from overlapper.whole_file import beside, settle, unfinished
+from overlapper.whole_file import beside, claim, settle, unfinished
 
 CORNERS = np.random.default_rng(0).normal(size=(12, 3))
 KEYS = [(0, -1, 0), (1, -1, 0)]
@@ -132,13 +135,61 @@ def test_an_exception_while_writing_leaves_all_files_as_they_were(tmp_path):
     assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == [("a.txt", "earlier")]
 
 
-def test_an_existing_file_is_not_overwritten(tmp_path):
+def test_a_table_overwrites_no_existing_file(tmp_path):
+    place = tmp_path / "a.csv"
+    unfinished(place).write_text("thesis")
+    path = claim(place)
+    assert path == unfinished(place, 2) == tmp_path / "a.unfinished-2.csv"
+    assert unfinished(place).read_text() == "thesis"
+
+
+def left_by_a_killed_process(place):
+    """The file that a process has begun beside `place`, and has half written when it is killed."""
+    code = "import os, sys; from overlapper.whole_file import beside\n"
+    code += "with beside(sys.argv[1]) as path: path.write_text('half'); os.kill(os.getpid(), 9)"
+    assert subprocess.run([sys.executable, "-c", code, place], check=False).returncode == -signal.SIGKILL
+    (left,) = place.parent.iterdir()
+    return left
+
+
+def test_a_file_that_a_killed_process_has_begun_is_taken_over(tmp_path):
+    place = tmp_path / "a.txt"
+    left = left_by_a_killed_process(place)
+    assert left.read_text() == "half"
+    with beside(place) as path:
+        assert path == left and path.read_text() == ""
+        path.write_text("new")
+    assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == [("a.txt", "new")]
+
+
+def test_two_runs_at_once_disturb_each_other_nowhere(tmp_path):
+    place = tmp_path / "a.txt"
+    with beside(place) as first:
+        with beside(place) as second:
+            assert first != second
+            first.write_text("first")
+            second.write_text("second")
+        assert place.read_text() == "second"
+    assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == [("a.txt", "first")]
+
+
+@pytest.mark.parametrize("locks", [None, errno.ENOLCK, errno.ENOSYS])
+def test_without_locks_a_file_is_still_whole_and_overwrites_no_other(tmp_path, monkeypatch, locks):
+    def no_lock(*_):
+        raise OSError(locks, os.strerror(locks))
+
+    if locks is None:
+        monkeypatch.setattr(whole_file, "fcntl", None)
+    else:
+        monkeypatch.setattr(whole_file.fcntl, "flock", no_lock)
     place = tmp_path / "a.txt"
     unfinished(place).write_text("thesis")
     with beside(place) as path:
-        assert path == unfinished(place, 2) == tmp_path / "a.unfinished-2.txt"
         path.write_text("new")
-    assert place.read_text() == "new" and unfinished(place).read_text() == "thesis"
+    assert {each.name: each.read_text() for each in tmp_path.iterdir()} == {
+        "a.txt": "new",
+        "a.unfinished.txt": "thesis",
+    }
 
 
 def test_a_file_is_on_the_disk_before_it_takes_its_place(tmp_path, monkeypatch):

@@ -528,7 +528,7 @@ def _opened_sqlite(path: Path) -> Iterator[sqlite3.Connection]:
                 if not re.match(r"(?i)create\s+table\b", str(kinds.get(name))):
                     raise ValueError(f"it has no table {name!r}")
             yield connection
-    except (sqlite3.Error, ValueError, OverflowError) as error:
+    except (sqlite3.Error, ValueError, OverflowError, MemoryError) as error:  # a page may claim any length
         raise _no_table(path, error) from error
 
 
