@@ -158,22 +158,24 @@ bool Culling::share(const Meeting& meeting, EnclosingPolytope& polytope) const {
   const auto work = [](const EnclosedPiece& part, const std::vector<int>& of_other) {
     return part.around.corners.size() * (of_other.size() + part.uncut.size() + 1);
   };
-  const bool from_p = work(a_.parts[meeting.p], meeting.of_q) <= work(b_.parts[meeting.q], meeting.of_p);
-  polytope = (from_p ? a_.parts[meeting.p] : b_.parts[meeting.q]).around;
-  const std::vector<int>& known = from_p ? meeting.of_p : meeting.of_q;
+  const EnclosedPiece &p = a_.parts[meeting.p], &q = b_.parts[meeting.q];
+  const bool from_p = work(p, meeting.of_q) <= work(q, meeting.of_p);
+  polytope = (from_p ? p : q).around;
+  const std::vector<int>&known = from_p ? meeting.of_p : meeting.of_q, &uncut = (from_p ? p : q).uncut;
   const int size = static_cast<int>(meeting.walls.size()), of_p = static_cast<int>(meeting.of_p.size());
+  // The walls of p come before those of q.
+  const int first = from_p ? 0 : of_p, first_other = from_p ? of_p : 0, end_other = from_p ? size : of_p;
   for (EnclosingPolytope::Face& face : polytope.faces) {
     const auto at = std::ranges::find(known, face.wall);
-    face.wall = at == known.end() ? kNoWall : static_cast<int>(at - known.begin()) + (from_p ? 0 : of_p);
+    face.wall = at == known.end() ? kNoWall : static_cast<int>(at - known.begin()) + first;
   }
   const auto cut = [&](int w) {
     cancellation_point(polytope.corners.size());
     return polytope.cut({rounded(meeting.walls[w].normal), meeting.walls[w].slack.head, w});
   };
-  const std::vector<int>& uncut = (from_p ? a_.parts[meeting.p] : b_.parts[meeting.q]).uncut;
   for (size_t i = 0; i < known.size() && !uncut.empty(); ++i)
-    if (std::ranges::binary_search(uncut, known[i]) && !cut(static_cast<int>(i) + (from_p ? 0 : of_p))) return false;
-  for (int w = from_p ? of_p : 0; w < (from_p ? size : of_p); ++w)
+    if (std::ranges::binary_search(uncut, known[i]) && !cut(static_cast<int>(i) + first)) return false;
+  for (int w = first_other; w < end_other; ++w)
     if (!cut(w)) return false;
   return true;
 }

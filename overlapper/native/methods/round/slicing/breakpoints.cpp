@@ -59,22 +59,12 @@ class Candidates {
     }
   }
 
-  /// Those between low and high in which a plane meets corners of the two quadrics: by samples, and between samples on
-  /// either side of the plane by false position.
+  /// Those between low and high where a plane meets a corner of the two quadrics. Samples find them, and false position
+  /// between two samples on either side of the plane.
   void trace(double low, double high) {
     const Quadric &p = stack_.quadric[0], &q = stack_.quadric[1];
     if (stack_.quadrics < 2 || (!p.ball && !q.ball && parallel(p, q))) return;
-    const double middle = low + (high - low) / 2, half = (high - low) / 2;
-    for (int k = 0; k < kSamples; ++k) {
-      static const std::array<double, kSamples> kPlaces = places();
-      samples_[k] = middle + half * kPlaces[k];
-    }
-    samples_.front() = low, samples_.back() = high;
-    for (int row = 0; row < kSamples / kRow; ++row) {
-      Row t;
-      std::copy_n(samples_.begin() + row * kRow, kRow, t.begin());
-      find_sides(stack_, t, {}, sides_[row]);
-    }
+    find_samples(low, high);
     for (int i = 0; i < stack_.lines - 4; ++i) {
       const Line& side = stack_.line[i];
       if (plane(i) || (stack_.ball < 0 && side.quadric != 0)) continue;
@@ -89,12 +79,24 @@ class Candidates {
   }
 
  private:
-  /// Denser towards both ends, where sides are steep, and the ends themselves: however near to where the sides of a
-  /// cylinder meet a plane cuts off a corner of them, that is between two samples.
+  /// Between -1 and 1, both included, and denser towards both ends, where sides are steep. A plane may cut off a corner
+  /// very near the end where the sides of a cylinder meet: that corner, too, is between two samples.
   static Samples places() {
     Samples result;
     for (int k = 0; k < kSamples; ++k) result[k] = -std::cos(std::numbers::pi * k / (kSamples - 1));
     return result;
+  }
+
+  void find_samples(double low, double high) {
+    static const Samples kPlaces = places();
+    const double middle = low + (high - low) / 2, half = (high - low) / 2;
+    for (int k = 0; k < kSamples; ++k) samples_[k] = middle + half * kPlaces[k];
+    samples_.front() = low, samples_.back() = high;
+    for (int row = 0; row < kSamples / kRow; ++row) {
+      Row t;
+      std::copy_n(samples_.begin() + row * kRow, kRow, t.begin());
+      find_sides(stack_, t, {}, sides_[row]);
+    }
   }
 
   bool plane(int i) const { return stack_.line[i].quadric < 0; }
@@ -328,7 +330,17 @@ class Candidates {
   std::array<Sides, kSamples / kRow> sides_;
 };
 
-/// Finds what the closed forms have not, and puts intervals together that have the same outline.
+/// Halves the interval up to the last bit. `before(t)` is true if t lies before the change that is looked for.
+template <class Before>
+void halve(double& low, double& high, Before before) {
+  for (int step = 0; step < 60; ++step) {
+    const double middle = low + (high - low) / 2;
+    if (middle <= low || middle >= high) return;
+    (before(middle) ? low : high) = middle;
+  }
+}
+
+/// Finds the changes of the outline that closed forms do not give, and joins intervals with the same outline.
 class Settling {
  public:
   Settling(const Stack& stack, bool closely, std::vector<Interval>& intervals)
@@ -443,13 +455,12 @@ class Settling {
       // The first change between here and there, or one of them.
       double before = here, after = there;
       Outline then = last;
-      for (int step = 0; step < 60; ++step) {
-        const double middle = before + (after - before) / 2;
-        if (middle <= before || middle >= after) break;
-        const Outline found = at(middle);
-        if (found == now) before = middle;
-        else after = middle, then = found;
-      }
+      halve(before, after, [&](double t) {
+        const Outline found = at(t);
+        if (found == now) return true;
+        then = found;
+        return false;
+      });
       append(from, after, now);
       from = here = after;
       now = then;
@@ -473,13 +484,10 @@ class Settling {
     Interval* before = i > 0 ? &intervals_[i - 1] : nullptr;
     Interval* after = i < intervals_.size() ? &intervals_[i] : nullptr;
     if ((before && !(low > before->low)) || (after && !(high < after->high))) return;
-    const Outline of_before = before ? before->outline : Outline{};
-    if (!(at(low) == of_before) || !(at(high) == (after ? after->outline : Outline{}))) return;
-    for (int step = 0; step < 60; ++step) {
-      const double middle = low + (high - low) / 2;
-      if (middle <= low || middle >= high) break;
-      (at(middle) == of_before ? low : high) = middle;
-    }
+    const auto outline_of = [](const Interval* interval) { return interval ? interval->outline : Outline{}; };
+    const Outline of_before = outline_of(before);
+    if (!(at(low) == of_before) || !(at(high) == outline_of(after))) return;
+    halve(low, high, [&](double t) { return at(t) == of_before; });
     if (before) before->high = after ? high : low;
     if (after) after->low = high;
   }

@@ -105,33 +105,41 @@ class Bundle {
     }
   }
 
+  /// The line of an edge; edges are counted around the outline.
+  int line_of(int i) const { return outline_.edge[(i + outline_.edges) % outline_.edges].line; }
+
+  /// The ends of edge i. `last` is the end of the edge before, and `first` the beginning of edge 0.
+  void find_ends(int i, const Points& last, Points& first, Points& from, Points& to, Points& unused) const {
+    const Outline::Edge& edge = outline_.edge[i];
+    if (edge.from_circle || edge.to_circle)
+      crossings(stack_.line[edge.line], edge.from_circle ? from : unused, edge.to_circle ? to : unused);
+    if (!edge.from_circle) {
+      if (i > 0) from = last;
+      else corner(line_of(i - 1), edge.line, from);
+    }
+    if (i == 0) first = from;
+    if (!edge.to_circle) {
+      if (i == outline_.edges - 1) to = first;
+      else corner(edge.line, line_of(i + 1), to);
+    }
+  }
+
   void go_round() {
     const int edges = outline_.edges;
     Points buffer[5];
     Points *first = &buffer[0], *from = &buffer[1], *to = &buffer[2], *last = &buffer[3], *unused = &buffer[4];
     for (int i = 0; i < edges; ++i) {
       const Outline::Edge& edge = outline_.edge[i];
-      const int before = outline_.edge[(i + edges - 1) % edges].line, after = outline_.edge[(i + 1) % edges].line;
       const Line& line = stack_.line[edge.line];
-      if (edge.from_circle || edge.to_circle)
-        crossings(line, edge.from_circle ? *from : *unused, edge.to_circle ? *to : *unused);
-      if (!edge.from_circle) {
-        if (i > 0) *from = *last;
-        else corner(before, edge.line, *from);
-      }
-      if (i == 0) *first = *from;
-      if (!edge.to_circle) {
-        if (i == edges - 1) *to = *first;
-        else corner(edge.line, after, *to);
-      }
+      find_ends(i, *last, *first, *from, *to, *unused);
       if (line.quadric < 0) add_edge(line, *from, *to);
       else add_side(line, *from, *to);
       if (i > 0 && edge.from_circle) {
-        add_arc(*last, *from, before, edge.line);
+        add_arc(*last, *from, line_of(i - 1), edge.line);
         add_triangle(*first, *last, *from);
       }
       if (i > 0 && (i < edges - 1 || edge.to_circle)) add_triangle(*first, *from, *to);
-      if (i == edges - 1 && edge.to_circle) add_arc(*to, *first, edge.line, outline_.edge[0].line);
+      if (i == edges - 1 && edge.to_circle) add_arc(*to, *first, edge.line, line_of(0));
       std::swap(to, last);
     }
   }
@@ -248,19 +256,23 @@ class Bundle {
     }
   }
 
-  /// The arcs from p to q, counter-clockwise: the segments beyond their chords, and the zone of the sphere.
-  void add_arc(const Points& p, const Points& q, int before, int after) {
-    const Quadric& ball = stack_.quadric[stack_.ball];
-    const double level = ball.level, stretch = 1 + dot(ball.shear, ball.shear), along = std::abs(2 * ball.along);
-    const double slack = std::abs(ball.slack), of_ball = stack_.stretch ? 0 : ball.radius;
+  /// The chord of the arc from p to q in each slice, and half the angle of the arc.
+  struct Chords {
+    Row length, distance;  ///< the distance of the centre from the chord, negative if the arc is less than half a turn
+    Row x, y;              ///< the unit vector across the chord, to the arc
+    Row angle, sine, cosine;
+  };
+
+  /// `before` and `after` are the lines that end at p and begin at q.
+  void find_chords(const Points& p, const Points& q, int before, int after, Chords& chords) const {
+    auto& [length, distance, ax, ay, angle, sine, cosine] = chords;
     const Row& radius = sides_.half[stack_.ball];
-    // Nearly all of a circle lies between two lines that leave nearly all of the disc only where these are one, or turn
-    // back; else next to nothing.
+    // If two lines leave nearly all of the disc, the arc between them is nearly all of the circle or next to nothing.
+    // It is nearly all only if the lines are one line, or turn back.
     const bool back = slicing::cross(stack_.line[before].normal, stack_.line[after].normal) <= 0;
     Row one, two;
     beyond(stack_.line[before], one), beyond(stack_.line[after], two);
-    Row length, distance, ax, ay, angle, sine, cosine;
-    double least = 4, most = 0, shortest = 0;
+    double shortest = 0;
     for (int k = 0; k < kRow; ++k) {
       const double cx = q.x[k] - p.x[k], cy = q.y[k] - p.y[k], l = std::sqrt(cx * cx + cy * cy);
       const double inverse = l > 0 ? 1 / l : 0, x = cy * inverse, y = -cx * inverse;
@@ -274,11 +286,8 @@ class Bundle {
       sine[k] = h / whole, cosine[k] = d / whole;
       angle[k] = half_turn_angle(h / whole, d / whole);
     }
-    for (int k = 0; k < kRow; ++k) {
-      least = std::min(least, angle[k]), most = std::max(most, angle[k]);
-      shortest = std::min(shortest, length[k] - kShort * radius[k]);
-    }
-    // Across a chord that is nothing but rounding is the way from the centre.
+    for (int k = 0; k < kRow; ++k) shortest = std::min(shortest, length[k] - kShort * radius[k]);
+    // If a chord is only rounding, the way from the centre is the direction across it.
     for (int k = 0; shortest < 0 && k < kRow; ++k) {
       if (!(length[k] < kShort * radius[k])) continue;
       const Point away =
@@ -286,12 +295,31 @@ class Bundle {
       const double far = std::copysign(norm(away), distance[k]);
       if (far != 0) ax[k] = away.x / far, ay[k] = away.y / far;
     }
+  }
+
+  static Segments segments_of(const Chords& chords) {
+    const Row& angle = chords.angle;
+    double least = 4, most = 0;
+    for (int k = 0; k < kRow; ++k) least = std::min(least, angle[k]), most = std::max(most, angle[k]);
     Segments segments{};
     if (least < quadric::kNarrow) {
       if (most < 0.1) narrow_segments<8>(angle, segments);
       else narrow_segments<quadric::SegmentSeries::kTerms>(angle, segments);
     }
-    if (most >= quadric::kNarrow) wide_segments(angle, sine, cosine, segments);
+    if (most >= quadric::kNarrow) wide_segments(angle, chords.sine, chords.cosine, segments);
+    return segments;
+  }
+
+  /// Adds the arcs from p to q, counter-clockwise: the segments beyond their chords, and the zone of the sphere.
+  void add_arc(const Points& p, const Points& q, int before, int after) {
+    const Quadric& ball = stack_.quadric[stack_.ball];
+    const double level = ball.level, stretch = 1 + dot(ball.shear, ball.shear), along = std::abs(2 * ball.along);
+    const double slack = std::abs(ball.slack), of_ball = stack_.stretch ? 0 : ball.radius;
+    const Row& radius = sides_.half[stack_.ball];
+    Chords chords;
+    find_chords(p, q, before, after, chords);
+    const Row &length = chords.length, &ax = chords.x, &ay = chords.y, &angle = chords.angle;
+    const Segments segments = segments_of(chords);
     Row strip, blur, px, py, up, t_up, size;
     for (int k = 0; k < kRow; ++k) {
       const double r = radius[k], r2 = r * r, w = segments.area[k] * r2, f = segments.first_across[k] * r2 * r;

@@ -100,25 +100,33 @@ bool replaced(Polygon& polygon, const Slice& slice, int line) {
   return false;
 }
 
-/// Cuts off what lies beyond the line, with `spare` to work in and to be exchanged; false if nothing is left.
+/// The corners of a polygon on the inner side of a line: `count` corners in turn, from `first`.
+struct InnerCorners {
+  int first = 0, count = 0;
+
+  InnerCorners(const Polygon& polygon, Point normal, double side) {
+    const int size = polygon.size;
+    std::array<bool, kMostLines + 8> inner;
+    for (int i = 0; i < size; ++i) {
+      inner[i] = side - dot(normal, polygon.corner(i)) >= 0;
+      count += inner[i];
+    }
+    if (count == size || count == 0) return;
+    while (!inner[first] || inner[first > 0 ? first - 1 : size - 1]) ++first;
+  }
+};
+
+/// Cuts off the part beyond the line; false if nothing is left. `spare` is memory, which is exchanged with the polygon.
 bool clip(Polygon*& now, Polygon*& spare_one, const Slice& slice, int line) {
   if (replaced(*now, slice, line)) return true;
   const Polygon& polygon = *now;
   Polygon& spare = *spare_one;
   const Stack& stack = slice.stack;
-  const Point normal = stack.line[line].normal;
   const double side = slice.side(line);
   const int size = polygon.size;
-  std::array<bool, kMostLines + 8> kept;
-  int count = 0;
-  for (int i = 0; i < size; ++i) {
-    kept[i] = side - dot(normal, polygon.corner(i)) >= 0;
-    count += kept[i];
-  }
+  auto [first, count] = InnerCorners(polygon, stack.line[line].normal, side);
   if (count == size) return true;
   if (count == 0) return false;
-  int first = 0;
-  while (!kept[first] || kept[first > 0 ? first - 1 : size - 1]) ++first;
   const auto wrapped = [size](int i) { return i < size ? i : i - size; };
   // The nearer one of two lines of one direction counts alone, whatever rounding says of the other's corners.
   const auto farther = [&](int edge) {
