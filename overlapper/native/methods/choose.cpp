@@ -1,7 +1,6 @@
 #include "methods/choose.h"
 
 #include <algorithm>
-#include <cassert>
 #include <limits>
 #include <stdexcept>
 

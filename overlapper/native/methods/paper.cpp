@@ -4,7 +4,6 @@
 #include <atomic>
 #include <future>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <thread>
 #include <unordered_set>

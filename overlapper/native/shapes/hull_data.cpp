@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cfloat>
 #include <limits>
-#include <numeric>
 #include <string>
 
 #include "geometry/cancellation.h"

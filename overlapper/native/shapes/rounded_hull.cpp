@@ -5,7 +5,6 @@
 #include <limits>
 #include <numbers>
 #include <stdexcept>
-#include <string>
 
 #include "geometry/cancellation.h"
 #include "shapes/cutter.h"

@@ -1,7 +1,6 @@
 #include "methods/round/quadric/cylinder.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -14,13 +13,14 @@ namespace overlapper::quadric {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kUnit = 0x1p-53;        ///< of rounding
-constexpr double kPlacing = 16 * kUnit;  ///< of how far numbers reach: where an edge leaves the cylinder
-constexpr double kNearlyWhole = 1e-5;    ///< rad: an arc of less may be the rest of a turn
-constexpr double kUpright = 1e-12;       ///< of a plane's normal along the axis: its arcs are straight
-constexpr double kGrazing = 1e-6;        ///< the square of the sine between a face and the surface
-constexpr double kBeyond = 1e-12;        ///< of how far numbers reach: a plane is out of reach
-constexpr double kOpen = 1e-9;           ///< of what sums to zero, without a wrong turn
+constexpr double kUnit = 0x1p-53;        ///< unit of rounding
+constexpr int kMostRoundings = 16;       ///< in a term of a sum
+constexpr double kPlacing = 16 * kUnit;  ///< error of the points where edges leave the cylinder, over their reach
+constexpr double kNearlyWhole = 1e-5;    ///< rad: a shorter arc may be the rest of a whole turn
+constexpr double kUpright = 1e-12;       ///< a normal with a smaller component along the axis has straight arcs
+constexpr double kGrazing = 1e-6;        ///< squared sine between the surface and a face that grazes it
+constexpr double kBeyond = 1e-12;        ///< margin of a plane that is out of reach, over the reach of numbers
+constexpr double kOpen = 1e-9;           ///< largest relative sum of terms that should sum to zero
 
 /// Functions of an arc's half angle x, as in SegmentSeries. All are odd.
 struct Arc {
@@ -50,7 +50,7 @@ ThirdMoments third_moments(double x, double s, double c, double along) {
     const double square = x * x, cube = square * x;
     return {cube * series(kSegmentSeries.third_across, square), cube * series(kSegmentSeries.across_along, square)};
   }
-  // About the middle of the disc, then about the chord's.
+  // Moments about the middle of the disc, then about the middle of the chord.
   const double s2 = s * s, s3 = s2 * s, s5 = s3 * s2;
   const double one = x - s * c, to1 = 2.0 / 3 * s3, to2 = one / 4 + s3 * c / 2, to3 = 2 * (s3 / 3 - s5 / 5);
   return {to3 - c * (3 * to2 - c * (3 * to1 - c * one)), 2.0 / 15 * s5 - c * along};
@@ -59,13 +59,13 @@ ThirdMoments third_moments(double x, double s, double c, double along) {
 /// The part of an edge inside the cylinder.
 struct CylinderChord {
   Vec3 from, to;
-  bool from_surface, to_surface;  ///< whether that is where it enters or leaves, and not a corner
+  bool from_surface, to_surface;  ///< whether the end is on the cylinder, and not a corner
 };
 
 double cross2(Vec3 a, Vec3 b) { return a.x * b.y - a.y * b.x; }
 double dot2(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y; }
 
-/// The same points whichever way round the edge is asked for.
+/// The part of the edge from p to q inside the cylinder; false if there is none.
 bool find_chord(Vec3 p, Vec3 q, bool p_inside, bool q_inside, double radius, CylinderChord& chord) {
   chord = {p, q, !p_inside, !q_inside};
   if (p_inside && q_inside) return true;
@@ -83,13 +83,12 @@ bool find_chord(Vec3 p, Vec3 q, bool p_inside, bool q_inside, double radius, Cyl
 
 /// Sums over the part of a face inside the cylinder.
 struct FaceSums : Section {
-  double sizes = 0;  ///< m²: of the areas that are summed
-  /// ∫ (ρ² − r²) x dA, of the distance ρ from the axis, and ∫ z³ dA.
-  Vec3 within;
-  double cubes = 0;
+  double sizes = 0;  ///< m²: the sum of the absolute areas
+  Vec3 within;       ///< ∫ (ρ² − r²) x dA, where ρ is the distance from the axis
+  double cubes = 0;  ///< ∫ z³ dA
 };
 
-/// The polyhedron about the point of the axis that is as high as its middle.
+/// The polyhedron about the point of the axis at half of its height.
 struct AboutAxis {
   const Rings* polyhedron = nullptr;
   double radius = 0, level = 0, height = 0;
@@ -116,15 +115,18 @@ struct CylinderSums {
   CylinderPart part;
   int terms = 0;
   double cones = 0, sizes = 0, all_area = 0;
-  double upward = 0;               ///< m²: of faces that look up, as seen along the axis
-  double far2 = 0;                 ///< m²: of how far corners of edges that are cut are from the origin
-  double turned = 0;               ///< rad
+  double upward = 0;               ///< m²: area of faces that look up, seen along the axis
+  double far2 = 0;                 ///< m²: largest squared distance of a cut edge's corner from the origin
+  double turned = 0;               ///< rad: sum over the arcs
   double levels = 0, squares = 0;  ///< ∫ z dθ and ∫ z² dθ along the arcs
   Vec3 height_moments;             ///< Σ h ∫ x dA
   double radial = 0;               ///< Σ ∫ (ρ² − r²) (n_x x + n_y y) dA
-  Vec3 lengthwise, across;  ///< Σ of n_x and n_y times that ∫ of x and y, n_z ∫ z³ dA; of those of two coordinates
+  /// Σ n_x ∫ (ρ² − r²) x dA, Σ n_y ∫ (ρ² − r²) y dA and Σ n_z ∫ z³ dA.
+  Vec3 lengthwise;
+  /// Σ n_y ∫ (ρ² − r²) z dA, Σ n_x ∫ (ρ² − r²) z dA, and half of Σ n_x ∫ (ρ² − r²) y dA + Σ n_y ∫ (ρ² − r²) x dA.
+  Vec3 across;
 
-  /// The part of a face inside, in a plane of such a normal and offset.
+  /// Adds the part of a face inside. `n` and `offset` are those of its plane.
   void add_face(Vec3 n, double offset, const FaceSums& face, bool is_cut) {
     const double area = face.area;
     ++part.faces, ++terms;
@@ -159,16 +161,16 @@ void find_chords(const AboutAxis& at, std::span<const int> ring, std::vector<Cyl
   sums.terms += 2 * static_cast<int>(chords.size());
 }
 
-/// Whether a face that has no edge inside reaches all around: a steeper face would be higher than the polyhedron.
+/// Whether a face without an edge inside reaches all around. A steeper face would be higher than the polyhedron.
 bool around(const AboutAxis& at, std::span<const int> ring, Vec3 n) {
   if (!(std::abs(n.z) * at.height > at.radius * std::hypot(n.x, n.y))) return false;
-  double twice = 0;  // its area as seen along the axis
+  double twice = 0;  // twice its area, seen along the axis
   for (size_t k = 0; k < ring.size(); ++k) {
     const double turn = cross2(at.corners[ring[k]], at.corners[ring[k + 1 < ring.size() ? k + 1 : 0]]) * n.z;
     if (turn < 0) return false;
     twice += turn;
   }
-  // A face that is nothing but rounding may seem to lie around anything.
+  // A face that is only rounding may seem to lie around anything.
   return twice >= 6 * std::abs(n.z) * at.radius * at.radius;
 }
 
@@ -210,14 +212,16 @@ void add_triangle(Vec3 n, Vec3 a, Vec3 b, Vec3 c, double radius, FaceSums& face)
   for (const Vec3 corner : {a, b, c}) at(25.0 / 48, 0.2 * sum + 0.4 * corner);
 }
 
-/// Whether a face lies along the surface there: its area is as uncertain as the root of where it lies.
+/// Whether a face is nearly tangent to the surface at `end`. The error of its area is then the root of the error of its
+/// place.
 bool grazes(Vec3 n, Vec3 end, double radius) {
   const double sine = dot2(n, end) / radius;
   return !(1 - sine * sine > kGrazing);
 }
 
-/// The angle of an arc from p to q of a face's border, counter-clockwise seen along the axis from where its normal
-/// leads. Nothing where it may be nothing as well as a whole turn. The face's chords are `border` long.
+/// The angle of an arc from p to q of a face's border. Seen from the side of the face's normal, arcs run
+/// counter-clockwise. No value if the angle may be either 0 or a whole turn. `border` is the length of the face's
+/// chords.
 std::optional<double> arc_angle(Vec3 n, Vec3 p, Vec3 q, std::span<const CylinderChord> chords, double border,
                                 double radius) {
   const double angle = std::atan2(cross2(p, q), dot2(p, q)), turn = n.z > 0 ? 2 * kPi : -2 * kPi;
@@ -225,7 +229,7 @@ std::optional<double> arc_angle(Vec3 n, Vec3 p, Vec3 q, std::span<const Cylinder
     const bool upright = std::abs(n.z) < kUpright;
     return !upright && (n.z > 0) != (angle > 0) ? angle + turn : angle;
   }
-  // If the other border is longer than the arc's chord, the face is not between the arc and its chord.
+  // If the rest of the border is longer than the arc's chord, the face is more than the part between arc and chord.
   if (border > 100 * kNearlyWhole * radius) return angle;
   if (chords.size() != 1) return std::nullopt;
   const double side = cross2(chords[0].from, chords[0].to) * n.z;
@@ -239,8 +243,8 @@ Vec3 way_to_middle(Vec3 p, Vec3 q, double angle) {
   return (angle > 0 ? 1 : -1) / std::sqrt(dot2(way, way)) * way;
 }
 
-/// The segment of a unit disc of half angle `half`, as it lies in the face, `scale` times as large: about the middle of
-/// its chord, across that towards the arc, and along it.
+/// Adds the moments of a segment of half angle `half` in a face: that of a unit disc, `scale` times as large. `middle`
+/// is the middle of its chord. `across` leads from there towards the arc, and `along` along the chord.
 void add_segment(Vec3 middle, Vec3 across, Vec3 along, const Arc& of, double half, double s, double c, double scale,
                  double radius, FaceSums& face) {
   const double one = scale * std::abs(of.segment), a = scale * std::abs(of.across);
@@ -286,7 +290,7 @@ void add_arc(Vec3 n, Vec3 p, Vec3 q, double angle, double radius, CylinderSums& 
   if (std::abs(x) < 1e-4) sums.squares += rise * rise * x / 6;
   else if (std::abs(x) < 1.5) sums.squares += rise * rise / 4 * of.segment / (s * s);
   else sums.squares += slope * slope * of.segment;
-  // The segment, seen along the axis and as large as it is.
+  // The area of the segment, seen along the axis and in the face.
   const double seen = radius * radius * std::abs(of.segment), area = seen / std::abs(n.z);
   const double beyond = radius * radius * radius * std::abs(of.across) / std::abs(n.z);
   face.area += area, face.sizes += area;
@@ -297,7 +301,7 @@ void add_arc(Vec3 n, Vec3 p, Vec3 q, double angle, double radius, CylinderSums& 
               radius * radius / std::abs(n.z), radius, face);
 }
 
-/// The part of a face inside that chords bound, and arcs between them; nothing where an arc leaves that open.
+/// The part of a face inside, which chords and the arcs between them bound; no value if an arc leaves it open.
 std::optional<FaceSums> add_polygon(Vec3 n, std::span<const CylinderChord> chords, double radius, CylinderSums& sums) {
   FaceSums face;
   const Vec3 apex = chords[0].from;
@@ -316,11 +320,11 @@ std::optional<FaceSums> add_polygon(Vec3 n, std::span<const CylinderChord> chord
   return face;
 }
 
-/// Adds what of a face is inside, to `section`, too. False where that is open.
+/// Adds the part of a face inside, and sets `section`. False if that part is left open.
 bool add_face(const AboutAxis& at, size_t f, std::vector<CylinderChord>& chords, CylinderSums& sums, Section& section) {
   const Vec3 n = at.polyhedron->planes()[f].normal;
   const double offset = at.polyhedron->planes()[f].offset - n.z * at.level;
-  // The cylinder between the heights does not reach a plane that is farther away.
+  // The cylinder between the heights does not reach a plane farther away.
   const double reach = at.radius * std::sqrt(dot2(n, n)) + std::abs(n.z) * at.height / 2;
   if (offset > reach + kBeyond * (reach + at.radius + std::abs(at.level))) return true;
   const auto ring = at.polyhedron->ring(f);
@@ -334,15 +338,14 @@ bool add_face(const AboutAxis& at, size_t f, std::vector<CylinderChord>& chords,
   return true;
 }
 
-/// Whether the sums are those of a closed surface: it goes once around the cylinder and back, and faces look up as much
-/// as down, unless a turn is wrong. Seen along the axis, faces that look up share nothing, but where two are one but
-/// for rounding.
+/// Whether the sums are those of a closed surface. Its arcs turn forth as much as back, and its faces look up as much
+/// as down. Seen along the axis, faces that look up cover at most the disc once, but for rounding.
 bool closes(const CylinderSums& sums, double radius) {
   return std::abs(sums.turned) <= kOpen && std::abs(sums.part.curved.force.z) <= kOpen * sums.all_area &&
          sums.upward <= (1 + kOpen) * kPi * radius * radius;
 }
 
-/// About a point that is `level` lower.
+/// Changes moments about a point to moments about the point `level` lower.
 void lift(double level, double size, Vec3& first, Vec3& squares, Vec3& products) {
   squares.z += level * (2 * first.z + level * size);
   products += level * Vec3{first.y, first.x, 0};
@@ -357,13 +360,14 @@ bool finish(const AboutAxis& at, CylinderSums& sums) {
   if (!(part.volume <= (1 + kOpen) * kPi * r * r * at.height)) return false;
   part.area += curved, part.whole_area = sums.all_area + curved;
   const double reach = std::sqrt(sums.far2) + r;
-  part.error = kUnit * (16 + sums.terms) * sums.sizes / 3 + kPlacing * reach * (sums.all_area + std::abs(curved));
+  part.error =
+      kUnit * (kMostRoundings + sums.terms) * sums.sizes / 3 + kPlacing * reach * (sums.all_area + std::abs(curved));
   const Vec3 of_curved{r * part.curved.force.x, r * part.curved.force.y, r * sums.squares / 2};
   part.first = 0.25 * (sums.height_moments + r * of_curved);
   const double v = part.volume, both = sums.radial / 4 + r * r * v / 2, rest = (r * r * v - both) / 2;
   part.squares = {sums.lengthwise.x / 2 + rest, sums.lengthwise.y / 2 + rest, sums.lengthwise.z / 3};
   part.products = 0.5 * sums.across;
-  // About the origin again.
+  // Moments about the origin again.
   lift(at.level, part.volume, part.first, part.squares, part.products);
   for (Pull* pull : {&part.curved, &part.flat}) pull->moment += cross(Vec3{0, 0, at.level}, pull->force);
   return true;
@@ -377,28 +381,30 @@ struct CylinderScratch {
 
 }  // namespace
 
-// With heights h and areas A of the faces, and the area C of the curved part, all about a point of the axis,
+// Volume and centroid. Faces have heights h and areas A, and the curved part has the area C. All are about a point of
+// the axis:
 //
-//   3 V = Σ h A + r C,   C = r ∮ z dθ,   4 ∫ x dV = Σ h ∫ x dA + r ∫ x dA over the curved part,
+//   3 V = Σ h A + r C,   C = r ∮ z dθ,   4 ∫ x dV = Σ h ∫ x dA + r ∫ x dA over the curved part.
 //
-// where ∫ n dA is −Σ A n over the curved part, r times its components ∫ x dA and ∫ y dA, and ∫ z dA is ½ r ∮ z² dθ. A
-// face's part inside is a polygon of the edges' parts and of the chords of arcs, in space, and segments of an ellipse
-// beyond these: of steep faces, segments are slender, and their terms series of no cancellation.
+// Over the curved part, ∫ n dA = −Σ A n. The integrals ∫ x dA and ∫ y dA are r times its components, and
+// ∫ z dA = ½ r ∮ z² dθ. The part of a face inside is a polygon of parts of edges and of chords of arcs, and segments of
+// an ellipse beyond these chords. The segments of steep faces are slender; series without cancellation give their
+// terms.
 //
-// The fields (ρ² − r²) x e, for a coordinate x and a unit vector e orthogonal to the axis, vanish on the curved part,
-// and z³ along the axis is along it: by them, second moments are integrals over the faces alone,
+// Second moments. For a coordinate x and a unit vector e orthogonal to the axis, the field (ρ² − r²) x e vanishes on
+// the curved part. The field z³ along the axis is tangent to it. By these fields, second moments are integrals over the
+// faces alone:
 //
 //   4 ∫ ρ² dV = 2 r² V + Σ ∫ (ρ² − r²) (n_x x + n_y y) dA,   2 ∫ x² dV = r² V − ∫ ρ² dV + Σ n_x ∫ (ρ² − r²) x dA,
 //   3 ∫ z² dV = Σ n_z ∫ z³ dA,   2 ∫ x y dV = Σ n_x ∫ (ρ² − r²) y dA.
 //
-// Edges are cut at the same points whichever face asks, so that the surface closes whatever rounding has done to these;
-// a corner that it takes for inside, or an edge that grazes the cylinder, changes it by as much as these are off. Which
-// way round an arc goes is sure but where its ends nearly meet. All arcs together turn back as far as they turn, and
-// faces look up as much as down; by a wrong turn, neither would be so.
+// Closing. Both faces at an edge get the same points where the edge is cut. The surface therefore closes, whatever the
+// rounding of these points. If rounding moves a corner inside, or makes an edge graze the cylinder, the surface changes
+// by no more than the rounding. The direction of an arc is certain unless its ends nearly meet. All arcs together turn
+// forth as much as back, and faces look up as much as down. An arc in the wrong direction would violate both.
 //
-// The error. Every term has sixteen roundings or fewer, and every sum on the way one more. Points are off by kPlacing
-// of how far their numbers reach: by that, times the area, is the volume between the surface as computed and as it
-// should be.
+// Error. Every term has at most kMostRoundings roundings, and every sum adds one. Points are off by kPlacing times the
+// reach of their numbers. The volume between the computed surface and the true one is at most that, times the area.
 std::optional<CylinderPart> measure_cylinder(const Rings& polyhedron, double radius) {
   const Scratch<CylinderScratch> scratch;
   auto& [at, chords, sections] = *scratch;

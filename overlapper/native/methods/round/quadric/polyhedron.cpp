@@ -25,9 +25,8 @@ bool Rings::become(const Shape& shape, const Pose& pose) {
   return true;
 }
 
-/// The corner where an edge that is cut passes the height, the same for both of its faces.
+/// The corner where a cut edge passes the height: the same for both of its faces.
 int Rings::between(int above, int below, double height) {
-  // All edges of a fan of faces have one end in common.
   const auto [at_edge, is_new] = crossed_.try_emplace({above, below}, static_cast<int>(corners_.size()));
   if (is_new) {
     const Vec3 p = corners_[above], q = corners_[below];
@@ -38,8 +37,8 @@ int Rings::between(int above, int below, double height) {
   return at_edge->second;
 }
 
-/// Adds what is left of a face; `outside` tells which of its corners go. False if the face is not convex, by
-/// rounding. Around the new face, after_ leads from each corner, counted from `before`, to the next.
+/// Adds the rest of a face without the corners that are `outside`. False if rounding has made the face not convex.
+/// Around the new face, after_ has the next corner of each corner. Its corners have numbers from `before` on.
 template <class Outside>
 bool Rings::cut_face(size_t f, double height, int before, Outside outside) {
   const size_t begin = kept_ring_.size();
@@ -65,7 +64,7 @@ bool Rings::cut_face(size_t f, double height, int before, Outside outside) {
   return true;
 }
 
-/// Adds the new face; false if its border does not close.
+/// Adds the new face in the plane of the cut; false if its border does not close.
 bool Rings::close_cut(const Plane& plane, int before) {
   kept_.push_back(plane);
   int at = before;
@@ -104,7 +103,7 @@ bool Rings::cut(double height, bool keep_below) {
 
 Polyhedron Rings::polyhedron() {
   edges_.clear();
-  // The face on the other side of each edge from a lower corner to a higher one.
+  // Edges from a corner of higher number, with the face on their left: (lower corner, higher corner, face).
   thread_local std::vector<std::array<int, 3>> back;
   back.clear();
   for (size_t f = 0; f < planes_.size(); ++f) {
@@ -119,7 +118,7 @@ Polyhedron Rings::polyhedron() {
   std::ranges::sort(edges_, {}, [](const Edge& e) { return std::array{e.from, e.to}; });
   std::ranges::sort(back);
   for (size_t k = 0; k < edges_.size(); ++k) edges_[k].right = back[k][2];
-  // Without the corners that were cut off.
+  // Numbers the corners anew, without those that were cut off.
   number_.assign(corners_.size(), kNone);
   left_.clear();
   const auto number = [&](int corner) {

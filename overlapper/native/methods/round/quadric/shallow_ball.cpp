@@ -1,7 +1,6 @@
 #include "methods/round/quadric/shallow_ball.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>

@@ -6,7 +6,8 @@
 namespace overlapper::quadric {
 namespace {
 
-/// The rule of Gauss and Kronrod with fifteen nodes on [-1, 1], and the weights that the seven of Gauss have in it.
+/// A node x >= 0 of the rule of Gauss and Kronrod with fifteen nodes on [-1, 1]; -x is a node, too. Seven of the nodes
+/// have a weight in the rule of Gauss.
 struct Node {
   double x, weight, of_gauss;
 };
@@ -21,13 +22,15 @@ constexpr std::array<Node, 8> kNodes{{
     {0.991455371120812640, 0.022935322010529225, 0},
 }};
 
+static_assert(2 * kNodes.size() - 1 == 15);
+
 constexpr int kMostHalvings = 40;
 
 struct Integral {
   double value = 0, error = 0;
 };
 
-/// Halves the interval wherever the rules disagree by more than a part of what they give there, or in all.
+/// Halves the interval until the two rules agree to a fraction of the value there, or of the whole.
 template <class Integrand>
 Integral integrate(const Integrand& integrand, double low, double high, double whole, int halvings = 0) {
   const double middle = low + (high - low) / 2, half = (high - low) / 2;
@@ -56,8 +59,8 @@ double Stretch::arc(Vec3 level, Vec3 across, Vec3 along, double half_angle) cons
   for (int i = 0; i < parts; ++i) {
     const double angle = (2 * i + 1 - parts) * step, cosine = std::cos(angle), sine = std::sin(angle);
     const Vec3 out = cosine * b + sine * c, on = cosine * c - sine * b;
-    // By the tangent s of half the angle, every root of what is under the root of the element is as far off as on the
-    // circle, and there is no sine to be taken.
+    // The variable is s = tan(angle / 2). No sine is needed. The polynomial under the root has its complex zeros as far
+    // from the arc as they are on the circle.
     const auto element = [&](double s) {
       const double square = s * s, inverse = 1 / (1 + square);
       const Vec3 at = (1 + square) * a + (1 - square) * out + (2 * s) * on;

@@ -9,18 +9,13 @@
 namespace overlapper::slicing {
 namespace {
 
-/// A point this far outside of another surface, relative to the terms of that, may yet be a corner.
+/// A point may be a corner if it is at most so far outside another surface, relative to the terms of that surface.
 constexpr double kNear = 1e-6;
 
 /// A point or direction (x, y, t).
 using Place = Vec3;
 
-/// Two points of the line where two planes meet.
-struct Ridge {
-  Place point, direction;
-};
-
-/// The two roots of a u² + 2 h u + c, if they are real, without cancellation.
+/// Calls use(u) for the real roots of a u² + 2 h u + c. No difference of nearly equal numbers is taken.
 template <class Use>
 void for_roots(double a, double h, double c, Use use) {
   const double discriminant = h * h - a * c;
@@ -30,17 +25,20 @@ void for_roots(double a, double h, double c, Use use) {
   if (a != 0) use(far / a);
 }
 
+/// Finds values of t at which the outline may change.
 class Candidates {
   static constexpr int kSamples = 24;
+  static_assert(kSamples % kRow == 0);
   static constexpr int kMostTurns = 12;
-  /// Two values beside the turn: one may be zero when the turn is known better, and one is zero but for rounding.
+  /// Relative values at a turn: below the first one, closer values may be zero; below the second one, it is zero but
+  /// for rounding.
   static constexpr double kGrazing = 0.1, kTouching = 1e-9;
   using Samples = std::array<double, kSamples>;
 
  public:
   Candidates(const Stack& stack, std::vector<double>& values) : stack_(stack), values_(values) {}
 
-  /// Those that have closed forms.
+  /// Collects the values that have closed forms.
   void collect() {
     const int lines = stack_.lines - 4;
     for (int i = 0; i < lines; ++i) {
@@ -59,8 +57,8 @@ class Candidates {
     }
   }
 
-  /// Those between low and high where a plane meets a corner of the two quadrics. Samples find them, and false position
-  /// between two samples on either side of the plane.
+  /// Collects the values between low and high where a plane meets a corner of the two quadrics. False position finds
+  /// them between two samples on either side of the plane.
   void trace(double low, double high) {
     const Quadric &p = stack_.quadric[0], &q = stack_.quadric[1];
     if (stack_.quadrics < 2 || (!p.ball && !q.ball && parallel(p, q))) return;
@@ -107,7 +105,7 @@ class Candidates {
   }
   void add_if_near(Point p, double t) {
     if (!(t > stack_.low && t < stack_.high)) return;
-    // A plane may go through the origin, where all its terms are nothing but the rounding of a point.
+    // If a plane goes through the origin, its terms are only the rounding of a point.
     const double blur = kNear * stack_.line[stack_.lines - 1].offset;
     for (int i = 0; i < stack_.lines - 4; ++i) {
       if (!plane(i)) continue;
@@ -126,7 +124,7 @@ class Candidates {
 
   static bool parallel(const Quadric& p, const Quadric& q) { return std::abs(cross(p.across, q.across)) < 1e-12; }
 
-  /// The corner of two lines at the samples.
+  /// Sets x_ and y_ to the corner of two lines at the samples.
   void find_corners(int i, int j) {
     const LineCorner corner_of(stack_.line[i], stack_.line[j]);
     Samples p, q;
@@ -177,7 +175,8 @@ class Candidates {
     for_changes(value, i, j, [&](Point p, double t) { return ball.value(p, t); });
   }
 
-  /// Where a function of a corner is zero. Where it turns before it is, two values may hide between samples.
+  /// Adds the values of t at which a function of a corner is zero. If the function turns near zero, two zeros may lie
+  /// between two samples.
   template <class Function>
   void for_changes(const Samples& value, int i, int j, Function function) {
     const auto at = [&](double t) { return function(Slice(stack_, t).corner(i, j), t); };
@@ -188,14 +187,14 @@ class Candidates {
       between(samples_[k], samples_[k + 1], value[k], value[k + 1]);
       if (k == 0) continue;
       const double before = value[k - 1], here = value[k], after = value[k + 1], side = here < 0 ? -1 : 1;
-      // In a pose that is symmetric, samples on either side of the turn are equal.
+      // In a symmetric pose, the samples on either side of the turn are equal.
       if (!(side * before > side * here && side * after >= side * here)) continue;
       add_turn({samples_[k - 1], samples_[k], samples_[k + 1]}, {before, here, after}, i, j, at, between);
     }
   }
 
-  /// Where a function turns before it is zero, by the turning points of parabolas through three values; and where it
-  /// touches zero but for rounding, as a corner does that grazes another surface, which two values then are that close.
+  /// Adds the zeros on either side of a turn of the function. Parabolas through three values find the turn. If the
+  /// function only touches zero, as a corner does that grazes another surface, the turn itself is added.
   template <class Function, class Between>
   void add_turn(std::array<double, 3> t, std::array<double, 3> value, int i, int j, Function at, Between between) {
     const bool negative = value[1] < 0;
@@ -212,7 +211,7 @@ class Candidates {
         between(t[before], turn, value[before], there), between(turn, t[before + 1], there, value[before + 1]);
         return;
       }
-      // The three about the value that is nearest to zero.
+      // The middle one of the three values stays the nearest to zero.
       const bool nearer = std::abs(there) < std::abs(value[1]);
       if (nearer) {
         const int end = later ? 0 : 2;
@@ -226,7 +225,7 @@ class Candidates {
     if (std::abs(value[1]) <= kTouching * size) add_if_near(Slice(stack_, t[1]).corner(i, j), t[1]);
   }
 
-  /// By false position after Dowell and Jarratt (1971).
+  /// Adds a zero by false position after Dowell and Jarratt (1971).
   template <class Function>
   void add_zero(double low, double high, double at_low, double at_high, int i, int j, Function at) {
     double t = low;
@@ -241,7 +240,7 @@ class Candidates {
       else at_low *= at_high / (at_high + here);
       high = t, at_high = here;
     }
-    // Where two lines are nearly parallel, what rounding does to t moves their corner far.
+    // If two lines are nearly parallel, rounding of t moves their corner far.
     const Line &a = stack_.line[i], &b = stack_.line[j];
     if (std::abs(cross(a.normal, b.normal)) < kNear * a.length * b.length) add(t);
     else add_if_near(Slice(stack_, t).corner(i, j), t);
@@ -276,7 +275,7 @@ class Candidates {
     }
   }
 
-  /// Where the plane's circle on the ball ends.
+  /// Adds the ends of the circle in which the plane cuts the ball.
   void plane_and_ball(const Line& line) {
     const Quadric& q = stack_.quadric[stack_.ball];
     const Point u = (1 / line.length) * line.normal, d{-u.y, u.x};
@@ -290,7 +289,7 @@ class Candidates {
               });
   }
 
-  /// Values of t where the line a y + b t = c of the plane across a cylinder meets its disc.
+  /// Calls use(y, t) where the line a y + b t = c, in the plane across a cylinder, meets the circle of the cylinder.
   template <class Use>
   static void on_disc(const Quadric& q, double a, double b, double c, Use use) {
     const double length2 = a * a + b * b;
@@ -302,7 +301,7 @@ class Candidates {
               q.value(y0 * q.across, t0), [&](double u) { use(y0 + u * y1, t0 + u * t1); });
   }
 
-  /// A plane that holds the axis's direction leaves the cylinder where its border meets the sides.
+  /// Adds the values at which a plane parallel to the axis of a cylinder meets the sides of the cylinder.
   void plane_along(const Line& line, const Quadric& q) {
     if (std::abs(cross(line.normal, q.across)) > 1e-9 * line.length) return;
     on_disc(q, dot(line.normal, q.across), line.rate, line.offset, [&](double, double t) { add(t); });
@@ -326,7 +325,7 @@ class Candidates {
 
   const Stack& stack_;
   std::vector<double>& values_;
-  Samples samples_, x_, y_;  ///< of t, and a corner there
+  Samples samples_, x_, y_;  ///< values of t, and a corner at each
   std::array<Sides, kSamples / kRow> sides_;
 };
 
@@ -357,7 +356,7 @@ class Settling {
     values.push_back(low_), values.push_back(high_);
     std::sort(values.begin(), values.end());
     if (!find_inside(values)) {
-      // Corners of a plane and two quadrics are not known yet.
+      // Corners of a plane and two quadrics were not collected yet.
       candidates.trace(low_, high_);
       std::sort(values.begin(), values.end());
       if (!find_inside(values)) return true;
@@ -376,21 +375,21 @@ class Settling {
   }
 
  private:
-  /// The largest number of parts of an interval that are looked at.
+  /// The largest number of parts of an interval, each of which has a slice.
   static constexpr int kMostInner = 48;
-  static constexpr double kPointlike = 1e-11, kPointlikeClosely = 1e-14;  ///< of the stack
-  static constexpr double kRounded = 1e-12;                               ///< of how far all slices are from the origin
+  static constexpr double kPointlike = 1e-11, kPointlikeClosely = 1e-14;  ///< relative to the height of the stack
+  static constexpr double kRounded = 1e-12;  ///< relative to the distance of all slices from the origin
   static constexpr int kMostEvents = 40;
 
-  /// The size beside which an interval is small: that of all intervals, or less near the origin, where doubles are
-  /// finer.
+  /// The size that small intervals are compared with: the size of all intervals, or less near the origin, where doubles
+  /// are finer.
   double size_near(double low, double high) const {
     const double all = high_ - low_;
     return std::clamp(1e3 * std::max(std::abs(low), std::abs(high)), 1e-3 * all, all);
   }
 
   Outline at(double t) const { return outline(Slice(stack_, t)); }
-  /// That outline may be it.
+  /// The outline at t; faster if it is the likely one.
   Outline at(double t, const Outline& likely) const {
     const Slice slice(stack_, t);
     return !likely.empty() && is_outline(slice, likely) ? likely : outline(slice);
@@ -398,9 +397,9 @@ class Settling {
 
   void append(double low, double high, const Outline& between) {
     if (between.empty()) return;
-    // A convex set has no empty slice between others, but by rounding.
+    // Only rounding leaves an empty slice between others: the set is convex.
     if (!intervals_.empty()) intervals_.back().high = low;
-    // A corner and a circle, or three lines, meet in a value of t; rounding makes it an interval of its own.
+    // A corner and a circle, or three lines, meet at one value of t. Rounding may make an interval of that value.
     const double far = std::max({0.0, low_, -high_});
     const double pointlike =
         std::max((closely_ ? kPointlikeClosely : kPointlike) * size_near(low, high), kRounded * far);
@@ -418,7 +417,7 @@ class Settling {
 
   bool settle(double low, double high) {
     const double width = high - low;
-    // If a change between the two is not known, the surface that is measured does not close.
+    // If there is an unknown change between the two, the measured surface does not close.
     if (const Outline middle = at(low + width / 2, latest_); !closely_ && !middle.empty()) {
       latest_ = middle;
       append(low, high, middle);
@@ -447,12 +446,12 @@ class Settling {
     return true;
   }
 
-  /// Appends intervals from `from`. The last one begins at the last change between two slices; `from` becomes that
-  /// change. False if there are too many.
+  /// Appends the intervals from `from` to the last change between two slices. `from` becomes that change. False if
+  /// there are too many changes.
   bool append_changes(double here, double there, Outline now, const Outline& last, double& from) {
     while (!(now == last)) {
       if (++events_ > kMostEvents) return false;
-      // The first change between here and there, or one of them.
+      // Finds a change between here and there, mostly the first one.
       double before = here, after = there;
       Outline then = last;
       halve(before, after, [&](double t) {
@@ -468,8 +467,8 @@ class Settling {
     return true;
   }
 
-  /// Near the origin doubles are finer than what the equations of breakpoints leave: there, changes of the outline are
-  /// found again, to the last bit that outlines know.
+  /// Finds changes of the outline near the origin again, to the last bit. Doubles are finer there than the error of the
+  /// equations of breakpoints.
   void refine() {
     constexpr double kFine = 1e-6, kRounding = 1e-15;
     const double range = stack_.high - stack_.low, away = kRounding * range;
@@ -479,7 +478,8 @@ class Settling {
     }
   }
 
-  /// Finds the change before an interval again, or after the last one, if it is the only one from low to high.
+  /// Finds the change before interval i again, or the change after the last interval. Only if there is no other change
+  /// between low and high.
   void refine(size_t i, double low, double high) {
     Interval* before = i > 0 ? &intervals_[i - 1] : nullptr;
     Interval* after = i < intervals_.size() ? &intervals_[i] : nullptr;
@@ -492,7 +492,7 @@ class Settling {
     if (after) after->low = high;
   }
 
-  /// The slice there is looked at first.
+  /// Whether the slice is not empty. latest_ becomes its outline.
   bool holds(double t) {
     const Outline found = at(t, latest_);
     if (found.empty()) return false;
@@ -500,9 +500,10 @@ class Settling {
     return true;
   }
 
-  /// False if no slice holds something: one in the middle between two breakpoints would.
+  /// Sets inside_ to a slice that is not empty: at the origin, or midway between two breakpoints. False if there is
+  /// none.
   bool find_inside(const std::vector<double>& values) {
-    // The origin is a point of the common set, though not of every piece.
+    // The origin is a point of the common set, but not of every piece.
     if (low_ < 0 && 0 < high_ && holds(0)) {
       inside_ = 0;
       return true;
@@ -516,8 +517,8 @@ class Settling {
 
   bool pointlike() const { return high_ - low_ < kPointlike * (stack_.high - stack_.low); }
 
-  /// Where a piece is no wider than a point, its corner may be near the origin by rounding alone: true if it holds
-  /// something elsewhere, between two breakpoints that are not as near to each other.
+  /// Looks for a slice that is not empty between two breakpoints farther from each other. A piece as small as a point
+  /// may be a corner that only rounding has put near the origin.
   bool find_wide(const std::vector<double>& values) {
     const double least = kPointlike * (stack_.high - stack_.low);
     for (size_t i = 0; i + 1 < values.size(); ++i) {
@@ -529,7 +530,8 @@ class Settling {
     return false;
   }
 
-  /// Finds which slices hold something, to a factor of four, so that samples and bisections look where changes are.
+  /// Sets low_ and high_ to at most four times the distance of the last slices that are not empty. Samples and
+  /// bisections then lie where changes are.
   void close_in() {
     for (double* end : {&low_, &high_})
       for (int step = 0; step < 60; ++step) {
@@ -541,13 +543,13 @@ class Settling {
 
   const Stack& stack_;
   bool closely_;
-  /// The part of an interval that is left out at its ends. The root of a slice's area is concave, so that anything that
-  /// begins or ends there holds no more than the cube of that part of the volume.
+  /// The fraction of an interval that is left out at its ends. The root of a slice's area is concave. A part of the set
+  /// that begins or ends there therefore has at most the cube of that fraction of the volume.
   double beside_;
   int inner_;
   std::vector<Interval>& intervals_;
-  double low_, high_;                                        ///< beyond which there is nothing
-  double inside_ = std::numeric_limits<double>::infinity();  ///< at which there is something
+  double low_, high_;                                        ///< slices outside are empty
+  double inside_ = std::numeric_limits<double>::infinity();  ///< this slice is not empty
   int events_ = 0;
   Outline latest_;
 };

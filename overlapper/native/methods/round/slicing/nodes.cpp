@@ -17,7 +17,7 @@ struct Points {
 
 double sum(const Row& row) { return ((row[0] + row[1]) + (row[2] + row[3])) + ((row[4] + row[5]) + (row[6] + row[7])); }
 
-/// The length of a chord, over the radius, below which rounding of its ends makes most of its direction.
+/// Rounding of its ends makes most of the direction of a shorter chord, relative to the radius.
 constexpr double kShort = 1e-6;
 
 /// quadric::Segment of each slice.
@@ -87,7 +87,8 @@ class Bundle {
     }
   }
 
-  /// Where a line enters the disc and where it leaves; where it has left it by rounding, its tangent point.
+  /// The points where a line enters the disc and leaves it. If rounding has put the line outside the disc, both are the
+  /// tangent point.
   void crossings(const Line& line, Points& enter, Points& leave) const {
     const Point u = (1 / line.length) * line.normal;
     const double length = line.length;
@@ -278,7 +279,7 @@ class Bundle {
       const double inverse = l > 0 ? 1 / l : 0, x = cy * inverse, y = -cx * inverse;
       const double beside =
           x * (0.5 * (p.x[k] + q.x[k]) - sides_.centre_x[k]) + y * (0.5 * (p.y[k] + q.y[k]) - sides_.centre_y[k]);
-      // Rounding may have turned a short chord round. Then the two lines beside the chord tell the side.
+      // Rounding may have reversed a short chord. The two lines beside the chord then tell the side.
       const double sure = back && one[k] > 0 && two[k] > 0 ? -std::abs(beside) : std::abs(beside);
       const double d = l < kShort * radius[k] ? sure : beside, h = 0.5 * l;
       const double whole = std::max(std::sqrt(h * h + d * d), DBL_MIN);
@@ -345,7 +346,7 @@ class Bundle {
     add_zone(ball, {sum(px), sum(py), sum(up)}, all, sum(t_up), sum(size), surface);
   }
 
-  /// The surface of an ellipsoid along arcs that reach so far to either side of (x, y).
+  /// The surface of an ellipsoid along arcs that extend by `angle` to either side of (x, y).
   double stretched_zone(const Row& x, const Row& y, const Row& angle) {
     const Row& radius = sides_.half[stack_.ball];
     double surface = 0;
@@ -360,7 +361,7 @@ class Bundle {
     return surface;
   }
 
-  /// Positive where a line leaves nearly all of the disc.
+  /// Positive if a line leaves nearly all of the disc.
   void beyond(const Line& line, Row& result) const {
     const Point n = line.normal;
     const double length = line.length;
@@ -419,7 +420,7 @@ class Bundle {
     sum_.products += Vec3{sum(yz), sum(zx), sum(xy)};
   }
 
-  /// atan2(sine, cosine) for a sine that is not negative, after Cephes: of half the angle, a rational approximation. It
+  /// atan2(sine, cosine) for a sine that is not negative: the rational approximation of Cephes for half the angle. It
   /// has no branches.
   static double half_turn_angle(double sine, double cosine) {
     const double tangent = sine / (1 + std::abs(cosine));
@@ -498,7 +499,7 @@ Integrals measure(const Stack& stack, const Outline& outline, double t) {
 void add_face(const Line& plane, const Stack& stack, const Outline& outline, double t, Integrals& sum) {
   const Integrals face = measure(stack, outline, t);
   const double area = face.volume;
-  // The plane is parallel but for less than 1e-11: what it is tilted counts to first order.
+  // The plane is nearly parallel to the slices. Its tilt counts to first order.
   const Point tilt = plane.normal + plane.normal_tail;
   sum.correction +=
       (plane.offset_tail * area - plane.rate_tail * t * area - tilt.x * face.first.x - tilt.y * face.first.y) /
@@ -511,7 +512,7 @@ void add_face(const Line& plane, const Stack& stack, const Outline& outline, dou
   if (stack.view && stack.view->sees(plane.owner)) {
     const View& view = *stack.view;
     const double facing = side * view.normal.z, u = view.u0 + view.u.z * t, v = view.v0 + view.v.z * t;
-    // In u and v, which are linear in x and y.
+    // u and v are linear in x and y.
     const auto first = [&](Vec3 by) { return by.x * face.first.x + by.y * face.first.y; };
     const auto second = [&](Vec3 a, Vec3 b) {
       return a.x * b.x * face.squares.x + a.y * b.y * face.squares.y + (a.x * b.y + a.y * b.x) * face.products.z;

@@ -14,14 +14,14 @@
 namespace overlapper::slicing {
 namespace {
 
-/// A node x < 0 of a rule of Gauss and Legendre with n nodes, θ = π/2 (1 + x); its mirror image has the same numbers,
-/// those for odd coefficients negated. Made with mpmath.
+/// A node x < 0 of a rule of Gauss and Legendre with n nodes, and θ = π/2 (1 + x). The node at -x has the same numbers,
+/// but those for odd coefficients are negated. Computed with mpmath.
 struct Node {
-  double share;               ///< sin²(θ/2): of the interval, how much lies below
-  double weight;              ///< of the slice there, for an interval of length one
+  double share;               ///< sin²(θ/2): the fraction of the interval below the node
+  double weight;              ///< of the slice, for an interval of length 1
   double sine;                ///< sin θ
-  double last, last_but_one;  ///< what it gives to the coefficients n − 1 and n − 2 of the Legendre series
-  double even, odd;           ///< likewise n / 2 and n / 2 − 1; n is a multiple of four
+  double last, last_but_one;  ///< its terms in the coefficients n − 1 and n − 2 of the Legendre series
+  double even, odd;           ///< its terms in the coefficients n / 2 and n / 2 − 1; n is a multiple of four
 };
 // clang-format off
 constexpr std::array<Node, 4> kNodes8{{
@@ -58,23 +58,25 @@ constexpr std::array<Node, 12> kNodes24{{
 using Rule = std::span<const Node>;
 constexpr std::array<Rule, 3> kRules{kNodes8, kNodes16, kNodes24};
 static_assert(2 * kNodes24.size() == kMostNodes);
+static_assert(std::ranges::all_of(kRules, [](Rule rule) { return rule.size() % 2 == 0; }));
 
-/// At first, smaller relative errors of a rule do not justify another rule.
+/// If the relative error of a rule is smaller, no other rule is tried.
 constexpr double kVolumeError = 1e-14, kAreaError = 1e-12;
-/// The same of the area of a stretched ball, by the worst that its terms may do.
+/// The same for the area of a stretched ball, from a bound of its terms.
 constexpr double kStretchedAreaError = 1e-11;
-/// The relative size at which the last coefficients of the series leave no error worth halving for: a rule of n nodes
-/// integrates the first 2 n terms, so that its error is as small as the square of the n-th.
+/// If the last coefficients of the series are smaller, relative to the whole, halving is not worth it. A rule of n
+/// nodes integrates the first 2 n terms, so its error is about the square of the n-th term.
 constexpr double kVolumeTail = 2e-9, kAreaTail = 1e-7;
-/// More missing nodes than any rule has, in half rules. Half the interval would need hardly fewer.
+/// More nodes than any rule has. If so many are needed, half the interval would need hardly fewer.
 constexpr double kHopeless = 30;
+static_assert(kHopeless > kMostNodes);
 constexpr int kMostHalvings = 48;
 /// Rules after which halving goes on for ever: where two surfaces touch along a line.
 constexpr int kMostRules = 600;
 /// Rules after which the area of a stretched ball, whose element may change as sharply as at an edge, has its error.
 constexpr int kMostRulesForStretch = 240;
 
-/// Coefficients in the middle and at the end of a Legendre series, from values at the nodes.
+/// Coefficients in the middle and at the end of a Legendre series, summed over the nodes.
 struct Series {
   double last = 0, last_but_one = 0, even = 0, odd = 0;
   void add(const Node& node, double low, double high) {
@@ -84,23 +86,23 @@ struct Series {
     odd += node.odd * (low - high);
   }
   double tail() const { return std::max(std::abs(last), std::abs(last_but_one)); }
-  /// By what factor terms have become smaller from the middle to the end, not more than one.
+  /// The size of the last terms relative to those in the middle, at most 1.
   double ratio() const {
     const double middle = std::max(std::abs(even), std::abs(odd)), end = tail();
     return end < middle ? end / middle : 1;
   }
-  /// A rule of n nodes integrates the first 2 n terms. From the middle to the n-th, terms have become smaller by a
-  /// factor; to the last, they do so twice again, and more if the integrand has no singularity nearby.
+  /// A rule of n nodes integrates the first 2 n terms. From the middle to the n-th term, terms fall by the ratio. To
+  /// the last one, they fall twice more by that ratio, or faster if the integrand has no singularity nearby.
   double error() const { return 30 * tail() * ratio() * ratio(); }
-  /// The same where an element is sharp near an end of the interval: terms, which begin at about `whole`, fall fast at
-  /// first and then as slowly as those of a root. They are taken to fall once again, not twice, as they did to the
-  /// end, and by as much less, squared, as that was less than they fell to the middle.
+  /// The error if the element of the area is sharp near an end of the interval. Terms begin at about `whole`. They fall
+  /// fast at first, and then as slowly as those of a root. They are taken to fall once more by the ratio, not twice. If
+  /// they fell less to the end than to the middle, that fall is less by the square of the same factor.
   double stretched_error(double whole) const {
     const double middle = std::max(std::abs(even), std::abs(odd)), second = ratio();
     const double slowing = middle > 0 ? std::max(1.0, second * whole / middle) : 1;
     return 30 * tail() * std::min(1.0, second * slowing * slowing);
   }
-  /// How many times half the nodes it takes until the error is that, if terms go on like that.
+  /// How many times half the nodes are needed until the error is so small, if terms keep falling at this rate.
   double halves_until(double small) const {
     const double now = error();
     if (now <= small) return 0;
@@ -168,7 +170,7 @@ class Integrating {
 
   /// How many times half of its nodes a rule lacks.
   double lacks(const RulePart& part) const {
-    // Other rules do not make rounding smaller.
+    // No rule makes rounding smaller.
     const double rounding = 16 * DBL_EPSILON * part.integrals.blur / part.integrals.volume;
     const auto of = [&](const Series& series, double here, double whole, double limit, double limit_of_tail) {
       const double end = series.tail();
@@ -179,7 +181,7 @@ class Integrating {
     const double volume = of(part.volume, part.integrals.volume, volume_, kVolumeError, kVolumeTail);
     if (stack_.stretch) {
       if (sum_.rules > kMostRulesForStretch) return volume;
-      // Where terms fall slowly, more nodes would help little.
+      // If terms fall slowly, more nodes help little.
       if (part.area.stretched_error(part.integrals.area) > kStretchedAreaError * area_) return kHopeless;
     }
     return std::max(volume, of(part.area, part.integrals.area, area_, kAreaError, kAreaTail));
@@ -187,7 +189,7 @@ class Integrating {
 
   /// The rule with enough more nodes, or the largest one. No value if halves need fewer nodes.
   std::optional<Rule> finer(const RulePart& part, double lacking) const {
-    // In a series of few nodes, terms in the middle have not begun to fall; later terms fall twice as fast.
+    // In a series of few nodes, the terms in the middle have not begun to fall. Later terms fall twice as fast.
     const double nodes = static_cast<double>(part.rule.size()) * (2 + lacking / 2);
     if (!(nodes < kHopeless)) return std::nullopt;
     for (const Rule& rule : kRules)
@@ -215,7 +217,7 @@ class Integrating {
   void add_as_it_is(const RulePart& part) {
     sum_.integrals.add(1, part.integrals);
     sum_.samples.insert(sum_.samples.end(), part.samples.begin(), part.samples.begin() + 2 * part.rule.size());
-    // If halving ended for its area's sake, no fall of terms is taken for granted.
+    // If halving for the area has ended, terms are not taken to fall further.
     const bool ended = sum_.rules > kMostRulesForStretch;
     const double of_stretched = ended ? 30 * part.area.tail() : part.area.stretched_error(part.integrals.area);
     sum_.area_error += stack_.stretch ? of_stretched : part.area.error();
@@ -224,7 +226,7 @@ class Integrating {
   }
 
   const Stack& stack_;
-  double volume_, area_;  ///< of all that is measured, about
+  double volume_, area_;  ///< about the totals of all pieces so far and of this one
   bool few_;
   double strictness_;
   Sum& sum_;
@@ -255,14 +257,14 @@ bool integrate(const Stack& stack, std::span<const Interval> intervals, double v
 
 namespace {
 
-/// The integral of the square of what rises from p to q.
+/// The integral of the square of a function that rises linearly from p to q.
 double of_square(double width, double p, double q) { return width / 3 * (p * p + p * q + q * q); }
 
 }  // namespace
 
 bool within_chords(double begin, double end, Sum& sum) {
   std::vector<Sample>& samples = sum.samples;
-  // Slopes between samples that lie very near each other would be rounding.
+  // Slopes between two samples very near each other would be rounding.
   const double low = samples.front().t, range = samples.back().t - low;
   double last_kept = -std::numeric_limits<double>::infinity();
   std::erase_if(samples, [&](const Sample& sample) {
@@ -279,7 +281,7 @@ bool within_chords(double begin, double end, Sum& sum) {
   for (int i = 0; i < last; ++i) {
     const double width = samples[i + 1].t - samples[i].t, p = root(i), q = root(i + 1);
     below += of_square(width, p, q);
-    // The chords beside, drawn out, meet over the interval; at the ends there is one only.
+    // The chords on both sides, drawn out, meet over the interval. An end has a chord on one side only.
     const double rise = i > 0 ? slope(i - 1) : 0, fall = i + 1 < last ? slope(i + 1) : 0;
     double peak = i == 0 ? 0 : width;
     if (i > 0 && i + 1 < last && rise > fall) peak = std::clamp((q - p - fall * width) / (rise - fall), 0.0, width);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cfloat>
-#include <numbers>
 #include <span>
 
 namespace overlapper::slicing {
@@ -29,12 +28,12 @@ Slice::Slice(const Stack& stack_, double t_) : stack(stack_), t(t_) {
 
 namespace {
 
-/// Where a line crosses the circle, as lengths along the line from its point nearest to the origin.
+/// The crossings of a line and the circle.
 struct Crossing {
   Point normal, direction;
-  double height;        ///< of the line over the origin
-  double discriminant;  ///< negative where they do not cross
-  double enter = 0, leave = 0;
+  double height;                ///< distance of the line from the origin, along the normal
+  double discriminant;          ///< negative if the line misses the circle
+  double enter = 0, leave = 0;  ///< lengths along the line, from its point nearest to the origin
 
   Crossing(const Slice& slice, int line) {
     const Line& l = slice.stack.line[line];
@@ -54,7 +53,8 @@ struct Crossing {
   Point at(double s) const { return height * normal + s * direction; }
 };
 
-/// A convex polygon as the lines of its edges; corner i lies between edges i and i + 1. Nothing beyond its size is set.
+/// A convex polygon by the lines of its edges. Corner i lies between edges i and i + 1. Entries beyond `size` are not
+/// set.
 struct Polygon {
   std::array<int, kMostLines + 8> line;
   std::array<double, kMostLines + 8> x, y;
@@ -69,8 +69,8 @@ bool of_one_direction(Point a, Point b) {
   return dot(a, b) > 0 && std::abs(one - two) <= 32 * DBL_EPSILON * (std::abs(one) + std::abs(two));
 }
 
-/// Whether two lines of one direction cross at no place but one that rounding has made up: anywhere on the two, or
-/// beyond the edge from p to q, although the other line has these on either side.
+/// Whether two lines run in one direction, so that their crossing is only rounding. It may then be anywhere on the
+/// lines. Or it lies outside the edge from p to q, although p and q are on different sides of the other line.
 bool along_one_another(const Slice& slice, int edge, int other, Point p, Point q) {
   const Point a = slice.stack.line[edge].normal, b = slice.stack.line[other].normal;
   if (!(std::abs(cross(a, b)) <= 32 * DBL_EPSILON * dot(a, b))) return false;
@@ -79,8 +79,8 @@ bool along_one_another(const Slice& slice, int edge, int other, Point p, Point q
   return !(along >= 0 && along <= dot(q - p, q - p));
 }
 
-/// Two lines of one direction may lie nearer to one another than the error of corners far away. Then the sides alone
-/// tell which line is the nearer, and it takes the other's place. True if there is such a line.
+/// Handles an edge that is nearer to the line, and parallel to it, than the error of corners far away. The sides alone
+/// then tell which of the two is nearer to the origin, and the nearer one stays. True if there is such an edge.
 bool replaced(Polygon& polygon, const Slice& slice, int line) {
   const Line& b = slice.stack.line[line];
   const double near = 64 * DBL_EPSILON * slice.stack.line[slice.stack.lines - 1].offset * b.length;
@@ -128,7 +128,7 @@ bool clip(Polygon*& now, Polygon*& spare_one, const Slice& slice, int line) {
   if (count == size) return true;
   if (count == 0) return false;
   const auto wrapped = [size](int i) { return i < size ? i : i - size; };
-  // The nearer one of two lines of one direction counts alone, whatever rounding says of the other's corners.
+  // Of two lines in one direction only the nearer one counts. The corners of the other one may be wrong by rounding.
   const auto farther = [&](int edge) {
     return slice.side(edge) * stack.line[line].length > side * stack.line[edge].length;
   };
@@ -151,17 +151,17 @@ bool clip(Polygon*& now, Polygon*& spare_one, const Slice& slice, int line) {
   return true;
 }
 
-/// The fraction of a chord within which a corner inside the circle may lie on the circle.
+/// A corner inside the circle may lie on the circle if the chord ends within this fraction of its length.
 constexpr double kBesideCircle = 1e-6;
 
-/// The distance, over the radius, by which lines that leave the whole disc have its centre inside, but for rounding. It
-/// is not enough that no chord meets an edge: in a polygon that is nothing but rounding, none does.
+/// If lines leave the whole disc, the distance of its centre inside them is at least this fraction of the radius.
+/// Chords that meet no edge are not enough: in a polygon that is only rounding, none does.
 constexpr double kBeyondCircle = 0.999;
 
-/// Joins edges that do not share a corner by arcs. Both edges at a corner see it inside of the circle, or neither does,
-/// and there the outline turns by less than half a turn; unless the polygon is nothing but rounding, which leaves
-/// nothing. `position` counts the `long_edges` of the polygon; `before` and `after` say how
-/// much of an edge's chord lies outside of the edge.
+/// Joins edges that do not share a corner by arcs. Both edges at a corner have the corner inside the circle, or neither
+/// has. At a corner the outline turns by less than half a turn. If either is not so, the polygon is only rounding, and
+/// the outline becomes empty. `position` has the numbers of edges among the `long_edges` of the polygon. `before` and
+/// `after` are the fractions of an edge's chord outside the edge.
 void close_with_arcs(const Slice& slice, std::span<const int> position, int long_edges, std::span<const double> before,
                      std::span<const double> after, Outline& result) {
   for (int i = 0; i < result.edges; ++i) {
@@ -179,10 +179,10 @@ void close_with_arcs(const Slice& slice, std::span<const int> position, int long
   }
 }
 
-/// The outline of polygon and disc.
+/// The outline of the common part of the polygon and the disc.
 void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
   std::array<int, kMostLines + 8> position;
-  std::array<double, kMostLines + 8> before, after;  // of the chord, what lies outside of the piece
+  std::array<double, kMostLines + 8> before, after;  // fractions of the chord outside the edge
   int long_edges = 0;
   bool holds_disc = slice.radius > 0;
   for (int i = 0; i < polygon.size; ++i) {
@@ -191,7 +191,7 @@ void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
     holds_disc = holds_disc && crossing.height - dot(crossing.normal, slice.centre) >= kBeyondCircle * slice.radius;
     const double from = dot(crossing.direction, polygon.corner(i > 0 ? i - 1 : polygon.size - 1));
     const double to = dot(crossing.direction, polygon.corner(i));
-    // Where three lines meet in a point, rounding may turn the edge round that they leave there.
+    // If three lines meet in a point, rounding may reverse the edge between them.
     if (!(from < to)) continue;
     ++long_edges;
     if (!(crossing.discriminant > 0)) continue;
@@ -205,8 +205,8 @@ void cut_by_disc(const Polygon& polygon, const Slice& slice, Outline& result) {
   close_with_arcs(slice, std::span(position).first(result.edges), long_edges, before, after, result);
 }
 
-/// Whether two lines follow one another that run against each other and meet beyond the square around everything: by
-/// rounding, as there is nothing between them.
+/// Whether two neighbouring lines run against each other and meet beyond the square around everything. Only rounding is
+/// then between them.
 bool is_flat(const Polygon& polygon, const Slice& slice) {
   constexpr double kParallel = 1e-12;
   const Stack& stack = slice.stack;
@@ -244,7 +244,7 @@ Outline outline(const Slice& slice) {
 
 namespace {
 
-/// The lines of a slice that are not of the square around everything, and their sides.
+/// The lines of a slice without the square around everything, and their sides.
 struct LineSides {
   const Slice& slice;
   int lines;
@@ -260,14 +260,15 @@ struct LineSides {
       if (!(slack(i, slice.centre) > slice.radius * slice.stack.line[i].length)) return false;
     return slice.radius > 0;
   }
-  /// Whether all lines but two have a point inside.
+  /// Whether a point is inside all lines but two.
   bool hold(Point p, int but, int and_but) const {
     for (int i = 0; i < lines; ++i)
       if (!(slack(i, p) > 0) && i != but && i != and_but) return false;
     return true;
   }
-  /// Whether other lines have the arc between two points inside. It is on the circle, between the lines `before` and
-  /// `after`. The farthest points of the circle along other lines are then not on it.
+  /// Whether the arc of the circle from p to q is inside all lines. p is on the line `before`, and q on the line
+  /// `after`. For every other line that cuts the circle, the circle's farthest point along its normal must not be on
+  /// the arc.
   bool hold_arc(Point p, Point q, int before, int after) const {
     const Point chord = q - p;
     if (!(dot(chord, chord) > 1e-12 * slice.radius * slice.radius)) return false;
@@ -288,8 +289,8 @@ struct LineSides {
   }
 };
 
-/// The ends of an edge of an outline, that of the edge before and of the first one given; false if it has none, or goes
-/// the wrong way.
+/// The ends of edge i of an outline. `first` is where edge 0 begins, and `last` is where edge i - 1 ends. False if the
+/// edge has no ends, or if it is reversed.
 bool find_ends(const Slice& slice, const Outline& outline, int i, Point first, Point last, Point& from, Point& to) {
   const int edges = outline.edges;
   const Outline::Edge& edge = outline.edge[i];

@@ -6,15 +6,15 @@
 namespace overlapper::slicing {
 namespace {
 
-/// The sine between two axes up to which double-doubles make them one direction.
+/// Two axes are one direction for double-doubles if the sine between them is not larger.
 constexpr double kOneDirection = 1e-24;
-/// A plane this nearly parallel to the slices ends the stack, and what it is tilted counts to first order.
+/// The sine of a plane's tilt against the slices up to which the plane ends the stack. The tilt counts to first order.
 constexpr double kParallel = 1e-11;
-/// Planes between that and this would make slices whose border rushes across.
+/// The border of a plane with a tilt between kParallel and kRushing would move too fast from slice to slice.
 constexpr double kRushing = 1e-3;
-/// A ridge that rises less than that from slice to slice lies in them rather than across.
+/// A ridge whose direction has a smaller component across the slices counts as parallel to them.
 constexpr double kSteep = 0.05;
-/// rad, about: how slices are turned where others do not suit.
+/// Tangents of the angles by which slices are turned, until some suit.
 constexpr std::array<double, kAxes> kTurns{0, 0.3, -0.3, 0.7, -0.7};
 
 /// Axes of the slices: l, m and n orthonormal, t = n + x l + y m for the shear (x, y).
@@ -25,10 +25,10 @@ struct Axes {
 
 WideVector across(const WideVector& v, const WideVector& unit_axis) { return v - dot(v, unit_axis) * unit_axis; }
 
-/// A surface where it is nearest to the origin: the way out there, {0, 0, 0} if that may be any, and how far.
+/// The shortest way from the origin to a surface.
 struct WayOut {
-  WideVector normal;
-  double slack;
+  WideVector normal;  ///< unit; zero if all directions are nearly as short
+  double slack;       ///< m: the length of the way
 };
 
 WayOut way_out(const Round& r) {
@@ -38,7 +38,7 @@ WayOut way_out(const Round& r) {
   return {{}, r.radius - length};
 }
 
-/// The nearest surface, and the nearest other one that is not parallel to it there.
+/// The ways to the nearest surface, and to the nearest surface that is not parallel to that one.
 std::array<WayOut, 2> nearest(std::span<const Round> rounds, std::span<const Wall> walls) {
   std::array<WayOut, 2> ways{
       {{{}, std::numeric_limits<double>::infinity()}, {{}, std::numeric_limits<double>::infinity()}}};
@@ -57,8 +57,8 @@ std::array<WayOut, 2> nearest(std::span<const Round> rounds, std::span<const Wal
   return ways;
 }
 
-/// A unit vector orthogonal to `axis`: along the edge in which the nearest wall that is no plane across it meets a
-/// plane across it, if there is one.
+/// A unit vector orthogonal to `axis`, and parallel to the nearest wall that is not orthogonal to the axis, if there is
+/// one.
 WideVector along_an_edge(const WideVector& axis, std::span<const Wall> walls) {
   WideVector best = wide(any_orthogonal(rounded(axis)));
   double least = std::numeric_limits<double>::infinity();
@@ -70,25 +70,26 @@ WideVector along_an_edge(const WideVector& axis, std::span<const Wall> walls) {
   return unit(across(best, axis));
 }
 
-/// From slice to slice along a direction.
+/// Axes with t along a direction.
 Axes sheared(const WideVector& l, const WideVector& m, const WideVector& n, const WideVector& along) {
   const DoubleDouble rise = dot(along, n), x = dot(along, l) / rise, y = dot(along, m) / rise;
   return {l, m, n, n + x * l + y * m, x, y};
 }
 
-/// About m0 orthogonal to l, turned by an angle about l; the direction from slice to slice stays orthogonal to m0.
-Axes turned(const WideVector& l, const WideVector& m0, double angle, std::span<const Round> rounds,
+/// Axes with m turned about l, away from m0, which is orthogonal to l. t is along a steep ridge, or else orthogonal to
+/// m0.
+Axes turned(const WideVector& l, const WideVector& m0, double tangent_of_angle, std::span<const Round> rounds,
             std::span<const Wall> walls) {
   const WideVector n0 = cross(l, m0);
-  const DoubleDouble tangent{angle}, cosine = DoubleDouble{1} / sqrt(DoubleDouble{1} + tangent * tangent);
+  const DoubleDouble tangent{tangent_of_angle}, cosine = DoubleDouble{1} / sqrt(DoubleDouble{1} + tangent * tangent);
   const WideVector m = cosine * (m0 - tangent * n0), n = cosine * (n0 + tangent * m0);
   const std::array<WayOut, 2> ways = nearest(rounds, walls);
   const WideVector ridge = cross(ways[0].normal, ways[1].normal);
   return sheared(l, m, n, std::abs(rounded(dot(ridge, n))) > kSteep ? ridge : n0);
 }
 
-/// Slices are to hold the way out and, of a body that lies along a line, that line.
-Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double angle) {
+/// Chooses slices parallel to the way out, and to the axis of a cylinder.
+Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double tangent_of_angle) {
   const Round *one = nullptr, *two = nullptr;
   for (const Round& r : rounds)
     if (!r.ball) (one ? two : one) = &r;
@@ -104,7 +105,7 @@ Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double a
       const WideVector m = unit(flat), l = cross(m, n);
       WideVector along = n;
       const WideVector ridge = cross(out, ways[1].normal);
-      // Nearer to orthogonal, the slices are as wide as the common set.
+      // If the way out is nearly across the slices, the slices are as wide as the common set.
       if (std::abs(rounded(dot(ridge, n))) > kSteep) along = ridge;
       else if (width > 8 * std::sqrt(std::max(0.0, 2 * ways[0].slack / radius))) along = across(n, out);
       return sheared(l, m, n, along);
@@ -113,17 +114,17 @@ Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double a
   if (one) {
     WideVector out = way_out(*one).normal;
     if (!(norm2(rounded(out)) > 0)) out = along_an_edge(one->axis, walls);
-    return turned(one->axis, unit(across(out, one->axis)), angle, rounds, walls);
+    return turned(one->axis, unit(across(out, one->axis)), tangent_of_angle, rounds, walls);
   }
   WideVector out = nearest(rounds, walls)[0].normal;
   if (!rounds.empty() && norm2(rounded(way_out(rounds[0]).normal)) > 0) out = way_out(rounds[0]).normal;
   if (!(norm2(rounded(out)) > 0)) out = wide(Vec3{0, 0, 1});
   out = unit(out);
   const WideVector n = along_an_edge(out, walls);
-  return turned(cross(out, n), out, angle, rounds, walls);
+  return turned(cross(out, n), out, tangent_of_angle, rounds, walls);
 }
 
-/// False if a wall is nearly parallel to the slices but not quite.
+/// False if a wall is nearly parallel to the slices, but not parallel.
 bool even(const Axes& axes, std::span<const Wall> walls) {
   const Vec3 l = rounded(axes.l), m = rounded(axes.m);
   return std::ranges::none_of(walls, [&](const Wall& wall) {
@@ -133,23 +134,23 @@ bool even(const Axes& axes, std::span<const Wall> walls) {
   });
 }
 
-/// The way to turn slices that comes after `way` others that suit. If none suits, `way` 0 is the first of all. Slices
-/// along two axes that are not parallel leave no choice.
+/// The axes number `way` among the turns that suit. If none suits, number 0 is the first turn. The slices of two
+/// cylinders whose axes are not parallel cannot be turned.
 std::optional<Axes> axes_of(std::span<const Round> rounds, std::span<const Wall> walls, int way) {
   const Axes first = choose(rounds, walls, 0);
   const bool fixed = rounds.size() == 2 && !rounds[0].ball && !rounds[1].ball &&
                      norm(cross(rounds[0].axis, rounds[1].axis)).head > kOneDirection;
   int suit = 0;
-  for (const double angle : kTurns) {
-    const Axes axes = angle == 0 ? first : choose(rounds, walls, angle);
+  for (const double tangent : kTurns) {
+    const Axes axes = tangent == 0 ? first : choose(rounds, walls, tangent);
     if (even(axes, walls) && suit++ == way) return axes;
     if (fixed) break;
   }
   return way == 0 ? std::optional(first) : std::nullopt;
 }
 
-/// The component of a unit vector along another, without what is nothing but the rounding of double-doubles: of lines
-/// of one direction, that would make lines that cross.
+/// The component of a unit vector along another one; 0 if it is only the rounding of double-doubles. That rounding
+/// would make parallel lines cross.
 DoubleDouble along(const WideVector& unit, const WideVector& axis) {
   const DoubleDouble component = dot(unit, axis);
   return std::abs(component.head) > 1e-30 ? component : DoubleDouble{};
@@ -167,7 +168,7 @@ Line line_of(const Wall& wall, const Axes& axes) {
   return line;
 }
 
-/// A plane parallel to the slices bounds t.
+/// Ends the stack at a plane parallel to the slices.
 void end_stack(Stack& stack, const Line& line) {
   const double end = line.offset / line.rate;
   if (line.rate > 0 && end < stack.high) stack.high = end, stack.high_plane = line;

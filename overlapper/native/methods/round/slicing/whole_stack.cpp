@@ -7,7 +7,7 @@
 namespace overlapper::slicing {
 namespace {
 
-/// Whether there is something between where intervals end and where a quadric does.
+/// Whether slices between t, where the intervals end, and the end of the stack are not empty.
 bool holds_to(const Stack& stack, double t, double end) {
   const double middle = t + (end - t) / 2;
   return t == end || !outline(Slice(stack, middle == end ? t : middle)).empty();
@@ -15,8 +15,8 @@ bool holds_to(const Stack& stack, double t, double end) {
 
 bool ended_by(const std::optional<Line>& plane, double t) { return plane && plane->offset / plane->rate == t; }
 
-/// The face at one end, for `side` -1 the lower one. It is in a plane that ends the stack, or as thin as rounding,
-/// where slices are drawn out to the end of a quadric.
+/// Adds the face at one end: the lower one for `side` -1. A plane that ends the stack has such a face. So has the end
+/// of a quadric that slices are drawn out to; that face is as thin as rounding.
 void add_end_face(const Stack& stack, const std::optional<Line>& plane, double end, int side, int drawn_to, double t,
                   const Outline& of_last, bool few, Integrals& sum) {
   if (plane && t == end) {
@@ -28,9 +28,9 @@ void add_end_face(const Stack& stack, const std::optional<Line>& plane, double e
   }
 }
 
-/// The volume that may be missing, beyond rounding: the difference of the volume from ∫ t N dA, plus the sum of the
-/// area vectors times the size. Area vectors sum to zero over a closed surface. Those of lines and of arcs are other
-/// integrals over the same slices, less smooth than the volume.
+/// m³: the volume that may be missing, beyond rounding. It is the difference of the volume and ∫ t N dA, plus the sum
+/// of the area vectors times the size. Area vectors sum to zero over a closed surface. The integrals of area vectors of
+/// lines and arcs are less smooth than the integral of the volume over the same slices.
 double open_part(const Stack& stack, const Integrals& s) {
   const Vec3 left = s.pull[0] + s.pull[1] + s.pull[2];
   const auto part = [&](double sum, double square) {
@@ -68,7 +68,7 @@ double integrate_whole(const Stack& stack, const DrawnIntervals& drawn, double v
   add_end_face(stack, stack.low_plane, stack.low, -1, drawn.drawn_low, lowest.low, lowest.outline, few, sum.integrals);
   add_end_face(stack, stack.high_plane, stack.high, 1, drawn.drawn_high, highest.high, highest.outline, few,
                sum.integrals);
-  // A piece for which that does not hold is worth its size as an error. It may be rounding alone.
+  // Otherwise the error is the size of the piece, which may be only rounding.
   if (!sound || !(sum.integrals.volume > 0) || !within_chords(lowest.low, highest.high, sum))
     return 8 * std::abs(sum.about) + std::abs(sum.integrals.volume);
   return open_part(stack, sum.integrals);
