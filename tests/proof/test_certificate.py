@@ -12,6 +12,8 @@ from strategies import in_general_position, placed, polyhedra, quaternion, solid
 from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 from overlapper.proof.certificate import certificate
 from overlapper.proof.claims import Bracketed, CertificateError, Overlapping, OwnedPlane, Separated, Touching
+from overlapper.proof.deepest_ball import DeepestBall, room
+from overlapper.proof.rational_body import RationalBody
 from overlapper.shapes.table import facts
 
 CUBE = Box([0.5, 0.5, 0.5])
@@ -374,3 +376,13 @@ def test_hulls_turned_in_doubles_are_proved_although_their_facets_are_not_flat()
         world = Hull(np.array([[*turned.position]]) + corners @ np.linalg.qr(rng.normal(size=(3, 3)))[0])
         lower, upper = proved(overlap(turned, Placed(world, (0.3, 0.2, 0.1))))
         assert upper - lower <= upper * Fraction(1, 10**15)
+
+
+def test_planes_that_leave_exactly_no_room_are_replaced_by_tighter_ones():
+    """The first planes show that the bodies have no more than a plane in common, and they are 0.5 m apart."""
+    bodies = [RationalBody(Placed(CUBE)), RationalBody(Placed(CUBE, (1.5, 0, 0)))]
+    x = np.array([1, 0, 0]) * Fraction(1)
+    loose = [OwnedPlane(x, Fraction(1, 2), 0), OwnedPlane(-x, Fraction(-1, 2), 1)]
+    ball = DeepestBall(bodies, loose)
+    assert room(ball.weighted()) == 0
+    assert room(ball.without_common_point()) < 0

@@ -9,6 +9,7 @@ from pathlib import Path
 import pybullet as p
 import pybullet_data
 import pytest
+import trimesh
 
 from overlapper.simulation.bullet.inventory import inventory
 from overlapper.simulation.bullet.model_file import NotRead
@@ -56,6 +57,21 @@ def test_skipped_shapes_are_named_with_their_reason_and_give_exit_code_1(tmp_pat
     assert "plate/top" in said and "box" in said and "0.1 × 0.2 × 0.3" in said and "6,000" in said
     assert "1 body, 1 of 2 shapes modelled, 0 pairs of shapes that pybullet lets collide." in said
     assert "Not modelled: plate/top, 1 of 2 shapes: vertices are flat" in said
+
+
+def test_each_convex_part_of_a_saved_mesh_counts_as_a_shape(tmp_path):
+    box = trimesh.creation.box((0.2, 0.2, 0.2))
+    two = trimesh.util.concatenate([box, box.copy().apply_translation((1, 0, 0))])
+    client = p.connect(p.DIRECT)
+    mesh = {"vertices": two.vertices.tolist(), "indices": two.faces.ravel().tolist()}
+    flags = p.GEOM_FORCE_CONCAVE_TRIMESH
+    shape = p.createCollisionShape(p.GEOM_MESH, **mesh, flags=flags, physicsClientId=client)
+    p.createMultiBody(0, shape, physicsClientId=client)
+    p.saveBullet(str(tmp_path / "two.bullet"), physicsClientId=client)
+    p.disconnect(client)
+    found = inventory(tmp_path / "two.bullet")
+    assert found.decomposed == (("body 0/base", 2),)
+    assert (found.bodies, found.shapes, found.shapes_read) == (1, 2, 2)
 
 
 def test_a_scene_that_was_saved_is_listed(tmp_path):
