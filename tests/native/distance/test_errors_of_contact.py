@@ -269,6 +269,25 @@ def test_crossing_cylinders_separate_perpendicular_to_both_axes(seed):
     assert_allclose(answer.normal, (0, -1, 0), atol=1e-15)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_a_corner_in_the_side_of_a_cylinder_leaves_it_straight_away_from_the_axis(seed):
+    rng = np.random.default_rng(seed)
+    q = quaternion(rng)
+    outward = np.array([0.9, 0.3, 0]) / np.hypot(0.9, 0.3)
+    aside, along = np.cross([0, 0, 1], outward), np.array([0, 0, 1])
+    turns = rng.uniform(0, 0.5) + np.arange(3)[:, None] * 2 * np.pi / 3
+    tip = rng.uniform(0.05, 0.9) * outward + 0.2 * along
+    corners = np.vstack([tip, tip + 3 * outward + np.cos(turns) * aside + np.sin(turns) * along])
+    cylinder = Placed(Cylinder(1, 40), rng.normal(size=3), q)
+    hull = Placed(Hull(corners @ rotation(q).T + cylinder.position))
+    (axis,) = exact.placed([(0, 0, 1)], (0, 0, 0), cylinder.given_orientation)
+    arms = [exact.subtract(exact.vector(corner), exact.vector(cylinder.position)) for corner in hull.shape.vertices]
+    truth = 1 - root(min(exact.dot(arm, arm) - exact.dot(arm, axis) ** 2 for arm in arms))
+    for bodies in ((cylinder, hull), (hull, cylinder)):
+        answer = overlap(*bodies)
+        assert abs(Fraction(answer.depth) - truth) <= answer.errors.depth <= 1e-15
+
+
 @pytest.mark.parametrize("tilt", [1e-1, 1e-4, 1e-8, 1e-12, 0])
 def test_a_cylinder_that_stands_askew_in_another_has_the_depth_of_its_lowest_rim_point(tilt):
     """Its rim is inside of the other's cap, whose normal is the way out; only the cap itself is as deep."""
