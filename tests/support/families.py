@@ -13,12 +13,15 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import product
 from math import pi
+from random import Random
 from typing import NamedTuple
 from zlib import crc32
 
 import exact
 import numpy as np
 from mpmath import mp
+from plain_cases import MORE_SHAPES, SHAPES, sunk
+from plain_cases import posed as plainly_posed
 from published import PUBLISHED
 from scipy.spatial import ConvexHull, cKDTree
 from strategies import directions, hull_points, overlapping_points, quaternion, reach, rotation, turn
@@ -685,12 +688,27 @@ def posed_round(rng):
         Box(rng.uniform(0.2, 1, 3)),
     ]
     a, b = choices[int(rng.integers(3))], choices[int(rng.integers(4))]
-    depth = float(rng.choice([0.3, 1e-2, 1e-4, 1e-8, -1e-8, -1e-2]))
+    return posed_along_an_axis(rng, a, b, [0.3, 1e-2, 1e-4, 1e-8, -1e-8, -1e-2])
+
+
+def posed_along_an_axis(rng, a, b, depths):
+    """Two shapes at random poses, into each other along a random axis by one of the depths."""
+    depth = float(rng.choice(depths))
     axis, p, q = directions(rng, 1)[0], quaternion(rng), quaternion(rng)
     room = reach(Placed(a, orientation=p), axis) + reach(Placed(b, orientation=q), -axis)
     where = rng.normal(size=3)
     bodies = (Placed(a, where, p), Placed(b, where + axis * (room - depth), q))
     return Case(f"{type(a).__name__} and {type(b).__name__}", depth, bodies)
+
+
+def more_kinds(rng):
+    """A shape of a kind that a header adds to the core, and one of any kind, `parameter` into each other or apart."""
+    plain = Random(int(rng.integers(2**32)))
+    makers = {**SHAPES, **MORE_SHAPES}
+    first, second = plain.choice([*MORE_SHAPES]), plain.choice([*makers])
+    depth = plain.choice([0.1, 1e-2, 1e-4, -1e-4, -1e-2])
+    bodies = sunk([plainly_posed(plain, makers[name](plain), 0.8) for name in (first, second)], depth)
+    return Case(f"{first} and {second}", depth, tuple(bodies))
 
 
 def round_contacts(rng):
@@ -892,12 +910,7 @@ def posed_ellipsoids(rng):
         Ellipsoid(2 * np.exp(rng.uniform(-3, 0, 3))),
     ]
     a, b = Ellipsoid(2 * np.exp(rng.uniform(-3, 0, 3))), choices[int(rng.integers(len(choices)))]
-    depth = float(rng.choice([1.0, 0.5, 0.3, 1e-2, 1e-4, 1e-8, -1e-8, -1e-2]))
-    axis, p, q = directions(rng, 1)[0], quaternion(rng), quaternion(rng)
-    room = reach(Placed(a, orientation=p), axis) + reach(Placed(b, orientation=q), -axis)
-    where = rng.normal(size=3)
-    bodies = (Placed(a, where, p), Placed(b, where + axis * (room - depth), q))
-    return Case(f"Ellipsoid and {type(b).__name__}", depth, bodies)
+    return posed_along_an_axis(rng, a, b, [1.0, 0.5, 0.3, 1e-2, 1e-4, 1e-8, -1e-8, -1e-2])
 
 
 def rounded_slab(sides, r, h):
@@ -929,7 +942,7 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
         round_contacts, rounded_hulls, rounded_meshes, folded_hulls, tilted_round, flush_round, special_poses,
-        ellipsoids, posed_ellipsoids,
+        ellipsoids, posed_ellipsoids, *([more_kinds] if MORE_SHAPES else []),
     )
 }  # fmt: skip
 

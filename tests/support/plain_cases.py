@@ -10,7 +10,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Shape, Sphere, overlap
+from overlapper import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Placed,
+    RoundedHull,
+    Shape,
+    Sphere,
+    _core,
+    overlap,
+)
 
 CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
 WAYS = [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) != (0, 0, 0)]
@@ -112,6 +125,11 @@ SHAPES: dict[str, Callable[[Random], Shape]] = {
     "half-space": lambda rng: HalfSpace(vector(rng), rng.uniform(-0.3, 0.3)),
     "ellipsoid": lambda rng: Ellipsoid([rng.uniform(0.2, 1) for _ in range(3)]),
 }
+
+# Kinds that a header adds to the core, such as tests/native/shapes/cone.h. They have no recorded answers.
+MORE_SHAPES: dict[str, Callable[[Random], Shape]] = {}
+if hasattr(_core, "Cone"):
+    MORE_SHAPES["cone"] = lambda rng: _core.Cone(rng.uniform(0.3, 1), rng.uniform(0.3, 2))
 
 
 def kinds(rng: Random) -> Iterator[PlainCase]:
