@@ -184,9 +184,20 @@ class Star(NamedTuple):
 def _published_polytope(overlap: Overlap, bodies: list[RationalBody], planes: list[OwnedPlane]) -> Star:
     """The facets of the overlap, with corners where their exact planes meet. Round bodies have too many to clip.
 
-    The point inside is the centroid. Most corners lie where bodies are round, so their mean would be pulled more.
+    The point inside is the centroid. Most corners lie where bodies are round, so their mean would be pulled more. The
+    core's inner polytope has another point inside. The middles of the edges make up for the difference.
     """
-    return _about_middles(planes, overlap.facets, _corners(overlap, planes))._replace(middle=exact(overlap.centroid))
+    rings, corners = _with_middles(overlap.facets, _corners(overlap, planes))
+    return _about_middles(planes, rings, corners)._replace(middle=exact(overlap.centroid))
+
+
+def _with_middles(rings: Sequence[NDArray[np.int32]], corners: Exact) -> tuple[list[NDArray[np.int32]], Exact]:
+    """The polygons and their corners, with a corner in the middle of every edge."""
+    edges = [np.sort([ring, np.roll(ring, -1)], axis=0).T for ring in rings]
+    ends, place = np.unique(np.vstack(edges), axis=0, return_inverse=True)
+    middles = np.split(len(corners) + place.ravel(), np.cumsum([len(ring) for ring in rings])[:-1])
+    finer = [np.stack([ring, middle], axis=1).ravel() for ring, middle in zip(rings, middles)]
+    return finer, np.vstack([corners, (corners[ends[:, 0]] + corners[ends[:, 1]]) / 2])
 
 
 def _on_fine_grid(points: Exact) -> tuple[Exact, int, Exact]:
