@@ -6,6 +6,9 @@ import pickle
 import signal
 import threading
 import time
+from copy import copy
+from functools import partial
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -36,10 +39,6 @@ def hull(count=300_000):
     return lambda: Hull(points)
 
 
-def smaller_hull():
-    return hull(80_000)
-
-
 def rounded_hull():
     points = ball(300_000)
     return lambda: RoundedHull(points, 0.1)
@@ -55,33 +54,19 @@ def unpickled_hull():
     return lambda: pickle.loads(text)
 
 
-def pair():
-    a, b = clump(2)
-    return lambda: overlap(a, b).volume
+def shared(count, method="auto"):
+    bodies = clump(count)
+    return lambda: overlap(*bodies, method=method).volume
 
 
-def group():
-    bodies = clump(4)
-    return lambda: overlap(*bodies).volume
-
-
-def group_by_the_article():
-    bodies = clump(5)
-    return lambda: overlap(*bodies, method="paper").volume
-
-
-def polytope():
-    a, b = clump(2)
-    common = overlap(a, b)
+def of_a_pair(ask):
+    common = overlap(*clump(2))
     assert common.volume > 0
-    return lambda: common.vertices
+    return lambda: ask(common)
 
 
-def errors():
-    a, b = clump(2)
-    common = overlap(a, b)
-    assert common.volume > 0
-    return lambda: common.errors
+def proof(common):
+    return common.certificate().verify()
 
 
 def traced_pair():
@@ -95,33 +80,11 @@ def errors_beside_a_ball():
     return lambda: common.errors
 
 
-def certificate():
-    a, b = clump(2)
-    common = overlap(a, b)
-    return lambda: common.certificate().verify()
-
-
 def finely_rounded(other):
-    """With whatever lies across a good part of it, by slices or by a polytope of tangent planes."""
+    """A rounded hull and a shape across a good part of it, or what a function makes of the hull."""
     a = RoundedHull(ball(20_000), 0.05)
-    b = Placed(other(a), (0.7, 0.1, 0.05), TURNED)
+    b = Placed(other(a) if callable(other) else other, (0.7, 0.1, 0.05), TURNED)
     return lambda: overlap(a, b).volume
-
-
-def rounded_hull_and_ball():
-    return finely_rounded(lambda _: Sphere(1))
-
-
-def rounded_hull_and_cylinder():
-    return finely_rounded(lambda _: Cylinder(0.5, 1))
-
-
-def rounded_hull_and_its_core():
-    return finely_rounded(lambda a: a.core)
-
-
-def rounded_hulls():
-    return finely_rounded(lambda a: a)
 
 
 def errors_of_rounded_hulls():
@@ -141,26 +104,35 @@ def one_long_row(threads=1):
     return lambda: batch.overlaps(*poses, threads=threads)
 
 
-def long_rows_of_many_threads():
-    return one_long_row(8)
-
-
-def pairs_of_boxes():
+def many_boxes(ask):
     batch, places = Batch([Box([1, 1, 1])] * 20_000), np.random.default_rng(2).uniform(0, 1, (20_000, 3))
-    return lambda: batch.candidate_pairs(places, [TURNED] * len(places))
+    return lambda: ask(batch)(places, [TURNED] * len(places))
 
 
-def overlaps_before_the_first_pair():
-    batch, places = Batch([Box([1, 1, 1])] * 20_000), np.random.default_rng(2).uniform(0, 1, (20_000, 3))
-    return lambda: batch.overlaps(places, [TURNED] * len(places))
-
-
-JOBS = [
-    hull, rounded_hull, points_for_a_hull, unpickled_hull, pair, traced_pair, group, group_by_the_article, polytope,
-    errors, errors_beside_a_ball, certificate, rounded_hull_and_ball, rounded_hull_and_cylinder,
-    rounded_hull_and_its_core, rounded_hulls, errors_of_rounded_hulls, round_bodies_to_a_fine_tolerance, one_long_row,
-    long_rows_of_many_threads, pairs_of_boxes, overlaps_before_the_first_pair,
-]  # fmt: skip
+JOBS = {
+    "hull": hull,
+    "rounded hull": rounded_hull,
+    "points for a hull": points_for_a_hull,
+    "unpickled hull": unpickled_hull,
+    "pair": partial(shared, 2),
+    "traced pair": traced_pair,
+    "group": partial(shared, 4),
+    "group by the article": partial(shared, 5, "paper"),
+    "polytope": partial(of_a_pair, attrgetter("vertices")),
+    "errors": partial(of_a_pair, attrgetter("errors")),
+    "errors beside a ball": errors_beside_a_ball,
+    "certificate": partial(of_a_pair, proof),
+    "rounded hull and ball": partial(finely_rounded, Sphere(1)),
+    "rounded hull and cylinder": partial(finely_rounded, Cylinder(0.5, 1)),
+    "rounded hull and its core": partial(finely_rounded, attrgetter("core")),
+    "rounded hulls": partial(finely_rounded, copy),
+    "errors of rounded hulls": errors_of_rounded_hulls,
+    "round bodies to a fine tolerance": round_bodies_to_a_fine_tolerance,
+    "one long row": one_long_row,
+    "long rows of many threads": partial(one_long_row, 8),
+    "pairs of boxes": partial(many_boxes, attrgetter("candidate_pairs")),
+    "overlaps before the first pair": partial(many_boxes, attrgetter("overlaps")),
+}
 
 
 def prepare():
@@ -198,22 +170,12 @@ def presses(job):
     return late, right
 
 
-@pytest.mark.parametrize("job", JOBS)
+@pytest.mark.parametrize("job", JOBS.values(), ids=JOBS)
 def test_ctrl_c_is_answered_within_a_second(another_process, job):
     late, right = another_process(presses, job)
     assert late
     assert max(late) < 1
     assert right
-
-
-def three_bodies():
-    a, b, c = clump(3)
-    return lambda: overlap(a, b, c).volume
-
-
-def other_pair():
-    a, b = clump(2)
-    return lambda: overlap(a, b).volume
 
 
 def coarsely_rounded_hulls():
@@ -232,7 +194,11 @@ def handled(long, short):
 
 @pytest.mark.parametrize(
     ("long", "short"),
-    [(three_bodies, other_pair), (traced_pair, other_pair), (coarsely_rounded_hulls, coarsely_rounded_hulls)],
+    [
+        (partial(shared, 3), partial(shared, 2)),
+        (traced_pair, partial(shared, 2)),
+        (coarsely_rounded_hulls, coarsely_rounded_hulls),
+    ],
 )
 def test_a_signal_handler_may_compute_while_something_else_is_computed(another_process, long, short):
     volume, again, found, alone = another_process(handled, long, short)
@@ -259,4 +225,4 @@ def beats(job):
 
 
 def test_other_threads_run_while_a_hull_is_made(another_process):
-    assert another_process(beats, smaller_hull) > 10
+    assert another_process(beats, partial(hull, 80_000)) > 10
