@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +21,22 @@ from overlapper.simulation.bullet.model_file import NotRead
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.links import link_contacts
 from overlapper.simulation.settings import Modelling
+from overlapper.tables.table import Row
+from overlapper.tables.table_file import TABLES, origin
+
+# Every column of a table of assets, in order, with its type. `closed` is 1 or 0, and empty for a model. `overlaps` is
+# JSON: names, volume in m³ and depth in m.
+COLUMNS: dict[str, type] = {
+    "asset": str,
+    "status": str,
+    "failure": str,
+    "bodies": int,
+    "shapes": int,
+    "closed": int,
+    "excess": float,
+    "overlaps": str,
+    "not_modelled": str,
+}
 
 MESHES = (".obj", ".off", ".ply", ".stl", ".3mf", ".glb", ".gltf", ".step", ".stp")
 
@@ -56,6 +74,11 @@ class Asset:
         """Whether it can be read, nothing is open or left out, and nothing overlaps."""
         return not (self.failure or self.skipped or self.overlaps) and self.closed is not False
 
+    @property
+    def status(self) -> str:
+        """Whether it is sound, in words."""
+        return "sound" if self.sound else "not read" if self.failure else "not sound"
+
 
 def asset_files(folder: Path) -> list[Path]:
     """The models and meshes in a folder and those in it, sorted. ValueError if there is none."""
@@ -65,11 +88,20 @@ def asset_files(folder: Path) -> list[Path]:
         if path.suffix.lower() in (*ENDINGS, *MESHES)
         and path.is_file()
         and not path.name.startswith(".")
-        and (path.suffix.lower() != ".xml" or b"<mujoco" in path.read_bytes()[:4000])
+        and (path.suffix.lower() != ".xml" or _is_mjcf(path))
     )
     if not found:
         raise ValueError(f"there is no model and no mesh in the folder {folder}: {', '.join((*ENDINGS, *MESHES))}")
     return found
+
+
+def _is_mjcf(path: Path) -> bool:
+    """Whether a file is MJCF by its beginning. A file that cannot be opened is taken for one, and told later."""
+    try:
+        with path.open("rb") as file:
+            return b"<mujoco" in file.read(4000)
+    except OSError:
+        return True
 
 
 def read_asset(folder: Path, path: Path, units: str, least_depth: float, modelling: Modelling) -> Asset:
@@ -86,10 +118,40 @@ def read_asset(folder: Path, path: Path, units: str, least_depth: float, modelli
         return _unread(name, f"{error.strerror}")
     except (ImportError, NotRead, RuntimeError, ValueError) as error:
         return _unread(name, first_line(error).removeprefix(f"{path} ").removeprefix(f"{path}: "))
+    except Exception as error:  # a fault of ours, which must not keep the other files from their lines
+        return _unread(name, f"{type(error).__name__}: {first_line(error)}")
 
 
 def _unread(name: str, failure: str) -> Asset:
     return Asset(name, failure, 0, 0, None, (), None, ())
+
+
+def write_table(assets: Sequence[Asset], path: Path, settings: Mapping[str, Any]) -> None:
+    """Write a row for each asset. OSError if the file cannot be written."""
+    texts = {name: str(value) for name, value in settings.items()}
+    table = TABLES[path.suffix](path, origin() | texts, COLUMNS)
+    try:
+        table.write(map(_row, assets))
+    except BaseException:
+        table.leave()
+        raise
+    table.close()
+
+
+def _row(asset: Asset) -> Row:
+    overlaps = [asdict(each) for each in asset.overlaps]
+    read = not asset.failure
+    return {
+        "asset": asset.name,
+        "status": asset.status,
+        "failure": asset.failure or None,
+        "bodies": asset.bodies if read else None,
+        "shapes": asset.shapes if read else None,
+        "closed": None if asset.closed is None else int(asset.closed),
+        "excess": asset.excess,
+        "overlaps": json.dumps(overlaps) if overlaps else None,
+        "not_modelled": "; ".join(asset.skipped) or None,
+    }
 
 
 def _model(name: str, path: Path, units: str, least_depth: float, modelling: Modelling) -> Asset:

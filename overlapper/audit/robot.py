@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,9 +14,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from overlapper.printable import first_line
-from overlapper.simulation.bullet.joints import kinematic_tree
-from overlapper.simulation.bullet.model_file import NotRead
+from overlapper.simulation.bullet.joints import ENDINGS, kinematic_tree
+from overlapper.simulation.bullet.model_file import NotRead, read_apart
+from overlapper.simulation.bullet.model_text import root_of
 from overlapper.simulation.kinematic_tree import KinematicTree
 from overlapper.simulation.settings import Modelling
 
@@ -131,20 +131,36 @@ def shape_keys(robot: Robot) -> NDArray[np.int64]:
     return np.array(keys, dtype=np.int64).reshape(-1, 3)
 
 
+def not_modelled(robot: Robot) -> dict[str, str]:
+    """By the name of a link, which of its shapes are not modelled and why."""
+    return {name: link.skipped for name, link in zip(robot.link_names, robot.tree.links) if link.skipped}
+
+
 def read_robot(path: Path, modelling: Modelling = Modelling()) -> Robot:  # noqa: B008
     """The robot of a URDF, SDF or MJCF file.
 
-    pybullet passes over mimic joints: those of a URDF are read from its text. NotRead if pybullet cannot read it, or if
-    a joint mimics one that is not there or, in the end, itself.
+    pybullet passes over mimic joints: those of a URDF are read from its text. NotRead if pybullet cannot read it or
+    takes it for something else than it says, or if a joint mimics one that is not there or, in the end, itself.
     """
-    tree = kinematic_tree(path, modelling)
-    if path.suffix.lower() != ".urdf":
-        return Robot(tree.bodies[0], tree, {})
-    root = _root(path)
-    return Robot(root.get("name") or tree.bodies[0], tree, _mimics(path, root, tree))
+    found: Robot = read_apart(path, _answers, (path, modelling), ENDINGS)
+    return found
 
 
-def _mimics(path: Path, root: ElementTree.Element, tree: KinematicTree) -> dict[str, Mimic]:
+def _answers(request: tuple[Path, Modelling]) -> Generator[Robot | str, None, None]:
+    """In the process in which pybullet reads the file: the robot in it, or the reason why it cannot be read."""
+    path, modelling = request
+    try:
+        root = root_of(path)
+        tree = yield from kinematic_tree(path, root, modelling)
+        if path.suffix.lower() == ".urdf":
+            yield Robot(root.get("name") or tree.bodies[0], tree, _mimics(root, tree))
+        else:
+            yield Robot(tree.bodies[0], tree, {})
+    except (NotRead, ValueError) as error:
+        yield str(error)
+
+
+def _mimics(root: ElementTree.Element, tree: KinematicTree) -> dict[str, Mimic]:
     kinds = {link.joint.name: link.joint.kind for link in tree.links}
     told = {str(joint.get("name")): joint.find("mimic") for joint in root.findall("joint")}
     found: dict[str, Mimic] = {}
@@ -153,30 +169,18 @@ def _mimics(path: Path, root: ElementTree.Element, tree: KinematicTree) -> dict[
             continue
         leader = str(mimic.get("joint"))
         if kinds.get(leader) not in ("revolute", "prismatic"):
-            raise NotRead(f"{path}: the joint {name!r} mimics {leader!r}, which is no joint that one number moves")
-        try:
-            multiplier, offset = (float(mimic.get(key, default)) for key, default in (("multiplier", 1), ("offset", 0)))
-        except ValueError as error:
-            raise NotRead(f"{path}: the joint {name!r} mimics {leader!r} by what is no number") from error
+            raise NotRead(f"the joint {name!r} mimics {leader!r}, which is no joint that one number moves")
+        multiplier, offset = (float(mimic.get(key, default)) for key, default in (("multiplier", 1), ("offset", 0)))
         found[name] = Mimic(leader, multiplier, offset)
-    return {name: _followed(path, name, found) for name in found}
+    return {name: _followed(name, found) for name in found}
 
 
-def _root(path: Path) -> ElementTree.Element:
-    """The root of a URDF; what comes behind its end is not read, as pybullet does not. NotRead if it has none."""
-    text, end = path.read_bytes(), b"</robot>"
-    try:
-        return ElementTree.fromstring(text[: text.index(end) + len(end)] if end in text else text)
-    except ElementTree.ParseError as error:  # which pybullet may have passed over
-        raise NotRead(f"{path} is no XML: {first_line(error)}") from error
-
-
-def _followed(path: Path, name: str, mimics: Mapping[str, Mimic]) -> Mimic:
+def _followed(name: str, mimics: Mapping[str, Mimic]) -> Mimic:
     """The same with a leader that follows none."""
     mimic, passed = mimics[name], {name}
     while mimic.leader in mimics:
         if mimic.leader in passed:
-            raise NotRead(f"{path}: the joint {name!r} mimics itself")
+            raise NotRead(f"the joint {name!r} mimics itself")
         passed.add(mimic.leader)
         next_ = mimics[mimic.leader]
         mimic = Mimic(next_.leader, mimic.multiplier * next_.multiplier, mimic.multiplier * next_.offset + mimic.offset)

@@ -6,24 +6,31 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from overlapper.audit.audit import Audit, PairAudit
+from overlapper.audit.robot import not_modelled
 from overlapper.printable import first_line
 from overlapper.whole_file import beside
 
 Names = frozenset[str]
 
 
-def reason(audited: PairAudit) -> str | None:
-    """Why a pair need not be asked about; None if it must be."""
+def reason(audited: PairAudit, whole: bool) -> str | None:
+    """Why a pair need not be asked about; None if it must be, as a pair of links that are not modelled `whole`."""
     if audited.pair.adjacent:
         return "Adjacent"
+    if audited.status == "never" and not whole:
+        return None
     return {"never": "Never", "always": "Always"}.get(audited.status)
 
 
 def write_srdf(audit: Audit, path: Path) -> None:
-    """Write <disable_collisions> for each pair that is adjacent, never overlaps or always does."""
+    """Write <disable_collisions> for each pair that is adjacent, never overlaps or always does.
+
+    A pair of a link that is not modelled whole is not said never to overlap.
+    """
+    partial = not_modelled(audit.robot).keys()
     root = ElementTree.Element("robot", name=audit.robot.name)
     for audited in audit.pairs:
-        if why := reason(audited):
+        if why := reason(audited, partial.isdisjoint(audited.names)):
             first, second = audited.names
             ElementTree.SubElement(root, "disable_collisions", link1=first, link2=second, reason=why)
     ElementTree.indent(root)
@@ -35,6 +42,8 @@ def write_srdf(audit: Audit, path: Path) -> None:
 
 def read_srdf(path: Path) -> dict[Names, str]:
     """The pairs that an SRDF file disables, with its reasons. OSError if it is not there, ValueError if it is none."""
+    if path.exists() and not path.is_file():
+        raise ValueError(f"{path} is no SRDF, and no file")
     try:
         root = ElementTree.parse(path).getroot()
     except (ElementTree.ParseError, ValueError) as error:

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from overlapper.audit.audit import Audit, PairAudit, Pose
+from overlapper.audit.robot import not_modelled
 from overlapper.tables.table import Row, Value
 from overlapper.tables.table_file import TABLES, origin
 
 # Every column, in order, with its type; the unit is in the name. `adjacent` is 1 or 0. Joints are JSON, by name, in rad
-# and m. `page` is a link to the pose of the largest volume.
+# and m. `page` is a link to the pose of the largest volume. `not_modelled` says what of the two links is left out.
 COLUMNS: dict[str, type] = {
     "nameA": str,
     "nameB": str,
@@ -31,6 +32,7 @@ COLUMNS: dict[str, type] = {
     "depth_configuration": int,
     "depth_joints": str,
     "page": str,
+    "not_modelled": str,
 }
 
 
@@ -73,6 +75,8 @@ def _row(audit: Audit, audited: PairAudit, page: Mapping[tuple[int, int], str]) 
         row |= {"volume_m3": shared.volume, "volume_error_m3": shared.volume_error}
         row["depth_m"] = audited.deepest.contact.depth
     row["page"] = page.get(audited.pair.links)
+    left_out = not_modelled(audit.robot)
+    row["not_modelled"] = "; ".join(f"{name}: {left_out[name]}" for name in audited.names if name in left_out) or None
     return {name: row.get(name) for name in COLUMNS}
 
 

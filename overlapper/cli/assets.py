@@ -21,22 +21,31 @@ if TYPE_CHECKING:
     from overlapper.audit.assets import Asset
 
 
-def audit_folder(folder: Path, units: str, least_depth: float, modelling: Modelling, as_json: bool) -> NoReturn:
-    """Tell of every asset; exit code 1 if anything is wrong with one."""
+def audit_folder(
+    folder: Path, units: str, least_depth: float, modelling: Modelling, out: Path | None, as_json: bool
+) -> NoReturn:
+    """Tell of every asset, also in a table `out`; exit code 1 if anything is wrong with one."""
+    told = {"units": units, "least_depth": least_depth, **settings_of(modelling)}
     try:
         with input_refusals(), quiet():
-            from overlapper.audit.assets import asset_files, read_asset
+            from overlapper.audit.assets import asset_files, read_asset, write_table
+            from overlapper.tables.outputs import can_be_written
 
+            can_be_written(out, None)
             files = asset_files(folder)
             read = (read_asset(folder, file, units, least_depth, modelling) for file in files)
             assets = list(with_progress(read, folder.name, len(files)))
+            if out:
+                write_table(assets, out, told | {"folder": str(folder)})
     except KeyboardInterrupt as error:
         raise Interrupted from error
     if as_json:
-        told = {"units": units, "least_depth": least_depth, **settings_of(modelling)}
-        print(json.dumps({"settings": told, "assets": [asdict(asset) | {"sound": asset.sound} for asset in assets]}))
+        rows = [asdict(asset) | {"sound": asset.sound} for asset in assets]
+        print(json.dumps({"settings": told, "assets": rows} | ({"out": str(out)} if out else {})))
     else:
         _show(assets)
+        if out:
+            say(f"Written: {out}")
     raise typer.Exit(0 if all(asset.sound for asset in assets) else 1)
 
 
@@ -48,8 +57,7 @@ def _show(assets: Sequence[Asset]) -> None:
     for asset in assets:
         row = [str(asset.bodies), str(asset.shapes), {True: "yes", False: "no", None: ""}[asset.closed]]
         row += ["" if asset.excess is None else f"{asset.excess:+.1%}", str(len(asset.overlaps))]
-        status = "sound" if asset.sound else "not read" if asset.failure else "not sound"
-        table.add_row(Text(printable(asset.name)), status, *(row if not asset.failure else [""] * 5))
+        table.add_row(Text(printable(asset.name)), asset.status, *(row if not asset.failure else [""] * 5))
     show(table)
     for asset in assets:
         if asset.failure:

@@ -58,7 +58,9 @@ def audit(
         Path | None, typer.Option(help="An SRDF file, of which the pairs that it disables are checked.")
     ] = None,
     srdf: Annotated[Path | None, typer.Option(help="SRDF file to write, for a planner.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Table of all pairs of links: .csv, .parquet, .sqlite.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Table of all pairs of links, or assets: .csv, .parquet, .sqlite.")
+    ] = None,
     html: HtmlOption = None,
     engine: AbstractContextManager[Executor],
     tolerance: ToleranceOption = 1e-3,
@@ -72,8 +74,8 @@ def audit(
 
     Its joints are placed at rest, at corners of their limits, and at random between them. Links that a joint ties, or
     joints and links without shapes alone, are adjacent: they overlap by design, and are left to themselves. The exit
-    code is 1 if a pair that is not adjacent overlaps always, or if a pair overlaps that --against disables as one that
-    does not. It is 2 if the robot cannot be read, else 0.
+    code is 1 if a pair that is not adjacent overlaps always, if a pair that --against disables overlaps, or if a shape
+    is not modelled. It is 2 if the robot cannot be read, else 0.
 
     For a folder of models and meshes the answer is what loads, what is closed, and what is left out and why. It says,
     too, how much volume convex parts add, and what overlaps in itself at rest. The exit code is 1 if anything is to be
@@ -102,10 +104,10 @@ def audit(
         **settings_of(modelled),
     }
     if robot.is_dir():
-        asked = {"--expect": expect, "--against": against, "--srdf": srdf, "--out": out, "--html": html}
+        asked = {"--expect": expect, "--against": against, "--srdf": srdf, "--html": html}
         if of_robots := [name for name, value in asked.items() if value]:
             raise Refused(f"{of_robots[0]} is for a robot, and {robot} is a folder")
-        audit_folder(robot, units, least_depth, modelled, as_json)
+        audit_folder(robot, units, least_depth, modelled, out, as_json)
     written: list[Path] = []
     try:
         with input_refusals(), quiet():
@@ -113,7 +115,7 @@ def audit(
             from overlapper.audit.audit import audit as look
             from overlapper.audit.findings import findings, remarks
             from overlapper.audit.page import addresses, write_page
-            from overlapper.audit.robot import read_robot
+            from overlapper.audit.robot import not_modelled, read_robot
             from overlapper.audit.srdf import read_srdf, write_srdf
             from overlapper.audit.table import facts, write_table
             from overlapper.simulation.bullet.model_file import NotRead
@@ -137,7 +139,8 @@ def audit(
                     lambda blocks, count: with_progress(blocks, robot.name, count),
                 )
             if not found.pairs:
-                raise Refused(f"{robot} has no two links with shapes that could overlap")
+                left_out = "".join(f"; {name} is not modelled: {why}" for name, why in not_modelled(read).items())
+                raise Refused(f"{robot} has no two links with shapes that could overlap{left_out}")
             page = addresses(found, html) if html else {}
             if out:
                 write_table(found, out, settings, page)
@@ -153,7 +156,8 @@ def audit(
         raise Interrupted from error
     if as_json:
         files = {name: str(path) for name, path in (("out", out), ("srdf", srdf), ("html", html)) if path}
-        about = {"robot": read.name, "joints": list(read.columns), "remarks": remarks(read)}
+        about: dict[str, Any] = {"robot": read.name, "joints": list(read.columns), "remarks": remarks(read)}
+        about["not_modelled"] = not_modelled(read)
         told = {"pairs": facts(found, page), "findings": wrong}
         print(json.dumps({"settings": settings} | about | told | files))
     else:
@@ -163,6 +167,7 @@ def audit(
 
 def _show(found: Audit, wrong: list[str], written: list[Path]) -> None:
     from overlapper.audit.findings import remarks
+    from overlapper.audit.robot import not_modelled
 
     met = [each for each in found.pairs if each.met and not each.pair.adjacent]
     if met:
@@ -170,6 +175,7 @@ def _show(found: Audit, wrong: list[str], written: list[Path]) -> None:
     counts = {status: len(found.of_status(status)) for status in ("never", "sometimes", "always")}
     adjacent = len(found.pairs) - sum(counts.values())
     words = [f"{adjacent:,} {'are' if adjacent != 1 else 'is'} adjacent"]
+    left_out = len(not_modelled(found.robot))
     words += [
         f"{count:,} {status} {'overlaps' if count == 1 else 'overlap'}" for status, count in counts.items() if count
     ]
@@ -178,6 +184,8 @@ def _show(found: Audit, wrong: list[str], written: list[Path]) -> None:
         f"Of {len(found.pairs):,} pairs of {links:,} links, {', '.join(words)} in {found.sampling.count:,} "
         "configurations."
     )
+    if left_out:
+        say(f"{left_out:,} {'links are' if left_out > 1 else 'link is'} not modelled whole.")
     for line in (*remarks(found.robot), *wrong, *(f"Written: {path}" for path in written)):
         say(line)
 

@@ -88,8 +88,10 @@ def clashes(
             can_be_written(out, html)
             parts, failures = scene.read(sources, units)
             if len(parts) < 2:
-                for failure in failures:
+                for failure in failures[:-1]:
                     say(f"overlapper: {failure}", sys.stderr)
+                if failures:
+                    raise Refused(failures[-1])
                 raise Refused(f"at least two bodies are needed, not {len(parts)}")
             found = scene.clashes(parts, concave == "enclose", concave_threshold, least_depth, pairs)
             found.failures[:0] = failures

@@ -101,12 +101,17 @@ class Confined:
     def _unanswered(self, ended: Ended) -> Unanswered:
         if ended.limit is not None:
             return Unanswered(f"took longer than {self.seconds:g} s")
-        if OUT_OF_MEMORY.search(ended.words):
+        if out_of_memory(ended):
             return Unanswered(f"needed more than {self.megabytes:,} MB")
         name = signal_name(-ended.code) if ended.code is not None and ended.code < 0 else ""
         if ended.code is None:
             return Unanswered(f"had a process that {ended}")
         return Unanswered(str(ended).replace("ended with", "ended its process with", 1), name)
+
+
+def out_of_memory(ended: Ended) -> bool:
+    """Whether a process ended as it was refused memory, by its last words."""
+    return OUT_OF_MEMORY.search(ended.words) is not None
 
 
 def answers(request: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any], float]) -> Iterator[tuple[bool, Any]]:

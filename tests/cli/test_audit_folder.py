@@ -1,5 +1,6 @@
 """`overlapper audit FOLDER`: models that load, closed meshes, skipped shapes, and self-overlaps at rest."""
 
+import csv
 import json
 import subprocess
 import sys
@@ -73,6 +74,27 @@ def test_every_asset_of_a_folder_is_reported(folder):
     assert (shared["volume"], shared["depth"]) == (pytest.approx(200.0), pytest.approx(2.0))  # glTF is in metres
     assert [each["names"] for each in found["robots/table.urdf"]["overlaps"]] == [["arm", "plate"], ["wall", "plate"]]
     assert (found["robots/table.urdf"]["bodies"], found["robots/table.urdf"]["closed"]) == (5, None)
+
+
+def test_a_table_of_assets_has_a_row_for_each(folder, tmp_path):
+    code, said = run(folder, "--units", "mm", "--out", tmp_path / "assets.csv")
+    lines = (tmp_path / "assets.csv").read_text().splitlines()
+    rows = {row["asset"]: row for row in csv.DictReader(line for line in lines if not line.startswith("#"))}
+    assert code == 1 and said.endswith(f"Written: {tmp_path / 'assets.csv'}\n")
+    assert {name: row["status"] for name, row in rows.items()} == {
+        **dict.fromkeys(("bent.obj", "cube.stl"), "sound"),
+        **dict.fromkeys(("open.ply", "pair.glb", "robots/table.urdf"), "not sound"),
+        "broken.stl": "not read",
+    }
+    assert rows["broken.stl"]["failure"] and "open along 3 edges" in rows["open.ply"]["not_modelled"]
+    (shared,) = json.loads(rows["pair.glb"]["overlaps"])
+    assert sorted(shared["names"]) == ["left", "right"] and "# units: mm" in lines
+
+
+def test_a_fault_in_one_asset_is_its_failure(folder, monkeypatch):
+    monkeypatch.setattr("overlapper.audit.assets._mesh", lambda *_: [][0])
+    failed = read_asset(folder, folder / "cube.stl", "mm", 0.0, Modelling())
+    assert failed.failure == "IndexError: list index out of range"
 
 
 def test_people_get_a_table_and_sentences(folder):

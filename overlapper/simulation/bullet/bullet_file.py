@@ -130,6 +130,18 @@ class BulletFile:
                 self._leaves[address] = tuple(self._flatten(address, np.zeros(3), np.eye(3)))
         return self._leaves[address]
 
+    def pieces(self, address: int) -> list[int]:
+        """The number of leaves of each child of the compound at `address`; of another shape, its one.
+
+        ValueError if the file is damaged there.
+        """
+        with _damage():
+            number = int(self._base(address, "btCollisionShapeData")["m_shapeType"])
+            if KINDS.get(number) != "compound":
+                return [1]
+            children = int(self._at(address)[0]["m_childShapePtr"])
+            return [len(self.leaves(int(child["m_childShape"]))) for child in (self._at(children) if children else ())]
+
     def _read_bodies(self, blocks: list[Block]) -> tuple[SavedBody, ...]:
         colliders: dict[int, dict[int, Collider]] = {}  # of each multibody, by link
         frictions: dict[int, float] = {}  # of each multibody, of its base

@@ -6,7 +6,7 @@ It is read in a process of its own (`overlapper.simulation.bullet.model_file`).
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,8 @@ import numpy as np
 from overlapper import Placed
 from overlapper.quaternion import composed, rotated
 from overlapper.shapes.table import facts
-from overlapper.simulation.bullet.model_file import NotRead, load, read_apart
+from overlapper.simulation.bullet.model_file import LOADED, NotRead, load, read_apart
+from overlapper.simulation.bullet.model_text import must_be_sound, root_of
 from overlapper.simulation.settings import Modelling, settings_of
 
 Listed = dict[tuple[int, int], list[Placed]]
@@ -79,24 +80,28 @@ def inventory(path: Path, self_collision: bool = False, modelling: Modelling = M
     return found
 
 
-def _answers(request: tuple[Path, bool, Modelling]) -> Iterator[Inventory | str]:
+def _answers(request: tuple[Path, bool, Modelling]) -> Generator[Inventory | str, None, None]:
     """In the process in which pybullet reads the file: what is in it, or the reason why it cannot be read."""
     try:
-        yield _read(*request)
+        yield (yield from _read(*request))
     except (NotRead, ValueError) as error:
         yield str(error)
 
 
-def _read(path: Path, self_collision: bool, modelling: Modelling) -> Inventory:
+def _read(path: Path, self_collision: bool, modelling: Modelling) -> Generator[str, None, Inventory]:
     if path.suffix.lower() == ".bullet":
         return _of_bullet_file(path, modelling)
     import pybullet
 
     from overlapper.simulation import Bodies, Recorder
+    from overlapper.simulation.bullet.lost_shapes import lost_shapes
 
+    root = root_of(path)
+    must_be_sound(path, root)
     client = pybullet.connect(pybullet.DIRECT)
     with Recorder(client) as recorder:
         load(path, client, pybullet.URDF_USE_SELF_COLLISION if self_collision else 0)
+        yield LOADED
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of shapes left out, which the inventory names
             bodies = Bodies(client, recorder=recorder, **settings_of(modelling))
@@ -104,6 +109,11 @@ def _read(path: Path, self_collision: bool, modelling: Modelling) -> Inventory:
     for (body, link, _), placed in zip(bodies.keys, bodies.placed):
         listed.setdefault((body, link), []).append(placed)
     report, names = bodies.report(), bodies.names
+    if not report.bodies:
+        raise NotRead("it has no body")
+    lost, absent = lost_shapes(path, root, client, range(report.bodies))
+    skipped = [(names.get(key, path.name), reason) for key, reason in lost.items()]
+    skipped += [(name, "pybullet has not built its shapes") for name in absent]
     meets = {key: len(others) for key, others in bodies.partners().items()}
     return Inventory(
         report.bodies,
@@ -111,7 +121,7 @@ def _read(path: Path, self_collision: bool, modelling: Modelling) -> Inventory:
         report.shapes_read,
         report.pairs_possible,
         _links(listed, names, meets),
-        tuple((each.name, each.reason) for each in bodies.skipped),
+        tuple(skipped + [(each.name, each.reason) for each in bodies.skipped]),
         tuple((each.name, len(each.shapes)) for each in bodies.decomposed),
     )
 

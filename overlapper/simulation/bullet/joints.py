@@ -1,25 +1,30 @@
 """The links and joints of a file that pybullet loads.
 
-The file is read in a process of its own (`overlapper.simulation.bullet.model_file`).
+pybullet may die of a file: whoever reads one does so in a process of its own, by `model_file.read_apart`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from overlapper.printable import printable
 from overlapper.quaternion import composed, rotated
-from overlapper.simulation.bullet.model_file import NotRead, load, read_apart
+from overlapper.simulation.bullet.mjcf import misread
+from overlapper.simulation.bullet.model_file import LOADED, NotRead, load
+from overlapper.simulation.bullet.model_text import must_be_sound
 from overlapper.simulation.kinematic_tree import Joint, Kind, KinematicTree, LinkShape, TreeLink
 from overlapper.simulation.model import BASE
 from overlapper.simulation.naming import labels
 from overlapper.simulation.settings import Modelling
 
 ENDINGS = (".urdf", ".sdf", ".xml")
+
+MOST_LINKS = 128
 
 KINDS: dict[int, Kind] = {
     0: "revolute",
@@ -29,48 +34,49 @@ KINDS: dict[int, Kind] = {
 }  # by pybullet's numbers of joint types
 
 
-def kinematic_tree(path: Path, modelling: Modelling) -> KinematicTree:
-    """The links of a URDF, SDF or MJCF file.
+def kinematic_tree(path: Path, root: Element, modelling: Modelling) -> Generator[str, None, KinematicTree]:
+    """The links of a URDF, SDF or MJCF file, whose text has this root. LOADED comes first, when pybullet has the file.
 
-    NotRead if the file is not there, or pybullet refuses it or dies of it.
+    NotRead if pybullet refuses the file, or would take it for something else than it says.
     """
-    found: KinematicTree = read_apart(path, _answers, (path, modelling), ENDINGS)
-    return found
-
-
-def _answers(request: tuple[Path, Modelling]) -> Iterator[KinematicTree | str]:
-    """In the process in which pybullet reads the file: what is in it, or the reason why it cannot be read."""
-    try:
-        yield _read(*request)
-    except (NotRead, ValueError) as error:
-        yield str(error)
-
-
-def _read(path: Path, modelling: Modelling) -> KinematicTree:
     import pybullet
 
     from overlapper.simulation.bullet.known_bodies import KnownBodies
+    from overlapper.simulation.bullet.lost_shapes import lost_shapes
     from overlapper.simulation.bullet.recorder import Recorder
 
+    if (count := len(root.findall("link"))) > MOST_LINKS:
+        raise NotRead(f"it has {count:,} links, and pybullet tells the poses of {MOST_LINKS} at most")
+    must_be_sound(path, root)
+    if path.suffix.lower() == ".xml" and (changed := misread(root)):
+        raise NotRead(f"pybullet's importer of MJCF would change what it says: {changed}")
     client = pybullet.connect(pybullet.DIRECT)
     with Recorder(client) as recorder:
         # Visual shapes take most of the time of loading a URDF.
         load(path, client, pybullet.URDF_IGNORE_VISUAL_SHAPES if path.suffix.lower() == ".urdf" else 0)
+        yield LOADED
         known = KnownBodies(client, modelling, recorder, {})
         known.refresh()
+    if not known.by_id:
+        raise NotRead("it has no body")
+    lost, absent = lost_shapes(path, root, client, sorted(known.by_id))
+    if absent:
+        raise NotRead(f"pybullet has not built the shapes of {', '.join(absent)}")
     names = labels(known.by_id)
     links: list[TreeLink] = []
     shapes: list[LinkShape] = []
     for number, (id, body) in enumerate(known.by_id.items()):
         base = len(links)
-        skipped = {each.link: each.reason for each in body.skipped}
+        skipped = {link: [reason] for (of_body, link), reason in lost.items() if of_body == id}
+        for left_out in body.skipped:
+            skipped.setdefault(left_out.link, []).append(left_out.reason)
         concave = {link: [each for each in body.decomposed if each.link == link] for link in body.link_names}
         joints = _joints(client, id, names[id])
         for link, joint in enumerate(joints, BASE):
             parent = base + 1 + body.parents[link] if link > BASE else -1
             gains = [each.volume / each.mesh_volume - 1 for each in concave[link] if each.mesh_volume]
             parts_of_it = sum(len(each.shapes) for each in concave[link])
-            about = skipped.get(link, ""), parts_of_it, max(gains, default=None)
+            about = "; ".join(skipped.get(link, ())), parts_of_it, max(gains, default=None)
             links.append(TreeLink(number, body.link_names[link], parent, joint, *about))
         for each in sorted(body.shapes, key=lambda each: (each.link, each.index)):
             shapes.append(LinkShape(base + 1 + each.link, each.shape, each.position, each.orientation))
@@ -89,7 +95,7 @@ def _joints(client: int, id: int, name: str) -> list[Joint]:
         base = pybullet.getBasePositionAndOrientation(id, client)
         states = pybullet.getLinkStates(id, range(len(told)), computeForwardKinematics=1, physicsClientId=client)
     except pybullet.error as error:
-        raise NotRead(f"pybullet tells no poses of the {len(told)} links of {name}") from error
+        raise NotRead(f"pybullet tells no poses of the {1 + len(told)} links of {name}") from error
     frames = [tuple(map(np.array, each[:2])) for each in (base, *(states or ()))]
     root = Joint("", "held", frames[0][0], frames[0][1], np.zeros(3), np.zeros(3), 0.0, -1.0)
     return [root, *(joint_between(client, id, each, frames[1 + each[16]], frames[1 + each[0]]) for each in told)]

@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from overlapper.install import simulator_hint
+from overlapper.jobs.confined import MEGABYTES, SECONDS, out_of_memory
 from overlapper.jobs.worker import Ended, Worker
+
+LOADED = "loaded"  # the first reply: what comes then may take long, as meshes are decomposed, with limits of its own
 
 ENDINGS = (".urdf", ".sdf", ".xml", ".bullet")
 
@@ -24,9 +27,10 @@ def read_apart(
     request: tuple[Any, ...],
     endings: Sequence[str] = ENDINGS,
 ) -> Any:
-    """The one reply of `answers` to a request, in a process of its own; a text is the reason why there is none.
+    """The last reply of `answers` to a request, in a process of its own; a text is the reason why there is none.
 
-    NotRead if the file is not there, or pybullet refuses it or dies of it; ImportError without pybullet.
+    `answers` says LOADED when pybullet has the file, which has limits of time and memory. NotRead if the file is not
+    there, or breaks a limit, or pybullet refuses it or dies of it; ImportError without pybullet.
     """
     if find_spec("pybullet") is None:
         raise ImportError(f"overlapper.simulation needs {simulator_hint()}")
@@ -35,10 +39,16 @@ def read_apart(
     if not path.is_file():
         raise NotRead(f"there is no file {path}")
     try:
-        with Worker(answers) as worker:
+        with Worker(answers, megabytes=MEGABYTES) as worker:
             worker.send(request)
-            found = worker.receive()
+            found = worker.receive(SECONDS)
+            if found == LOADED:
+                found = worker.receive()
     except Ended as ended:
+        if ended.limit is not None:
+            raise NotRead(f"{path} cannot be read: pybullet takes longer than {ended.limit:g} s") from None
+        if out_of_memory(ended):
+            raise NotRead(f"{path} cannot be read: pybullet needs more than {MEGABYTES:,} MB") from None
         if ended.code is not None and ended.code < 0:
             raise NotRead(f"pybullet dies of {path} with signal {signal.Signals(-ended.code).name}") from None
         if not ended.words:

@@ -1,0 +1,73 @@
+"""Collision shapes that a model names and pybullet has not built: it passes over meshes that it cannot read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import pybullet
+
+from overlapper.printable import printable
+from overlapper.simulation.bullet.model_text import named_shapes
+from overlapper.simulation.bullet.saved_scene import saved_bodies
+from overlapper.simulation.model import BASE, LinkKey
+
+
+def lost_shapes(path: Path, root: Element, client: int, ids: Sequence[int]) -> tuple[dict[LinkKey, str], list[str]]:
+    """Why links have fewer shapes than the model names, by body and link; and the names of links that are not there.
+
+    `root` is the root of the model, and `ids` are the bodies that pybullet has made of it.
+    """
+    named = named_shapes(path, root)
+    file, rows, _ = saved_bodies(client, sorted(ids))
+    lost: dict[LinkKey, str] = {}
+    others = 0  # shapes of links that have no name in the file
+    for id, row in sorted(rows.items()):
+        colliders = file.bodies[row].colliders
+        for link, name in _link_names(client, id).items():
+            pieces = file.pieces(colliders[link].shape) if link in colliders else []
+            if not named.get(name):
+                others += sum(map(bool, pieces))
+                continue
+            expected = named[name].pop(0)
+            files = _files(client, id, link) if path.suffix.lower() != ".xml" else None
+            if reason := _reason(expected, pieces, files):
+                lost[id, link] = reason
+    unnamed = sum(map(len, named.pop("", [])))  # of MJCF, whose bodies pybullet numbers
+    absent = [name for name, links in named.items() for shapes in links if shapes]
+    return lost, absent + ["a body without a name"] * (others < unnamed)
+
+
+def _link_names(client: int, id: int) -> dict[int, str]:
+    joints = [pybullet.getJointInfo(id, joint, client) for joint in range(pybullet.getNumJoints(id, client))]
+    names = {BASE: pybullet.getBodyInfo(id, client)[0]} | {joint[0]: joint[12] for joint in joints}
+    return {link: name.decode(errors="replace") for link, name in names.items()}
+
+
+def _files(client: int, id: int, link: int) -> list[str]:
+    """The file of each shape that pybullet reports, "" for a shape without one."""
+    told = pybullet.getCollisionShapeData(id, link, client)
+    return [each[4].decode(errors="replace") for each in told]
+
+
+def _reason(expected: Sequence[str], pieces: Sequence[int], files: Sequence[str] | None) -> str:
+    """Why a link has fewer shapes than `expected`, "" if it has as many.
+
+    `pieces` are the numbers of convex shapes of each of its shapes. An only shape may come as its convex shapes.
+    `files` are those that pybullet reports, None if it cannot be asked.
+    """
+    there = min(1, sum(pieces)) if len(expected) == 1 else sum(map(bool, pieces))
+    if files is not None and len(expected) > 1:
+        there = min(there, len(files))
+    if there >= len(expected):
+        return ""
+    lost = [shape for shape, count in zip(expected, pieces) if not count] if len(pieces) == len(expected) else []
+    lost = lost or [shape for shape in expected if files is not None and not _is_among(shape, files)] or [*expected]
+    names = ", ".join(dict.fromkeys(map(printable, lost)))
+    return f"pybullet has built {there} of the {len(expected)} shapes that the file names, and not {names}"
+
+
+def _is_among(shape: str, files: Sequence[str]) -> bool:
+    """Whether a shape is reported; primitives are reported without a name."""
+    return any(file.endswith(Path(shape).name) for file in files) if "." in shape else "" in files
