@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping
 from contextlib import closing, redirect_stderr
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -37,7 +37,8 @@ def check(
 
     What moved is told by cause: the geometry is this package's, the shapes are the models', the dynamics the
     simulator's. A new scene is recorded, and has moved this once. The exit code is 0 if all is as recorded, 1 if
-    something moved, and 2 if a scene could not be run.
+    something moved, and 2 if a scene could not be run. Shapes that are not modelled are noted. A scene that has
+    diverged is not recorded.
 
     Examples:
 
@@ -48,8 +49,10 @@ def check(
     named: dict[str, Path] = {}
     for scene in (scene for folder in paths or [Path("scenes")] for scene in _scenes_in(folder)):
         named.setdefault(os.path.abspath(scene), scene)  # once, or two at once would write its expected file
-    scenes = [*named.values()]
-    held = _in_turn(scenes, out, record) if workers == 1 else _at_once(scenes, out, record, workers)
+    from overlapper.scenes.check import pages_of
+
+    pages = pages_of([*named.values()], out)
+    held = _in_turn(pages, record) if workers == 1 else _at_once(pages, record, workers)
     code = 0
     try:
         with closing(held):
@@ -81,20 +84,20 @@ class _Held:
     talk: str = ""
 
 
-def _in_turn(scenes: Sequence[Path], out: Path, record: bool) -> Generator[_Held, None, None]:
-    for scene in scenes:
-        yield _held(scene, out, record)
+def _in_turn(pages: Mapping[Path, Path], record: bool) -> Generator[_Held, None, None]:
+    for scene, page in pages.items():
+        yield _held(scene, page, record)
 
 
-def _at_once(scenes: Sequence[Path], out: Path, record: bool, workers: int | None) -> Generator[_Held, None, None]:
+def _at_once(pages: Mapping[Path, Path], record: bool, workers: int | None) -> Generator[_Held, None, None]:
     """As _in_turn, in the same order, by several processes."""
     from overlapper.jobs.hand import Done, Job, Outcome
     from overlapper.jobs.processes import Processes
 
-    job = Job(__name__, prepared.__name__, (out, record))
+    job = Job(__name__, prepared.__name__, record)
     found: dict[int, Outcome] = {}
     told = 0
-    with closing(Processes(workers).outcomes(job, scenes)) as outcomes:
+    with closing(Processes(workers).outcomes(job, [*pages.items()])) as outcomes:
         for number, outcome in outcomes:
             found[number] = outcome
             while told in found:
@@ -102,28 +105,28 @@ def _at_once(scenes: Sequence[Path], out: Path, record: bool, workers: int | Non
                 if isinstance(ready, Done):
                     yield ready.value
                 else:
-                    yield _refused(f"{scenes[told]}: {ready.sentence}")
+                    yield _refused(f"{[*pages][told]}: {ready.sentence}")
                 told += 1
 
 
-def prepared(setup: tuple[Path, bool]) -> Callable[[Path], _Held]:
+def prepared(record: bool) -> Callable[[tuple[Path, Path]], _Held]:
     """The function that compares a scene with its expected file in another process."""
 
-    def held(scene: Path) -> _Held:
+    def held(item: tuple[Path, Path]) -> _Held:
         with redirect_stderr(io.StringIO()) as talk:
-            found = _held(scene, *setup)
+            found = _held(*item, record)
         return replace(found, talk=talk.getvalue())
 
     return held
 
 
-def _held(scene: Path, out: Path, record: bool) -> _Held:
+def _held(scene: Path, page: Path, record: bool) -> _Held:
     try:
         with quiet() as noise, scene_refusals(noise):
             import_engine(scene)
             from overlapper.scenes.check import hold
 
-            outcome = hold(scene, out, record)
+            outcome = hold(scene, page, record)
     except Refused as error:
         return _refused(str(error))
     shown = outcome.lines if outcome.word != "as recorded" else [f"note: {note}" for note in outcome.notes]
@@ -141,17 +144,18 @@ def diff(
     """Say what moved from one table of overlaps to another: poses of shapes, and overlaps of pairs.
 
     The budgets are those that the first table has in its heading, as expected files do. Without any, overlaps may
-    differ by rounding, and poses by a tenth of a millimetre and a milliradian. The exit code is 0 if nothing moved, 1
-    if something did, and 2 if a table cannot be read.
+    differ by rounding, and poses by a tenth of a millimetre and a milliradian. What is not modelled must be the same.
+    The exit code is 0 if nothing moved, 1 if something did, and 2 if a table cannot be read.
 
     [bold]overlapper diff monday.csv tuesday.csv[/bold]
     """
-    from overlapper.tables.table_file import read_content, read_table
+    from overlapper.tables.table_file import LEFT_OUT, read_content
     from overlapper.verdicts.comparison import compare_forces, compare_measures, compare_poses
     from overlapper.verdicts.expected import DRIFT, FORCES, ROUNDING, budgets_in
 
     with input_refusals():
-        first, found = read_content(before), read_table(after)
+        first, second = read_content(before), read_content(after)
+        found = second.rows
         recorded, budgets = first.rows, ROUNDING | DRIFT | FORCES | budgets_in(first.metadata, before)
     compared = {
         "poses": compare_poses(recorded, found, budgets),
@@ -159,7 +163,15 @@ def diff(
     }
     if all(rows and "energy_j" in rows[0] for rows in (recorded, found)):
         compared["forces"] = compare_forces(recorded, found, budgets)
-    moved = False
+    left_out = [
+        {said for name, said in content.metadata.items() if name.startswith(LEFT_OUT)} for content in (first, second)
+    ]
+    moved = left_out[0] != left_out[1]
+    if any(left_out):
+        print(f"left out  {'moved' if moved else 'the same'}")
+        for path, said in zip((before, after), left_out):
+            for each in sorted(said - (left_out[0] & left_out[1])):
+                say(f"    by {path} alone: {each}")
     for cause, differences in compared.items():
         moves = sorted(differences.moves, key=lambda move: -move.part)
         print(f"{cause:9} {f'{len(moves):,} moved' if moves else 'the same'}")

@@ -48,6 +48,8 @@ def run(
     With CONTACT "volumetric", bodies are pushed apart by the volumes that they share, and tables have the forces. What
     build takes beside the client, as build(client, *, mass=1.0, seed=0), are parameters that --set sets.
 
+    The exit code is 0, 1 if shapes were not modelled or a body has diverged, and 2 if the scene cannot be run.
+
     Examples:
 
     [bold]overlapper run franka_grasp[/bold]  a table of the overlaps
@@ -79,8 +81,8 @@ def run(
         print(json.dumps(told | summary.as_dict() | {"finished": finished} | places))
     else:
         _show(chosen.title, summary, finished, written)
-    if not finished:
-        raise typer.Exit(130)
+    if not finished or summary.skipped:
+        raise typer.Exit(1 if finished else 130)
 
 
 def _measure(

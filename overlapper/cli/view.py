@@ -88,7 +88,8 @@ def view(
     """See a scene, or a table of one: as a page with a time slider, as a picture, or live.
 
     An expected file has all that is needed. Of any other table give the --scene, which is run again with the table's
-    settings, and what is not as in the table is told. No file is run because a table names it.
+    settings, and what is not as in the table is told. No file is run because a table names it. The exit code is 1 if
+    shapes were not modelled or a body has diverged.
 
     Examples:
 
@@ -120,12 +121,18 @@ def view(
                 finished = _film(playback, page, looks, written)
     for remark in playback.remarks:
         say(f"overlapper: {remark}", sys.stderr)
+    from overlapper.cli.summary import skipped_lines
+
+    for line in skipped_lines(playback.skipped):
+        say(line, sys.stderr)
     for path in written:
         say(f"Written: {path}")
     if not finished:
         raise typer.Exit(130)
     if page in written:
         _open(page.resolve().as_uri())
+    if playback.skipped:
+        raise typer.Exit(1)
 
 
 def _film(playback: Playback, html: Path, looks: Sequence[Look], written: list[Path]) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -13,7 +15,7 @@ from overlapper.scenes.scene import Scene, SceneError, load_scene
 from overlapper.tables.table_file import origin
 from overlapper.verdicts import replay
 from overlapper.verdicts.expected import Expected, read_expected
-from overlapper.verdicts.verdict import Verdict, examine
+from overlapper.verdicts.verdict import Verdict, examine, left_out
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,22 +37,36 @@ class Outcome:
         return self.word in ("as recorded", "recorded")
 
 
-def hold(path: Path, pages: Path, anew: bool = False) -> Outcome:
+def pages_of(scenes: Sequence[Path], folder: Path) -> dict[Path, Path]:
+    """The page of each scene file, in a folder: named by its stem, and by folders above it if others have that stem."""
+    parts = {scene: scene.resolve().with_suffix("").parts[1:] for scene in scenes}
+    depth = dict.fromkeys(scenes, 1)
+    while True:
+        names = {scene: "-".join(parts[scene][-depth[scene] :]) for scene in scenes}
+        alike = Counter(names.values())
+        deeper = [scene for scene in scenes if alike[names[scene]] > 1 and depth[scene] < len(parts[scene])]
+        if not deeper:
+            return {scene: folder / f"{name}.moved.html" for scene, name in names.items()}
+        for scene in deeper:
+            depth[scene] += 1
+
+
+def hold(path: Path, page: Path, anew: bool = False) -> Outcome:
     """Run the scene of a file and compare it with its expected file, which is written if there is none, or `anew`.
 
-    If something has moved, the page with before and after goes to `<pages>/<scene>.moved.html`. SceneError if the scene
-    or its expected file is not to be used.
+    If something has moved, `page` shows before and after. SceneError if the scene or its expected file is not to be
+    used, or if the scene has diverged and is to be recorded.
     """
     scene = load_scene(path)
-    page = pages / f"{scene.name}.moved.html"
     try:
         if anew or not scene.expected.is_file():
-            record(scene)
+            notes = record(scene)
             written = f"written: {scene.expected}"
             page.unlink(missing_ok=True)  # of an earlier run
             if anew:
-                return Outcome(scene.name, "recorded", [written])
-            return Outcome(scene.name, "new", [written, "look at it, commit it, and the scene is guarded from now on"])
+                return Outcome(scene.name, "recorded", [written, *notes])
+            look = "look at it, commit it, and the scene is guarded from now on"
+            return Outcome(scene.name, "new", [written, *notes, look])
         verdict = examined(scene, read_expected(scene.expected))
     except ValueError as error:
         raise SceneError(str(error)) from error
@@ -62,8 +78,8 @@ def hold(path: Path, pages: Path, anew: bool = False) -> Outcome:
     return Outcome(scene.name, "moved", [*verdict.lines(), remark], causes, verdict.notes, shown)
 
 
-def record(scene: Scene) -> None:
-    """Run the scene and write its expected file anew.
+def record(scene: Scene) -> list[str]:
+    """Run the scene and write its expected file anew; returns a sentence for all that is not modelled.
 
     The steps, the tolerance and the budgets of an old file stay in force. A new file has four steps and budgets of five
     times what rounding does to its measures when all is moved by less than a metre.
@@ -72,7 +88,12 @@ def record(scene: Scene) -> None:
         made = _observed(scene, read_expected(scene.expected))
     except FileNotFoundError:
         made = replay.fitted(_observed(scene, replay.wanted(scene.steps, scene.contact == "volumetric")))
+    for step, still in made.stills.items():
+        for each in still.skipped:
+            if each.diverged:
+                raise SceneError(f"{scene.path} is not recorded: {each.name} has diverged in step {step}")
     made.write(scene.expected, origin(scene.engine) | heading_of(scene.parameters))
+    return left_out(made.stills)
 
 
 def _observed(scene: Scene, wanted: Expected) -> Expected:

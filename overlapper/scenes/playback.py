@@ -7,6 +7,7 @@ alone: its scene is run again with the table's settings, and held against the ta
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,11 @@ from overlapper.scenes.run import run
 from overlapper.scenes.scene import ContactModel, Scene, load_scene
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.links import link_contacts
+from overlapper.simulation.model import Skipped
 from overlapper.simulation.settings import Asking, Modelling, read_settings
 from overlapper.tables.frame import Frame
 from overlapper.tables.still import Still
+from overlapper.tables.summary import note_skipped
 from overlapper.tables.table import Row, link_rows, rows
 from overlapper.tables.table_file import TABLES, read_content
 from overlapper.verdicts.comparison import compare_measures
@@ -34,7 +37,8 @@ View = Frame[AnyBodies] | Frame[Still]
 class Playback:
     """The frames to show: `views`, as many as `total`. After the last one, `remarks` has the closing remarks.
 
-    `sparse` views are few steps of many, each worth a look.
+    `sparse` views are few steps of many, each worth a look. `skipped` has what was left out of the views so far, with
+    the first step of each.
     """
 
     name: str
@@ -42,6 +46,16 @@ class Playback:
     views: Generator[View, None, None]
     sparse: bool = False
     remarks: list[str] = field(default_factory=list)
+    skipped: dict[Skipped, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.views = self._noted(self.views)
+
+    def _noted(self, views: Generator[View, None, None]) -> Generator[View, None, None]:
+        with closing(views):
+            for view in views:
+                note_skipped(self.skipped, view)
+                yield view
 
 
 def play(
@@ -83,7 +97,7 @@ def play(
     if playback.total < last:
         playback.remarks.append(f"{path} goes on to step {last:,}: --steps {last} shows all of it")
         recorded = [row for row in recorded if int(row["step"] or 0) <= playback.total]
-    playback.views = _held_against(path, chosen, table.metadata, recorded, playback)
+    playback.views = playback._noted(_held_against(path, chosen, table.metadata, recorded, playback))
     return playback
 
 

@@ -55,14 +55,16 @@ class SceneItem(pytest.Item):
 
     def runtest(self) -> None:
         try:
-            from overlapper.scenes.check import hold
+            from overlapper.scenes.check import hold, pages_of
         except ImportError as error:
             pytest.fail(str(error), pytrace=False)
         from overlapper.scenes.scene import SceneError
 
         pages = self.config.invocation_params.dir / self.config.getoption("overlapper_out")
         try:
-            outcome = hold(self.path, pages, self.config.getoption("overlapper_record"))
+            scenes = [item.path for item in self.session.items if isinstance(item, SceneItem)]
+            page = pages_of(scenes, pages)[self.path]
+            outcome = hold(self.path, page, self.config.getoption("overlapper_record"))
         except SceneError as error:
             pytest.fail(str(error), pytrace=False)
         self._tell(outcome)

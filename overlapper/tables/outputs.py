@@ -11,15 +11,18 @@ from typing import TYPE_CHECKING, Any, Literal
 from overlapper import Overlaps
 from overlapper.simulation.links import link_contacts
 from overlapper.tables.summary import Summary
-from overlapper.tables.table import COLUMNS, FORCES, PosedBodies, link_rows, rows
-from overlapper.tables.table_file import TABLES, must_be_a_table
+from overlapper.tables.table import COLUMNS, FORCES, link_rows, rows
+from overlapper.tables.table_file import LEFT_OUT, TABLES, must_be_a_table
 from overlapper.whole_file import must_be_writable, unfinished
 
 if TYPE_CHECKING:
     from overlapper.reference import Comparison, Fcl
+    from overlapper.simulation.bodies import AnyBodies
     from overlapper.simulation.contacts import Contacts
     from overlapper.simulation.forces.forces import Forces
+    from overlapper.simulation.model import Skipped
     from overlapper.tables.frame import Frame
+    from overlapper.tables.still import Still
     from overlapper.viewer.look import Look
 
 PICTURES_PER_SECOND = 30  # of simulated time: as smooth as a film, and a tenth of the size that every step would take
@@ -54,6 +57,7 @@ class StepTable:
         if per not in ("shape", "link"):
             raise ValueError(f"per must be 'shape' or 'link', not {per!r}")
         self.path, self._per = path, per
+        self._left_out: dict[Skipped, int] = {}
         texts = {name: str(value) for name, value in settings.items()}
         self._table = TABLES[path.suffix](path, texts | {"per": per}, COLUMNS | FORCES if forces else COLUMNS)
 
@@ -61,12 +65,20 @@ class StepTable:
         self,
         step: int,
         time: float,
-        bodies: PosedBodies,
+        bodies: AnyBodies | Still,
         contacts: Contacts,
         opinions: Sequence[Comparison] = (),
         forces: Forces | None = None,
     ) -> None:
-        """Write the rows of a step at once; `opinions` are FCL's of the same contacts, if it was asked."""
+        """Write the rows of a step at once; `opinions` are FCL's of the same contacts, if it was asked.
+
+        What is left out for the first time is metadata from then on.
+        """
+        for each in bodies.skipped:
+            if each not in self._left_out:
+                self._left_out[each] = step
+                said = f"{each.name} from step {step} on, {each.reason}"
+                self._table.remark(f"{LEFT_OUT}{len(self._left_out)}", said)
         if self._per == "link":
             self._table.write(link_rows(step, time, bodies, link_contacts(contacts), forces))
         else:

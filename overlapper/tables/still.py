@@ -15,7 +15,7 @@ from overlapper.simulation.contacts import Contacts
 from overlapper.tables.table import Key, Row, key, placements, poses, rows
 
 if TYPE_CHECKING:
-    from overlapper.simulation import Forces
+    from overlapper.simulation import Forces, Skipped
     from overlapper.simulation.bodies import AnyBodies
 
 
@@ -33,6 +33,7 @@ class Still:
     names: dict[tuple[int, int], str]
     colors: dict[tuple[int, int], tuple[float, float, float, float]]
     forces: Forces | None = None
+    skipped: tuple[Skipped, ...] = ()
 
     @classmethod
     def of(cls, bodies: AnyBodies, forces: Forces | None = None) -> Still:
@@ -45,6 +46,7 @@ class Still:
             bodies.names,
             bodies.colors,
             forces,
+            tuple(bodies.skipped),
         )
 
     @classmethod

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from overlapper.simulation import Decomposed, Report, Skipped
     from overlapper.simulation.bodies import AnyBodies
     from overlapper.tables.frame import Frame
+    from overlapper.tables.still import Still
 
 
 Links = tuple[int, int, int, int]  # bodyA, linkA, bodyB, linkB
@@ -62,7 +63,7 @@ def overlapping_links(frame: Frame[Any]) -> Iterator[tuple[Links, LinkContact, f
         yield links, pair, float(np.linalg.norm(between.get(links, 0.0)))
 
 
-def note_skipped(known: dict[Skipped, int], frame: Frame[AnyBodies]) -> None:
+def note_skipped(known: dict[Skipped, int], frame: Frame[AnyBodies] | Frame[Still]) -> None:
     """Take in what a frame leaves out: `known` has the first step of each."""
     for each in frame.bodies.skipped:
         known.setdefault(each, frame.step)

@@ -31,6 +31,8 @@ from overlapper.whole_file import beside, claim, settle
 
 KNOWN = COLUMNS | FORCES
 
+LEFT_OUT = "left out "  # how the name of metadata begins that says what was not modelled
+
 # The columns without which a table says nothing of pairs.
 NEEDED = ["step", "status"]
 NEEDED += [f"{word}{side}" for side in "AB" for word in ("body", "link", "shape")]
@@ -66,11 +68,12 @@ class Content:
 class Table(Protocol):
     """A file that grows by the rows of a step at a time; those of finished steps outlive even a SIGKILL.
 
-    One of `close` and `leave` ends it. `close` puts it in its place. `leave` does not, and returns where the rows are;
-    None if there are none, and then nothing is left of it.
+    `remark` adds to the metadata what is known only then. One of `close` and `leave` ends it. `close` puts it in its
+    place. `leave` does not, and returns where the rows are; None if there are none, and then nothing is left of it.
     """
 
     def write(self, rows: Iterable[Row]) -> None: ...
+    def remark(self, name: str, value: str) -> None: ...
     def close(self) -> None: ...
     def leave(self) -> Path | None: ...
 
@@ -134,6 +137,9 @@ class CsvTable:
         lines = [_line([row.get(column) for column in self._columns]) for row in rows]
         self._grow(_text(lines), len(lines))
         self._empty = self._empty and not lines
+
+    def remark(self, name: str, value: str) -> None:
+        self.comment(f"{name}: {printable(value)}")
 
     def comment(self, text: str) -> None:
         """A line that readers of the rows pass over."""
@@ -255,10 +261,12 @@ def _csv_content(path: Path) -> Content:
     return content
 
 
-def _heading(lines: Iterable[str]) -> dict[str, str]:
-    """The metadata in the first lines of a CSV table, by name."""
+def _heading(lines: Sequence[str]) -> dict[str, str]:
+    """The metadata of a CSV table, by name: in its first lines, and what was left out of it, in comments below."""
     heading = itertools.takewhile(lambda line: line.startswith("# "), lines)
-    return {name: value.strip() for name, colon, value in (line[2:].partition(": ") for line in heading) if colon}
+    below = (line for line in lines if line.startswith(f"# {LEFT_OUT}"))
+    told = (line[2:].partition(": ") for line in itertools.chain(heading, below))
+    return {name: value.strip() for name, colon, value in told if colon}
 
 
 def _row(columns: Sequence[str], cells: Sequence[str]) -> Row:
@@ -306,7 +314,17 @@ class ParquetTable(CsvTable):
     ) -> None:
         self._arrow: Any = _arrow()
         self._metadata, self._kinds = metadata or {}, columns
+        self._remarks: dict[str, str] = {}  # which have no place among the rows of the CSV
         super().__init__(path, metadata, columns)
+
+    def remark(self, name: str, value: str) -> None:
+        self._remarks[name] = value
+
+    def leave(self) -> Path | None:
+        with suppress(OSError, ValueError):  # the file is closed, or the disk full
+            for name, value in self._remarks.items():
+                super().remark(name, value)
+        return super().leave()
 
     def close(self) -> None:
         try:
@@ -324,7 +342,7 @@ class ParquetTable(CsvTable):
         pyarrow, parquet = self._arrow, self._arrow.parquet
         kinds = {int: pyarrow.int32(), float: pyarrow.float64(), str: pyarrow.string()}
         fields = [(name, kinds[kind]) for name, kind in self._kinds.items()]
-        schema = pyarrow.schema(fields, {**self._metadata, "rows": str(self._seal)})
+        schema = pyarrow.schema(fields, {**self._metadata, **self._remarks, "rows": str(self._seal)})
         cells = pyarrow.csv.ConvertOptions(
             column_types=dict(fields), null_values=[""], strings_can_be_null=True, quoted_strings_can_be_null=False
         )
@@ -390,6 +408,10 @@ class SqliteTable:
             self._connection.executemany(f"INSERT INTO overlaps VALUES ({blanks})", cells)
         self._seal = self._seal.further(_text(map(_line, cells)), len(cells))
         self._empty = self._empty and not cells
+
+    def remark(self, name: str, value: str) -> None:
+        with _named(self._place, sqlite3.Error), self._connection:
+            self._connection.execute("REPLACE INTO metadata VALUES (?, ?)", (name, printable(value)))
 
     def close(self) -> None:
         try:

@@ -7,11 +7,13 @@ shapes are the models', as they are read today. The dynamics are the simulator's
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from overlapper import Shape
 from overlapper.polytopes.shape_text import alike
 from overlapper.shapes.table import facts
+from overlapper.simulation.model import Skipped
 from overlapper.tables.still import Still
 from overlapper.verdicts.comparison import (
     Differences,
@@ -33,7 +35,8 @@ class Verdict:
     `geometry`: overlaps of the shapes and poses recorded, measured by today's package. `shapes`: shapes as today's
     simulation has them. `dynamics`: poses of today's simulation, and forces of volumetric contact. `overlaps`: what has
     become of the overlaps because of the last two, and empty if both are as recorded. `notes`: sentences about budgets
-    that do not fit. `today` has the steps as they are today, `expected.stills` as they were recorded.
+    that do not fit, and about what is not modelled. `today` has the steps as they are today, `expected.stills` as they
+    were recorded.
     """
 
     expected: Expected
@@ -92,8 +95,21 @@ def examine(expected: Expected, today: dict[int, Still], last_step: int) -> Verd
     if shapes or dynamics.moves:
         changes = compare_measures(expected.rows, measured(today, expected.tolerance), HUNDREDTHS, names).moves
         overlaps = [replace(move, allowed=math.nan) for move in changes if move.quantity != "volume_error_m3"]
-    notes = _notes(geometry, rounding(expected), dynamics)
+    notes = _notes(geometry, rounding(expected), dynamics) + left_out(today)
     return Verdict(expected, geometry.moves, shapes, dynamics.moves, overlaps, notes, today)
+
+
+def left_out(stills: Mapping[int, Still]) -> list[str]:
+    """A sentence for each shape or body that is not modelled in some of the steps."""
+    steps: dict[Skipped, list[int]] = {}
+    for step, still in stills.items():
+        for each in still.skipped:
+            steps.setdefault(each, []).append(step)
+    return [
+        f"not modelled: {each.name}, {each.reason}"
+        + (f" (in step {', '.join(map(str, some))})" if len(some) < len(stills) else "")
+        for each, some in steps.items()
+    ]
 
 
 def _shape_moves(

@@ -116,11 +116,19 @@ def test_a_scene_with_a_syntax_error_is_listed_as_such(tmp_path):
 def test_shapes_that_are_not_modelled_are_named_below_the_table(tmp_path):
     (tmp_path / "bent.py").write_text(BENT)
     done = overlapper("run", "bent.py")
-    assert done.returncode == 0
+    assert done.returncode == 1
     assert "Nothing overlaps in 2 steps." in done.stdout
     assert "2 bodies, 1 of 2 shapes read" in done.stdout
     assert re.search(r"^Not modelled: mesh/link0, .*concave", done.stdout, re.MULTILINE)
     assert done.stderr == ""
+    (told,) = json.loads(overlapper("run", "bent.py", "--json").stdout)["skipped"]
+    assert (told["name"], told["first_step"], told["diverged"]) == ("mesh/link0", 1, False)
+    (tmp_path / "bent.py").write_text(f'"""Bent."""{BENT}')
+    checked("bent.py", "--record")
+    recorded = checked("bent.py")
+    done = overlapper("view", "bent.py", "--png", "bent.png")
+    assert done.returncode == 1 and "Not modelled: mesh/link0, " in done.stderr
+    assert recorded[0] == 0 and "    note: not modelled: mesh/link0, " in recorded[1]
 
 
 CROSSES = '''
@@ -294,7 +302,7 @@ def test_a_broken_scene_is_refused_with_what_pybullet_said_of_it(tmp_path):
         "import pybullet as p\nSTEPS = 1\ndef build(c):\n  p.loadURDF('no.urdf', physicsClientId=c)"
     )
     assert refusal("run", "broken.py") == (
-        "overlapper: the scene broken.py cannot be built at line 4: error: Cannot load URDF file. "
+        "overlapper: the scene broken.py cannot be built at line 4: error: Cannot load URDF file "
         "(URDF file 'no.urdf' not found)\n"
     )
 
@@ -521,6 +529,39 @@ def test_a_scene_that_has_moved_is_told_with_exit_code_1(two_scenes):
     assert "off by 0.01 where 0.0001 is allowed, 100 times its budget" in said
     assert "before and after: pages/one.moved.html" in said
     assert [path.name for path in Path("pages").iterdir()] == ["one.moved.html"]
+
+
+def test_scenes_of_one_name_have_a_page_each(two_scenes):
+    (two_scenes / "deeper" / "two.py").rename(two_scenes / "deeper" / "one.py")
+    (two_scenes / "deeper" / "expected" / "two.csv").rename(two_scenes / "deeper" / "expected" / "one.csv")
+    for path in ("one.py", "deeper/one.py"):
+        (two_scenes / path).write_text(TWO_CUBES.replace("[0, 0, 0.08]", "[0, 0, 0.07]"))
+    assert checked("guarded", "--out", "pages")[0] == 1
+    names = {"deeper-one.moved.html", "guarded-one.moved.html"}
+    assert {path.name for path in Path("pages").iterdir()} == names
+
+
+LOST = """
+        if i == 4:
+            p.resetBasePositionAndOrientation(1, [float("nan")] * 3, [0, 0, 0, 1], physicsClientId=client)
+"""
+DIVERGES = TWO_CUBES.replace('"no more"\n', f'"no more"{LOST}')
+
+
+def test_a_scene_that_diverges_has_moved_and_is_not_recorded(two_scenes):
+    (two_scenes / "one.py").write_text(DIVERGES)
+    code, said, _ = checked("guarded/one.py")
+    assert code == 1 and "box#1" in said and "note      not modelled: box#1, it has no finite pose" in said
+    code, said, complaints = checked("guarded/one.py", "--record")
+    assert (code, said) == (2, "")
+    assert complaints.endswith("overlapper: guarded/one.py is not recorded: box#1 has diverged in step 6\n")
+    done = overlapper("run", "guarded/one.py", "--out", "one.csv")
+    assert done.returncode == 1 and "\nNot modelled from step 5 on: box#1, it has no finite pose" in done.stdout
+    assert overlapper("run", "guarded/deeper/two.py", "--out", "two.csv").returncode == 0
+    done = overlapper("diff", "one.csv", "two.csv")
+    assert done.returncode == 1
+    assert done.stdout.startswith("left out  moved\n    by one.csv alone: box#1 from step 5 on, it has no finite pose")
+    assert overlapper("diff", "one.csv", "one.csv").stdout.startswith("left out  the same\n")
 
 
 def test_a_new_scene_is_written_with_exit_code_1_once(two_scenes):

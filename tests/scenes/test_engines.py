@@ -102,11 +102,11 @@ def test_steps_of_others_are_watched():
 
 def test_a_scene_is_held_against_its_expected_file():
     path = Path("sinking.py")
-    assert hold(path, Path("out")).word == "new"
+    assert hold(path, Path("out/sinking.moved.html")).word == "new"
     assert "pybullet" not in read_metadata(Path("expected/sinking.csv"))
-    assert hold(path, Path("out")).word == "as recorded"
+    assert hold(path, Path("out/sinking.moved.html")).word == "as recorded"
     path.write_text(SCENE.replace("sinks=0.02", "sinks=0.021"))
-    outcome = hold(path, Path("out"))
+    outcome = hold(path, Path("out/sinking.moved.html"))
     assert (outcome.word, outcome.causes["geometry"], outcome.causes["dynamics"]) == ("moved", "as recorded", "moved")
     assert outcome.page.is_file()
 

@@ -39,6 +39,38 @@ def test_the_folder_of_a_log_is_made(client, tmp_path):
     assert [each.name for each in (tmp_path / "new" / "folder").iterdir()] == ["own.csv"]
 
 
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_what_was_left_out_is_in_the_metadata_finished_or_not(client, tmp_path, ending):
+    for x in (0.0, 0.9):
+        box(client, position=[x, 0, 0])
+    bodies = Bodies(client)
+    place = tmp_path / f"own.{ending}"
+
+    def logged(error=None):
+        with Log(place, bodies) as log:
+            log.add(bodies.overlaps())
+            p.resetBasePositionAndOrientation(1, [float("nan")] * 3, [0, 0, 0, 1], physicsClientId=client)
+            with pytest.warns(UserWarning, match="box#1"):
+                bodies.update()
+            log.add(bodies.overlaps())
+            if error:
+                log.add(bodies.overlaps(), step=1)
+
+    logged()
+    metadata = read_metadata(place)
+    assert (
+        metadata["left out 1"].startswith("box#1 from step 2 on, it has no finite pose")
+        and "left out 2" not in metadata
+    )
+    assert [row["step"] for row in read_table(place)] == [1]
+    p.resetBasePositionAndOrientation(1, [0.9, 0, 0], [0, 0, 0, 1], physicsClientId=client)
+    bodies.update()
+    with pytest.raises(ValueError, match="step must be larger"):
+        logged("a step of the past")
+    (unfinished,) = tmp_path.glob("*.unfinished.*")
+    assert read_metadata(unfinished)["left out 1"] == metadata["left out 1"]
+
+
 @pytest.fixture
 def two_boxes(client):
     """Bodies that share 0.1 m in x."""

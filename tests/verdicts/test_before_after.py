@@ -70,7 +70,7 @@ def test_a_pair_that_comes_or_goes_has_a_line_without_figures(recorded, today, c
     path.write_text(CUBES.replace("0.15]", f"{recorded}]"))
     record(load_scene(path))
     path.write_text(CUBES.replace("0.15]", f"{today}]"))
-    outcome = check.hold(path, tmp_path / "pages")
+    outcome = check.hold(path, tmp_path / "pages" / "cubes.moved.html")
     assert outcome.word == "moved"
     assert f"status is {'not there' if today == '0.35' else 'overlapping'}, recorded as" in "\n".join(outcome.lines)
     assert f"<td>status</td>{cells}<td></td><td></td><td></td></tr>" in outcome.page.read_text(encoding="utf-8")
@@ -83,7 +83,7 @@ def test_without_meshcat_there_is_no_page_and_the_verdict_says_why(tmp_path, mon
     path.write_text(CUBES.replace("0.15]", "0.17]"))
     monkeypatch.delattr(verdicts, "before_after")
     monkeypatch.setitem(sys.modules, "overlapper.verdicts.before_after", None)
-    outcome = check.hold(path, tmp_path / "pages")
+    outcome = check.hold(path, tmp_path / "pages" / "cubes.moved.html")
     assert (outcome.word, outcome.page) == ("moved", None)
     cause = "import of overlapper.verdicts.before_after halted"
     assert outcome.lines[-1].startswith(f"no page of before and after: {cause}")
@@ -94,7 +94,7 @@ def test_a_scene_that_ends_before_a_recorded_step_has_no_second_frame(tmp_path):
     path.write_text(CUBES)
     record(load_scene(path))
     path.write_text(CUBES.replace("STEPS = 2", "STEPS = 1"))
-    outcome = check.hold(path, tmp_path / "pages")
+    outcome = check.hold(path, tmp_path / "pages" / "cubes.moved.html")
     assert "    step 2, the scene: last step is 1, recorded as 2" in outcome.lines
     assert "<td>the scene</td><td>last step</td><td>2</td><td>1</td>" in outcome.page.read_text(encoding="utf-8")
 
