@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cfloat>
 #include <limits>
+#include <numeric>
 #include <string>
 
 #include "geometry/cancellation.h"
