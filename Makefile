@@ -18,7 +18,7 @@ COUNTED := build/coverage/native/CMakeFiles/overlapper_core.dir
 COUNTING := tests/native
 UNCOUNTED := overlap/test_hardening python/test_failing_allocation python/test_out_of_memory python/test_stub
 
-.PHONY: help run test wheel record docs coverage coverage-python coverage-core mutants fuzz pictures lint format hooks ci clean
+.PHONY: help run test wheel record docs coverage coverage-python coverage-core mutants fuzz locks pictures lint format hooks ci clean
 
 help: ## this list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
@@ -89,6 +89,14 @@ build/sanitized/native/libfuzzer.so: build/sanitized/dev
 
 build/fuzz/corpus/%:
 	@mkdir -p $@
+
+# The locks, with the oldest Python that each is for.
+LOCKS := build-3.10 wheels-3.11 sbom-3.11
+locks: $(VENV)/bin/python ## pin what builds a release, with digests of every file, in .github/requirements
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check uv
+	@cd .github/requirements && for lock in $(LOCKS); do \
+	  $(CURDIR)/$(VENV)/bin/uv pip compile --quiet --upgrade --universal --generate-hashes --python-version $${lock#*-} \
+	    --custom-compile-command "make locks" --output-file $${lock%-*}.txt $${lock%-*}.in || exit 1; done
 
 pictures: $(VENV)/dev ## make the pictures of README and docs again, of which something has changed
 	@$(VENV)/bin/python docs/pictures.py
