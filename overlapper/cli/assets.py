@@ -13,7 +13,7 @@ from rich.text import Text
 
 from overlapper.cli.figures import plain_table, show
 from overlapper.cli.recorded import with_progress
-from overlapper.cli.refusals import Interrupted, input_refusals, quiet, say
+from overlapper.cli.refusals import input_refusals, quiet, say
 from overlapper.printable import printable
 from overlapper.simulation.settings import Modelling, settings_of
 
@@ -26,19 +26,16 @@ def audit_folder(
 ) -> NoReturn:
     """Tell of every asset, also in a table `out`; exit code 1 if anything is wrong with one."""
     told = {"units": units, "least_depth": least_depth, **settings_of(modelling)}
-    try:
-        with input_refusals(), quiet():
-            from overlapper.audit.assets import asset_files, read_asset, write_table
-            from overlapper.tables.outputs import can_be_written
+    with input_refusals(), quiet():
+        from overlapper.audit.assets import asset_files, read_asset, write_table
+        from overlapper.tables.outputs import can_be_written
 
-            can_be_written(out, None)
-            files = asset_files(folder)
-            read = (read_asset(folder, file, units, least_depth, modelling) for file in files)
-            assets = list(with_progress(read, folder.name, len(files)))
-            if out:
-                write_table(assets, out, told | {"folder": str(folder)})
-    except KeyboardInterrupt as error:
-        raise Interrupted from error
+        can_be_written(out, None)
+        files = asset_files(folder)
+        read = (read_asset(folder, file, units, least_depth, modelling) for file in files)
+        assets = list(with_progress(read, folder.name, len(files)))
+        if out:
+            write_table(assets, out, told | {"folder": str(folder)})
     if as_json:
         rows = [asdict(asset) | {"sound": asset.sound} for asset in assets]
         print(json.dumps({"settings": told, "assets": rows} | ({"out": str(out)} if out else {})))

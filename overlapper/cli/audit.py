@@ -26,7 +26,7 @@ from overlapper.cli.options import (
     with_options,
 )
 from overlapper.cli.recorded import with_progress
-from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say
+from overlapper.cli.refusals import Refused, input_refusals, quiet, say
 from overlapper.printable import printable
 from overlapper.simulation.settings import Modelling, settings_of
 
@@ -109,51 +109,48 @@ def audit(
             raise Refused(f"{of_robots[0]} is for a robot, and {robot} is a folder")
         audit_folder(robot, units, least_depth, modelled, out, as_json)
     written: list[Path] = []
-    try:
-        with input_refusals(), quiet():
-            from overlapper.audit.allowed import must_name_some
-            from overlapper.audit.audit import audit as look
-            from overlapper.audit.findings import findings, remarks
-            from overlapper.audit.page import addresses, write_page
-            from overlapper.audit.robot import not_modelled, read_robot
-            from overlapper.audit.srdf import read_srdf, write_srdf
-            from overlapper.audit.table import facts, write_table
-            from overlapper.simulation.bullet.model_file import NotRead
-            from overlapper.tables.outputs import can_be_written
+    with input_refusals(), quiet():
+        from overlapper.audit.allowed import must_name_some
+        from overlapper.audit.audit import audit as look
+        from overlapper.audit.findings import findings, remarks
+        from overlapper.audit.page import addresses, write_page
+        from overlapper.audit.robot import not_modelled, read_robot
+        from overlapper.audit.srdf import read_srdf, write_srdf
+        from overlapper.audit.table import facts, write_table
+        from overlapper.simulation.bullet.model_file import NotRead
+        from overlapper.tables.outputs import can_be_written
 
-            can_be_written(out, html, srdf)
-            disabled = read_srdf(against) if against else {}
-            try:
-                read = read_robot(robot, modelled)
-            except NotRead as error:
-                raise Refused(str(error)) from error
-            must_name_some(pairs, read.link_names, "link")
-            with engine as working:
-                found = look(
-                    read,
-                    configurations,
-                    seed,
-                    tolerance,
-                    least_depth,
-                    working,
-                    lambda blocks, count: with_progress(blocks, robot.name, count),
-                )
-            if not found.pairs:
-                left_out = "".join(f"; {name} is not modelled: {why}" for name, why in not_modelled(read).items())
-                raise Refused(f"{robot} has no two links with shapes that could overlap{left_out}")
-            page = addresses(found, html) if html else {}
-            if out:
-                write_table(found, out, settings, page)
-                written.append(out)
-            if srdf:
-                write_srdf(found, srdf)
-                written.append(srdf)
-            if html:
-                write_page(found, html)
-                written.append(html)
-            wrong = findings(found, pairs, disabled)
-    except KeyboardInterrupt as error:
-        raise Interrupted from error
+        can_be_written(out, html, srdf)
+        disabled = read_srdf(against) if against else {}
+        try:
+            read = read_robot(robot, modelled)
+        except NotRead as error:
+            raise Refused(str(error)) from error
+        must_name_some(pairs, read.link_names, "link")
+        with engine as working:
+            found = look(
+                read,
+                configurations,
+                seed,
+                tolerance,
+                least_depth,
+                working,
+                lambda blocks, count: with_progress(blocks, robot.name, count),
+            )
+        if not found.pairs:
+            left_out = "".join(f"; {name} is not modelled: {why}" for name, why in not_modelled(read).items())
+            raise Refused(f"{robot} has no two links with shapes that could overlap{left_out}")
+        page = addresses(found, html) if html else {}
+        if out:
+            write_table(found, out, settings, page)
+            written.append(out)
+        if srdf:
+            write_srdf(found, srdf)
+            written.append(srdf)
+        if html:
+            write_page(found, html)
+            written.append(html)
+        wrong = findings(found, pairs, disabled)
     if as_json:
         files = {name: str(path) for name, path in (("out", out), ("srdf", srdf), ("html", html)) if path}
         about: dict[str, Any] = {"robot": read.name, "joints": list(read.columns), "remarks": remarks(read)}

@@ -21,7 +21,7 @@ from overlapper.cli.options import (
     refuse_table,
     refuse_threshold,
 )
-from overlapper.cli.refusals import Interrupted, Refused, input_refusals, quiet, say
+from overlapper.cli.refusals import Refused, input_refusals, quiet, say
 from overlapper.printable import printable
 
 if TYPE_CHECKING:
@@ -80,29 +80,26 @@ def clashes(
         "concave_threshold": concave_threshold,
     }
     written: list[Path] = []
-    try:
-        with input_refusals(), quiet():
-            from overlapper.audit import clashes as scene
-            from overlapper.tables.outputs import can_be_written
+    with input_refusals(), quiet():
+        from overlapper.audit import clashes as scene
+        from overlapper.tables.outputs import can_be_written
 
-            can_be_written(out, html)
-            parts, failures = scene.read(sources, units)
-            if len(parts) < 2:
-                for failure in failures[:-1]:
-                    say(f"overlapper: {failure}", sys.stderr)
-                if failures:
-                    raise Refused(failures[-1])
-                raise Refused(f"at least two bodies are needed, not {len(parts)}")
-            found = scene.clashes(parts, concave == "enclose", concave_threshold, least_depth, pairs)
-            found.failures[:0] = failures
-            if out:
-                scene.write_table(found, out, settings)
-                written.append(out)
-            if html:
-                scene.write_page(found, html)
-                written.append(html)
-    except KeyboardInterrupt as error:
-        raise Interrupted from error
+        can_be_written(out, html)
+        parts, failures = scene.read(sources, units)
+        if len(parts) < 2:
+            for failure in failures[:-1]:
+                say(f"overlapper: {failure}", sys.stderr)
+            if failures:
+                raise Refused(failures[-1])
+            raise Refused(f"at least two bodies are needed, not {len(parts)}")
+        found = scene.clashes(parts, concave == "enclose", concave_threshold, least_depth, pairs)
+        found.failures[:0] = failures
+        if out:
+            scene.write_table(found, out, settings)
+            written.append(out)
+        if html:
+            scene.write_page(found, html)
+            written.append(html)
     code = 2 if found.failures else 1 if found.of_status("clash") else 0
     if as_json:
         files = {name: str(path) for name, path in (("out", out), ("html", html)) if path in written}

@@ -41,9 +41,11 @@ def give_up(sentence: str) -> NoReturn:
 
 @contextmanager
 def input_refusals() -> Iterator[None]:
-    """Turns what is wrong with files and databases into one sentence."""
+    """Turns what is wrong with files and databases into one sentence, and Ctrl-C into Interrupted."""
     try:
         yield
+    except KeyboardInterrupt as error:
+        raise Interrupted from error
     except OSError as error:
         raise Refused(f"{error.filename}: {error.strerror}" if error.filename else first_line(error)) from error
     except (ImportError, ValueError, NotStarted) as error:

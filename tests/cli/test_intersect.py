@@ -10,7 +10,10 @@ import pytest
 import trimesh
 from numpy.testing import assert_allclose
 
+import overlapper
 from overlapper import Hull, overlap, random_polytope, read_hull, write_mesh, write_polytopes
+from overlapper.cli.intersect import intersect as command
+from overlapper.cli.refusals import Interrupted
 from overlapper.polytopes.mesh_file import NotConvexWarning
 
 CUBE = np.array(np.meshgrid([0, 1], [0, 1], [0, 1.0])).reshape(3, 8).T
@@ -124,6 +127,15 @@ def test_a_mesh_that_is_not_convex_is_named_beside_the_answer():
     done = intersect("one.stl", "bent.obj", "--json")
     assert json.loads(done.stdout)["volume"] == pytest.approx(1.0)
     assert "bent.obj is not convex: it fills 85.7% of its convex hull" in done.stderr
+
+
+def test_ctrl_c_is_told_as_in_other_commands(monkeypatch):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(overlapper, "overlap", interrupt)
+    with pytest.raises(Interrupted):
+        command(["one.stl", "two.obj"])
 
 
 # Concave meshes
