@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from overlapper.printable import encodable
+
 Parameter = bool | int | float | str
 
 TRUTHS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -64,6 +66,8 @@ def known(name: str, defaults: Mapping[str, Parameter], scene: str) -> None:
 def value_of(name: str, text: str, default: Parameter) -> Parameter:
     """The value that a text is for a parameter with that default. ValueError if it is none of its kind."""
     if isinstance(default, str):
+        if (readable := encodable(text)) != text:
+            raise ValueError(f"{name} must be text in UTF-8, not '{readable}'")
         return text
     words, read = READERS[type(default)]
     try:

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import get_args
 
+from overlapper.printable import first_line
 from overlapper.scenes.scene import ContactModel, Scene, SceneError, Step, broken
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.engine import Simulation, engine
@@ -31,7 +32,7 @@ def run(
     Every step is a frame, and the first frame has number 1. With `only`, the steps in it alone are frames. `contact` is
     what pushes bodies apart: "bullet", contact points, or "volumetric", a `VolumetricContact` of the pairs that the
     simulator lets collide. By default the scene says which, and which pairs are asked for. SceneError if the scene
-    itself fails, ValueError for an invalid argument.
+    fails or cannot be measured, ValueError if `contact` is invalid.
     """
     model = scene.contact if contact is None else contact
     if model not in get_args(ContactModel):
@@ -57,6 +58,8 @@ def run(
                 yield Frame(i + 1, (i + 1) * seconds, bodies, contacts, forces)
     except Unreadable as error:
         raise SceneError(f"the scene {scene.path} cannot be read: {error}") from error
+    except ValueError as error:
+        raise SceneError(f"the scene {scene.path} cannot be measured: {first_line(error)}") from error
     finally:
         stack.close()
         simulation.end()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -10,6 +11,7 @@ from overlapper.simulation import Bodies, Recorder
 from overlapper.simulation.bullet import calls
 from overlapper.simulation.bullet.stepping import time_step
 from overlapper.simulation.engine import Happening, Listener
+from overlapper.simulation.source import Unreadable
 
 import pybullet  # isort: skip  # after the simulation, which says what to install
 
@@ -35,7 +37,10 @@ class Client:
         return build(self._client, **parameters)
 
     def step(self) -> None:
-        pybullet.stepSimulation(self._client)
+        try:
+            pybullet.stepSimulation(self._client)
+        except pybullet.error as error:
+            raise Unreadable("its client is disconnected") from error
 
     def leave(self) -> None:
         if self._own:
@@ -43,7 +48,8 @@ class Client:
 
     def end(self) -> None:
         self.leave()
-        pybullet.disconnect(self._client)
+        with suppress(pybullet.error):  # somebody else has ended it
+            pybullet.disconnect(self._client)
 
 
 def begin() -> Client:

@@ -15,8 +15,11 @@ from overlapper.simulation.model import LinkKey
 
 
 def time_step(client: int) -> float:
-    """s that a step of the client takes."""
-    return float(pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"])
+    """s that a step of the client takes. ValueError if it is not connected."""
+    try:
+        return float(pybullet.getPhysicsEngineParameters(client)["fixedTimeStep"])
+    except pybullet.error as error:
+        raise ValueError(f"physicsClientId {client} is not connected to a physics server") from error
 
 
 _INSIDE: WeakValueDictionary[int, Stepping] = WeakValueDictionary()
