@@ -7,8 +7,9 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
-from overlapper import __version__
+from overlapper import Shape, __version__
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
@@ -38,7 +39,8 @@ LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|!\[[^\]]*\]\([^)]*\))+)\]\(([^()\s]+)\)"
 FENCED = re.compile(r"^(```.*?^```$)", re.MULTILINE | re.DOTALL)
 CODE = re.compile(r"(`+[^`]+`+)")
 NUMBERED = re.compile(r"^\d+\. ``.*``$")
-SHAPES = "Box | Sphere | Capsule | Cylinder | Ellipsoid | Hull | RoundedHull | HalfSpace"
+KIND = rf"\b(?:{'|'.join(kind.__name__ for kind in get_args(Shape))})\b"
+ALL_KINDS = re.compile(rf"{KIND}(?: \| {KIND}){{{len(get_args(Shape)) - 1}}}")
 
 
 def in_repository(path, page):
@@ -113,7 +115,7 @@ def process_signature(app, what, name, obj, options, signature, returned):
     def short(text):
         if text is None:
             return None
-        text = text.replace(SHAPES, "Shape")
+        text = ALL_KINDS.sub("Shape", text)
         text = re.sub(
             r"Annotated\[NDArray\[(?:numpy\.)?(\w+)\], dict\([^()]*(?:\([^()]*\)[^()]*)*\)\]", r"NDArray[\1]", text
         )

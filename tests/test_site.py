@@ -3,6 +3,7 @@
 import ast
 import inspect
 import re
+import runpy
 from importlib import import_module
 from pathlib import Path
 from typing import get_args
@@ -46,6 +47,16 @@ def test_every_option_of_pytest_has_an_entry():
     source = Path(pytest_plugin.__file__).read_text(encoding="utf-8")
     options = set(re.findall(r'"(--overlapper-\w+)"', source))
     assert options == set(re.findall(r"^\.\. option:: (--[\w-]+)", PAGES["scenes"], re.MULTILINE))
+
+
+def test_signatures_say_shape_in_place_of_all_kinds_of_shapes():
+    short = runpy.run_path(str(DOCS / "conf.py"))["process_signature"]
+    told = overlapper.distance.__doc__.splitlines()[0].removeprefix("distance")
+    assert "Hull | " in told
+    assert short(None, None, None, None, None, told, "Hull | Box") == (
+        "(a: Shape | Placed | ArrayLike, b: Shape | Placed | ArrayLike) -> float",
+        "Hull | Box",
+    )
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -6,8 +6,10 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from plain_cases import SHAPES as MAKERS
+from plain_cases import MORE_SHAPES
+from plain_cases import SHAPES as RECORDED
 
+import overlapper
 from overlapper import Placed, Shape
 from overlapper.polytopes.shape_text import shape_of, text_of
 from overlapper.proof.rational_body import RationalBody
@@ -16,7 +18,8 @@ from overlapper.rational import exact
 from overlapper.shapes.facts import Facts
 from overlapper.shapes.table import KINDS, facts
 
-SHAPES = [make(Random(1)) for make in MAKERS.values()]
+MADE = [make(Random(1)) for make in (*RECORDED.values(), *MORE_SHAPES.values())]
+SHAPES = [shape for shape in MADE if type(shape) in KINDS]
 BOUNDED = [shape for shape in SHAPES if facts(shape).bounded]
 
 
@@ -31,6 +34,7 @@ def directions(count):
 def test_the_table_has_every_kind_of_shape():
     assert set(get_args(Shape)) <= KINDS.keys()
     assert {type(shape) for shape in SHAPES} == KINDS.keys()
+    assert {kind.__name__ for kind in get_args(Shape)} <= {*overlapper.__all__}
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=name)

@@ -702,7 +702,7 @@ def posed_along_an_axis(rng, a, b, depths):
 
 
 def more_kinds(rng):
-    """A shape of a kind that a header adds to the core, and one of any kind, `parameter` into each other or apart."""
+    """A shape of MORE_SHAPES and one of any kind, `parameter` into each other or apart."""
     plain = Random(int(rng.integers(2**32)))
     makers = {**SHAPES, **MORE_SHAPES}
     first, second = plain.choice([*MORE_SHAPES]), plain.choice([*makers])
