@@ -57,8 +57,8 @@ MAKERS = (
     of_results("steps", "*/steps.csv", "steps.png", by=("speed/steps_page",)),
     of_results(
         "chart",
-        "*/[cs][lp]*.csv",
-        *("speed.png", "speed_sizes.png", "speed_claims.png", "speed_families.png"),
+        "*/[gs][rp]*.csv",
+        *("speed.png", "speed_sizes.png", "speed_families.png"),
         by=("speed/page", "harness/peers"),
     ),
     of_results(

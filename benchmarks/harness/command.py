@@ -21,7 +21,6 @@ COMMANDS = {
     "steps": "speed.steps",
     "ways": "speed.ways",
     "stability": "stability.hard_cases",
-    "contacts": "stability.contacts",
     "stress": "stability.stress",
     "physics": "forces.physics",
     "forces": "forces.cost",

@@ -4,26 +4,24 @@
     python benchmarks chart --page                only the page and its pictures, from the results there are
     python benchmarks chart --family "box deep"   one family alone
 
-Writes speed.csv (a line for each family, method and setting) and claims.csv (what the article claims) to
-benchmarks/results/MACHINE, and the page speed.md with its pictures to docs. Every answer is compared with the exact
-truth: a peer that is wrong is shown as wrong; if this package is, the run ends there.
+Writes speed.csv (a line for each family, method and setting) and groups.csv (a line for each number of bodies and
+method) to benchmarks/results/MACHINE, and the page speed.md with its pictures to docs. Every answer is compared with
+the exact truth: a peer that is wrong is shown as wrong; if this package is, the run ends there.
 """
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import sys
 import time
 from argparse import ArgumentParser, Namespace
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import astuple, fields
 from pathlib import Path
 
 from harness import results
 from harness.peers import FEW, TIMED
 from harness.timing import on_one_processor
-from paper.claims import CLAIMS, Claim
+from speed import groups
 from speed.turns import Row, rows_of
 from speed.workloads import FAMILIES, MORE, pairs_of
 
@@ -54,10 +52,7 @@ def measure(chosen: Namespace, path: Path) -> None:
     print(*(f"Missing: {line}" for line in sorted(missing)), sep="\n", end="\n" * bool(missing))
     if chosen.family or chosen.method:
         return
-    # In a process of its own, so that this one keeps all processors.
-    with (
-        results.writing(path.with_name("claims.csv"), [field.name for field in fields(Claim)], note) as write,
-        ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), on_one_processor) as process,
-    ):
-        for claim in CLAIMS:
-            write(map(astuple, process.submit(claim, chosen.seconds / 8).result()))
+    on_one_processor()
+    with results.writing(path.with_name("groups.csv"), groups.Row._fields, note) as write:
+        for group in groups.measured(chosen.seconds / 8):
+            write([group])

@@ -13,7 +13,7 @@ from harness import charts, results
 from harness.charts import Panel, Series
 from harness.page import duration, filled, indented, named, table, times
 from harness.peers import PEERS, TIMED, Look
-from paper.claims import VERTICES, Claim
+from speed import groups
 from speed.turns import Row
 from speed.workloads import FAMILIES, SIZES
 
@@ -32,8 +32,6 @@ WRONG = 1e-6
 # Where an answer without any error is drawn: below the half-ulp of 1e-16.
 EXACT = 1e-17
 
-# Ways that are not peers are drawn as the peer that they are most like.
-ALIKE = {"cutting": "clipping", "duality": "scipy", "one hull": "scipy", "tree": "voxels"}
 LOOKS = {name: peer.look for name, peer in TIMED.items() if peer.look}
 
 
@@ -44,14 +42,14 @@ class Results:
     folder: str
     notes: list[str]
     rows: list[Row]
-    claims: list[Claim]
+    groups: list[groups.Row]
 
 
 def results_in(folder: Path) -> Results:
     notes, rows = results.read(folder / "speed.csv")
-    path = folder / "claims.csv"
-    claims = results.read(path)[1] if path.exists() else []
-    return Results(str(named(folder)), notes, [Row(**row) for row in rows], [Claim(**claim) for claim in claims])
+    path = folder / "groups.csv"
+    of_groups = results.read(path)[1] if path.exists() else []
+    return Results(str(named(folder)), notes, [Row(**row) for row in rows], [groups.Row(**row) for row in of_groups])
 
 
 def write_page(path: Path, folder: Path) -> Path:
@@ -61,9 +59,8 @@ def write_page(path: Path, folder: Path) -> Path:
     if families:
         accuracy(found.rows, [name for name in CHOSEN if name in at_hand] or families, folder / "speed.png")
         accuracy(found.rows, families, folder / "speed_families.png")
-    for name, panels in panels_of(found).items():
-        if all(panel.lines for panel in panels):
-            growth(panels, folder / f"speed_{name}.png")
+    if panels := [panel for panel in panels_of(found) if panel.lines]:
+        growth(panels, folder / "speed_sizes.png")
     page = folder / "speed.md"
     page.write_text(text(found), encoding="utf-8")
     return page
@@ -144,12 +141,8 @@ def power(points: list[tuple[float, float]]) -> float:
     return float(np.polyfit(x, y, 1)[0])
 
 
-def panels_of(found: Results) -> dict[str, list[Growth]]:
-    """The panels of time over size, and those of the article's claims."""
-    sizes = [by_size(found.rows, way) for way in ("deep", "shallow")]
-    pairs = by_claim(found.claims, "pair", "a pair", "vertices of either body", "vertices", 50)
-    groups = by_claim(found.claims, "bodies", f"many bodies of {VERTICES} vertices", "bodies", "bodies", 8)
-    return {"sizes": sizes, "claims": [pairs, groups]}
+def panels_of(found: Results) -> list[Growth]:
+    return [by_size(found.rows, "deep"), by_size(found.rows, "shallow"), by_number(found.groups)]
 
 
 def by_size(rows: list[Row], way: str) -> Growth:
@@ -160,12 +153,11 @@ def by_size(rows: list[Row], way: str) -> Growth:
     return Growth(way, "facets of either mesh", lines, 320)
 
 
-def by_claim(claims: list[Claim], name: str, title: str, along: str, size: str, least: float) -> Growth:
+def by_number(rows: list[groups.Row]) -> Growth:
     lines: dict[str, list[tuple[float, float]]] = {}
-    for claim in claims:
-        if claim.claim == name:
-            lines.setdefault(claim.way, []).append((float(getattr(claim, size)), float(claim.us)))
-    return Growth(title, along, lines, least)
+    for row in rows:
+        lines.setdefault(row.method, []).append((float(row.bodies), float(row.us)))
+    return Growth("many bodies", f"bodies of {groups.VERTICES} vertices", lines, 8)
 
 
 def growth(panels: list[Growth], path: Path) -> None:
@@ -174,20 +166,28 @@ def growth(panels: list[Growth], path: Path) -> None:
     decades = 10.0 ** np.arange(np.floor(np.log10(min(us for _, us in points))), 9)
     top = max(us for _, us in points)
     charts.draw(path, [growth_panel(panel, {us: duration(us) for us in decades if us < 10 * top}) for panel in panels],
-                (9.4, 4.2), dpi=170, colours=128)  # fmt: skip
+                (11, 4.2), dpi=170, colours=128)  # fmt: skip
 
 
 def growth_panel(shown: Growth, decades: dict[float, str]) -> Panel:
     series = []
     for name, points in sorted(shown.lines.items(), key=lambda item: -item[1][-1][1]):
-        look = LOOKS.get(name) or LOOKS[ALIKE[name]]
+        look = LOOKS[name]
         said = f"{name}, {shown.powers[name]:.2f}" if name in shown.powers else name
         style = {"color": look.colour, "marker": look.marker, "ms": look.size, "lw": 2.2 if look.ours else 1.2}
         series.append(Series(*zip(*points), said, style=style))
     sizes = sorted({x for points in shown.lines.values() for x, _ in points})
     axes = {"xscale": "log", "yscale": "log", "xlabel": shown.along, "ylabel": "time"}
     ticks = {size: f"{size:,.0f}" for size in sizes}
-    return Panel(shown.title, series, axes, xticks=ticks, yticks=decades, legend={"title": "grows with the power of"})
+    key = {"title": "grows with the power of", "loc": "upper left"}
+    return Panel(
+        shown.title,
+        series,
+        axes,
+        xticks=ticks,
+        yticks=decades,
+        legend={"title": "grows with the power of", "loc": "upper left"},
+    )
 
 
 # Words
@@ -209,17 +209,7 @@ def text(found: Results) -> str:
         depths=", ".join(f"{family} {duration(float(row.us))}" for family, row in depths if row),
         results=found.folder,
         notes=indented(found.notes),
-        claims=claims_text(*panels_of(found)["claims"]) if found.claims else "They were not measured.",
     )
-
-
-def claims_text(*panels: Growth) -> str:
-    said = {}
-    for claim, panel in zip(("pair", "bodies"), panels):
-        for way, points in panel.lines.items():
-            name = f"{claim}_{way}".replace(" ", "_")
-            said |= {name: duration(points[-1][1]), f"{name}_power": f"{panel.powers.get(way, np.nan):.2f}"}
-    return filled(Path(__file__).with_name("claims.md"), **said).strip()
 
 
 def compared(rows: list[Row]) -> str:

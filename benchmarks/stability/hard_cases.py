@@ -22,7 +22,7 @@ import numpy as np
 from harness import results
 from harness.peers import NOT_ASKED, HardCase, hard_cases
 from harness.watched import Watched
-from overlapper import Placed, overlap
+from overlapper import Placed
 from stability.judging import Question, distance_column, distance_verdict, verdict
 
 RESULTS = results.FOLDER / "stability.csv"
@@ -59,7 +59,6 @@ def measure(chosen: Namespace, path: Path) -> None:
             table.put(name, HardCase(kind, name), flat, verdict, asked)
     for name in hard_cases("distance"):
         table.put(distance_column(name), HardCase("distance", name), pairs, distance_verdict, asked)
-    table.put("way", way, [question.bodies for question in asked], lambda _, answer: answer, asked)
     table.write(path, f"seed {chosen.seed}; {results.packages()}")
 
 
@@ -111,11 +110,6 @@ class Columns:
     def write(self, path: Path, note: str) -> None:
         with results.writing(path, list(self.rows[0]), note, *self.missing) as write:
             write(row.values() for row in self.rows)
-
-
-def way(*bodies: np.ndarray | Placed) -> str:
-    """By which way the package itself answers."""
-    return overlap(*bodies).way
 
 
 def described(question: Question) -> dict[str, str]:

@@ -16,7 +16,7 @@ from harness import charts, results
 from harness.charts import Cells, Panel
 from harness.page import filled, indented, table
 from harness.peers import NO_ANSWER, NOT_ASKED, OUT_OF_ITERATIONS, hard_cases
-from stability import contacts, stress
+from stability import stress
 from stability.judging import distance_column, error_of, failed
 
 Row = dict[str, str]
@@ -227,135 +227,48 @@ def by_degeneracy(
 
 # Words
 
-KINDS = ("wrong volume", "missed", "phantom", "raised", "crashed", "hung")
-KINDS_OF_DISTANCES = ("off by > 1e-6", *KINDS[1:3], NO_ANSWER, OUT_OF_ITERATIONS, *KINDS[3:])
+KINDS = ("missed", "phantom", NO_ANSWER, OUT_OF_ITERATIONS, "raised", "crashed", "hung")
+WRONG = "off by > 1e-6"
 
-# A depth or distance further off than this, relative to the true one, is counted for itself.
+# An answer further off than this, relative to the true one, is counted for itself.
 COARSE = 0.01
 
 
-def kind(cell: str, wrong: str = KINDS[0]) -> str:
-    if cell in (NO_ANSWER, OUT_OF_ITERATIONS, "missed", "phantom"):
-        return cell
-    return {"raises": "raised", "crash": "crashed", "hang": "hung"}.get(cell.split()[0], wrong)
+def kind(cell: str) -> str:
+    return (
+        cell if cell in KINDS else {"raises": "raised", "crash": "crashed", "hang": "hung"}.get(cell.split()[0], WRONG)
+    )
 
 
 def text(notes: list[str], rows: list[Row]) -> str:
-    parts = {
-        "cases": f"{len(with_volumes(rows)):,}",
-        "pairs": f"{len(deep(rows)) + len(not_deep(rows)):,}",
-        "rounds": f"{len(rows) - len(with_volumes(rows)):,}",
-        "depths": totals_of_distances(deep(rows)),
-        "distances": totals_of_distances(not_deep(rows)),
-        "ways": ways(rows),
-        "notes": indented(notes),
-        "totals": totals(with_volumes(rows)),
-        "auto": about_auto(rows),
-        "stress": stress_run(),
-        **shallow_rounds(),
-    }
-    for column, peer in DISTANCES.items():
-        key = peer.split(",")[0] + "_tight" * ("," in peer)
-        for part, word in ((deep, "depth"), (not_deep, "distance")):
-            parts |= {f"{word}_{key}": f"{percent(failure_share(part(rows), column))} %"}
-            parts |= {f"{word}_{key}_at": worst_places(part(rows), column)}
-    for peer in peers_of(rows):
-        key = peer.replace(" ", "_")
-        kinds = Counter(kind(cell) for cell in asked(rows, peer) if failed(cell))
-        parts |= {f"{key}_{name.replace(' ', '_')}": str(kinds[name]) for name in KINDS}
-        parts |= {f"{key}_share": percent(failure_share(rows, peer))}
-        parts |= {f"{key}_worst_at": worst_places(rows, peer)}
-    return filled(Path(__file__).with_name("page.md"), **parts)
+    (seeds,), stressed = results.read(stress.TABLE)
+    volumes, every = with_volumes(rows), stressed[-1]
+    return filled(
+        Path(__file__).with_name("page.md"),
+        cases=f"{len(volumes):,}",
+        pairs=f"{len(deep(rows)) + len(not_deep(rows)):,}",
+        rounds=f"{len(rows) - len(volumes):,}",
+        totals=totals(volumes, peers_of(rows)),
+        depths=totals(deep(rows), list(DISTANCES)),
+        distances=totals(not_deep(rows), list(DISTANCES)),
+        stress=f"{int(every['cases']):,} cases of {len(stressed) - 1} families, {seeds}: {every['failures']} failures",
+        stress_error=every["worst error"],
+        stress_share=every["of the stated"],
+        notes=indented(notes),
+    )
 
 
-def worst_places(rows: list[Row], peer: str) -> str:
-    """The three groups in which a peer fails most, with the share."""
-    shares = {name: failure_share(group, peer) for name, group in grouped(rows).items()}
-    worst = sorted((name for name in shares if shares[name] > 0), key=lambda name: -shares[name])[:3]
-    return ", ".join(f"{name} {percent(shares[name])} %" for name in worst) or "none"
-
-
-def about_auto(rows: list[Row]) -> str:
-    failures = [f"`{row['family']}` {row['seed']} ({row['auto']})" for row in rows if failed(row["auto"])]
-    return "It failed in none of them." if not failures else f"It failed in {', '.join(failures)}."
-
-
-def totals(rows: list[Row]) -> str:
+def totals(rows: list[Row], columns: list[str]) -> str:
+    """A line for each peer: how many cases it was asked, the share it failed, and how often in each way, if ever."""
+    cells = {column: asked(rows, column) for column in columns}
+    failed_by = {column: Counter(kind(cell) for cell in of if failed(cell)) for column, of in cells.items()}
+    kinds = [name for name in (WRONG, *KINDS) if any(counts[name] for counts in failed_by.values())]
     lines = []
-    for peer in peers_of(rows):
-        kinds = Counter(kind(cell) for cell in asked(rows, peer) if failed(cell))
-        counts = [str(kinds[name] or "") for name in KINDS]
-        lines.append([*score(rows, peer), *counts, worst(rows, peer) if peer in volumes_of(rows) else ""])
-    return table(["", "cases", "failures", *KINDS, "worst error"], lines)
-
-
-def score(rows: list[Row], peer: str) -> list[str]:
-    """The peer, how many cases it was asked, and how many of them it failed."""
-    cases = len(asked(rows, peer))
-    share = f"{percent(failure_share(rows, peer))} %" if cases else "not installed"
-    return [DISTANCES.get(peer, peer), str(cases), share]
-
-
-def worst(rows: list[Row], peer: str) -> str:
-    error = worst_error(rows, peer)
-    return "" if np.isnan(error) else f"{error:.0e}"
-
-
-def totals_of_distances(rows: list[Row]) -> str:
-    lines = []
-    for column in DISTANCES:
-        cells = asked(rows, column)
-        kinds = Counter(kind(cell, KINDS_OF_DISTANCES[0]) for cell in cells if failed(cell))
-        coarse = sum(error_of(cell) > COARSE for cell in cells if cell not in KINDS_OF_DISTANCES)
-        counts = [str(count or "") for count in [*(kinds[name] for name in KINDS_OF_DISTANCES), coarse]]
-        lines.append([*score(rows, column), *counts, worst(rows, column)])
-    return table(["", "cases", "failures", *KINDS_OF_DISTANCES, f"off by > {COARSE * 100:.0f} %", "worst error"], lines)
-
-
-def ways(rows: list[Row]) -> str:
-    """By which way the package answered, in percent of each group, the most frequent of all first."""
-    names = [way for way, _ in Counter(asked(rows, "way")).most_common()]
-    lines = []
-    for name, group in [*grouped(rows).items(), ("all", rows)]:
-        counts = Counter(asked(group, "way"))
-        lines.append([name, *(percent(100 * counts[way] / counts.total()) if counts[way] else "" for way in names)])
-    return table(["", *names], lines)
-
-
-def stress_run() -> str:
-    """The record of `python benchmarks stress`, in words and as a table."""
-    (seeds,), rows = results.read(stress.TABLE)
-    failures = int(rows[-1]["failures"])
-    words = f"{int(rows[-1]['cases']):,} cases, {seeds}: " + (f"{failures} failures." if failures else "no failure.")
-    lines = ([value.replace("_", " ") for value in row.values()] for row in rows)
-    return f"{words}\n\n{table(list(rows[0]), lines)}"
-
-
-def shallow_rounds() -> dict[str, str]:
-    """The record of `python benchmarks contacts`, with all answers to a contact in one cell."""
-    notes, rows = results.read(contacts.RESULTS)
-    kinds = dict.fromkeys(row["contact"] for row in rows)
-    known = max(float(row["known to"]) for row in rows)
-    said = {
-        "shallow_cases": str(len(rows)),
-        "shallow_contacts": str(len(kinds)),
-        "shallow_known": f"{known:.0e}",
-        "shallow_notes": indented(notes),
-    }
-    for word, key in ((": volume", "volumes"), (": stated error", "stated"), (": depth", "depths")):
-        peers = [column for column in rows[0] if column.endswith(word)]
-        said[f"shallow_{key}_auto"] = all_said([row[f"auto{word}"] for row in rows])
-        lines = (
-            [contact, *(all_said([row[peer] for row in rows if row["contact"] == contact]) for peer in peers)]
-            for contact in kinds
-        )
-        said[f"shallow_{key}"] = table(["", *(peer.removesuffix(word) for peer in peers)], lines)
-    return said
-
-
-def all_said(cells: list[str]) -> str:
-    """The largest error, and how often each word stands in place of an answer."""
-    errors = [error for cell in cells if not np.isnan(error := error_of(cell))]
-    words = Counter(cell for cell in cells if cell != NOT_ASKED and np.isnan(error_of(cell)))
-    worst = [f"{max(errors):.0e}"] if errors else []
-    return ", ".join([*worst, *(f"{count} {word}" for word, count in words.most_common())])
+    for column, of in cells.items():
+        share = f"{percent(failure_share(rows, column))} %" if of else "not installed"
+        coarse = sum(error_of(cell) > COARSE for cell in of if kind(cell) == WRONG)
+        counts = [str(count or "") for count in (*(failed_by[column][name] for name in kinds), coarse)]
+        error = worst_error(rows, column) if column not in hard_cases("overlaps") else np.nan
+        worst = "" if np.isnan(error) else f"{error:.0e}"
+        lines.append([DISTANCES.get(column, column), str(len(of)), share, *counts, worst])
+    return table(["", "cases", "failures", *kinds, f"off by > {100 * COARSE:.0f} %", "worst error"], lines)

@@ -9,13 +9,11 @@ import exact
 import families
 import numpy as np
 import pytest
-from strategies import directions
 
 from harness import bodies, command, peers, results, watched
 from overlapper import HalfSpace, Hull, Placed, Sphere, overlap, penetration_depth
 from overlapper.cli import bench
-from paper import claims as paper_claims
-from speed import chart, page, truth, turns, workloads
+from speed import chart, groups, page, truth, turns, workloads
 
 ROOT = Path(__file__).parents[2]
 
@@ -245,14 +243,18 @@ def test_time_over_size_names_its_power(tmp_path):
     assert (tmp_path / "sizes.png").stat().st_size > 10_000
 
 
-def test_one_hull_and_the_tree_find_what_many_bodies_share():
-    rng = np.random.default_rng(0)
-    clouds = [directions(rng, 12) + 0.2 * directions(rng, 1) for _ in range(5)]
-    volume = float(exact.common(*map(exact.hull, clouds)).volume)
-    placed = [Placed(Hull(cloud)) for cloud in clouds]
-    walls, at = [bodies.planes(body) for body in placed], paper_claims.middle(*placed)
-    assert paper_claims.by_one_hull(walls, at) == pytest.approx(volume, rel=1e-9)
-    assert paper_claims.by_tree(walls, at) == pytest.approx(volume, rel=1e-9)
+def test_many_bodies_are_timed_by_each_peer(monkeypatch):
+    monkeypatch.setattr(groups, "COUNTS", (2, 4))
+    monkeypatch.setattr(groups, "ASKED", ("paper", "auto"))
+    rows = list(groups.measured(0.01))
+    assert [(row.method, row.bodies) for row in rows] == [("paper", 2), ("auto", 2), ("paper", 4), ("auto", 4)]
+    assert all(float(row.us) > 0 and float(row.error) < 1e-12 for row in rows)
+
+
+def test_a_wrong_volume_of_many_bodies_ends_the_run(monkeypatch):
+    monkeypatch.setattr(groups, "error_of", lambda *_: 1e-6)
+    with pytest.raises(command.Wrong, match="2 bodies: auto is off by"):
+        next(groups.measured(0.01))
 
 
 def test_the_page_says_what_the_committed_results_say():
@@ -263,15 +265,9 @@ def test_the_page_says_what_the_committed_results_say():
     assert (ROOT / "docs" / "speed.md").read_text(encoding="utf-8") == page.text(found)
 
 
-def test_the_page_says_what_the_claims_come_to():
-    def claim(kind, way, vertices, bodies, us):
-        return paper_claims.Claim(kind, way, vertices, bodies, f"{us:g}", "0.00e+00")
-
-    ways = {"paper": 1.0, "auto": 1.0, "cutting": 2.0, "duality": 1.0}
-    claims = [claim("pair", way, n, 2, n**power) for way, power in ways.items() for n in (50, 100, 200)]
-    claims += [claim("bodies", way, 32, m, m) for way in ("paper", "auto", "one hull", "tree") for m in (8, 16, 32)]
-    found = page.Results("", [], [], claims)
-    assert "grows with the power of 2.00" in page.text(found).replace("\n", " ")
+def test_time_over_the_number_of_bodies_names_its_power():
+    rows = [groups.Row("paper", 32, count, f"{100 * count}", "0") for count in (8, 16, 32)]
+    assert page.by_number(rows).powers == {"paper": pytest.approx(1.0)}
 
 
 def test_without_a_checkout_the_command_says_so(tmp_path, monkeypatch):

@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 import time
-from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,9 +14,9 @@ import pytest
 
 from harness import command, peers, results
 from harness.watched import Watched
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Placed, RoundedHull, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, HalfSpace, Placed, RoundedHull, Sphere
 from overlapper.cli import bench
-from stability import contacts, hard_cases, judging
+from stability import hard_cases, judging
 from stability import page as stability_page
 
 ROOT = Path(__file__).parents[2]
@@ -237,50 +236,9 @@ def test_libraries_that_lack_a_shape_are_not_asked():
             assert peers.HardCase("distance", name)(ball, other) == peers.NOT_ASKED
 
 
-def test_contacts_of_round_bodies_are_as_deep_as_they_are_said_to_be():
-    for contact in contacts.contacts(1):
-        volume, within = contact.volume
-        assert float(contact.depth) == pytest.approx(contacts.DEPTH, rel=1e-6)
-        assert 0 < within < 1e-12 * volume
-        found = overlap(contact.a, contact.b)
-        assert abs(Fraction(found.volume) - volume) <= volume / 10**12
-
-
-def test_an_unknown_depth_is_none():
-    (contact,) = (each for each in contacts.contacts(1) if each.kind == "cylinder's rim on a face")
-    beside = contacts.Contact("", 0, contact.a, Placed(Cylinder(0.5, 1.0), contact.a.bounds[1]))
-    with pytest.raises(ValueError, match="meets an edge"):
-        _ = beside.depth
-
-
-@pytest.mark.parametrize(
-    ("answer", "words"),
-    [(-1.0, "1.0e-03"), (-1.5, "5.0e-01"), (0.0, "apart"), (1.0, "apart"), (float("nan"), "no answer"), ("-", "-")],
-)
-def test_a_contact_is_described_by_its_figures(answer, words):
-    assert contacts.told((Fraction(-1), Fraction(1, 1000)), answer) == words
-
-
-def test_a_cell_of_the_page_shows_the_largest_error_and_missing_answers():
-    assert stability_page.all_said(["1.0e-03", "2.0e-01", "apart", "apart", "hang", "-"]) == "2e-01, 2 apart, 1 hang"
-    assert stability_page.all_said(["-", "-"]) == ""
-
-
-def test_all_installed_libraries_are_asked_about_round_contacts(tmp_path):
-    path = tmp_path / "stability_round.csv"
-    assert command.main(["contacts", "--cases=1", f"--out={tmp_path}"]) == 0
-    notes, rows = results.read(path)
-    assert [row["contact"] for row in rows] == list(contacts.CONTACTS)
-    missing = {note.removeprefix("missing: ").partition(" (")[0] for note in notes[1:]}
-    for column in (name for name in rows[0] if ": " in name):
-        assert any(row[column] != peers.NOT_ASKED for row in rows) is (column not in missing)
-    assert all(float(row["auto: volume"]) <= float(row[contacts.STATED]) for row in rows)
-
-
 def test_kinds_of_failures_are_told_apart():
     cells = ["2.0e-02", "missed", "phantom", "no answer", "out of iterations", "raises ValueError", "crash 1", "hang"]
-    wrong = stability_page.KINDS_OF_DISTANCES[0]
-    assert [stability_page.kind(cell, wrong) for cell in cells] == list(stability_page.KINDS_OF_DISTANCES)
+    assert [stability_page.kind(cell) for cell in cells] == [stability_page.WRONG, *stability_page.KINDS]
 
 
 def test_a_crash_and_a_hang_are_answers_and_the_next_case_is_asked_again():
@@ -308,7 +266,7 @@ def test_clipping_and_halfspaces_find_the_volume_of_hulls_in_general_position():
 def test_the_page_says_what_the_committed_results_say():
     notes, rows = results.read(hard_cases.RESULTS)
     assert len(rows) > 800
-    assert {*stability_page.peers_of(rows), *stability_page.DISTANCES, "way"} <= set(rows[0])
+    assert {*stability_page.peers_of(rows), *stability_page.DISTANCES} <= set(rows[0])
     assert (ROOT / "docs" / "stability.md").read_text(encoding="utf-8") == stability_page.text(notes, rows)
 
 
@@ -324,7 +282,6 @@ def test_the_command_writes_results_page_and_pictures(tmp_path, monkeypatch):
         assert bool(asked) is (peer not in missing)
     rounds = [row for row in rows if row["family"] in hard_cases.ROUND]
     assert {row["auto"] for row in rounds} == {peers.NOT_ASKED}
-    assert "separation" in {row["way"] for row in rows}
     pictures = {f"stability{name}.png" for name in ("", "_degeneracy", "_distances", "_distances_degeneracy")}
     assert {"stability.md", *pictures} <= {path.name for path in tmp_path.iterdir()}
 
