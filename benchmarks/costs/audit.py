@@ -3,10 +3,10 @@
     python benchmarks audit speed [ROUNDS]           configurations a second of a Franka, on one core
     python benchmarks audit robots [CONFIGURATIONS]  the table of docs/audit.md
 
-The first two need `pip install pin`, which is pinocchio with coal. Both sides have the same convex shapes: those that
-pybullet has made. Pinocchio has its own kinematics, of the URDF, which are compared with ours by the way. Ours looks at
-blocks as in an audit, with volumes and depths; theirs says yes or no for the same pairs of shapes, one configuration
-after the other, with and without a tree of boxes. Figures are medians of rounds in which all take turns.
+The first needs `pip install pin`, which is pinocchio with coal. Both sides have the same convex shapes: those that
+pybullet has made. Ours looks at blocks as in an audit, with volumes and depths; theirs says yes or no for the same
+pairs of shapes, one configuration after the other, with and without a tree of boxes. Figures are medians of rounds in
+which all take turns.
 """
 
 from __future__ import annotations
@@ -73,11 +73,6 @@ class Peer:
             joint = self.model.joints[self.model.getJointId(name)]
             q[joint.idx_q : joint.idx_q + joint.nq] = value if joint.nq == 1 else [np.cos(value), np.sin(value)]
         return q
-
-    def placements(self, q: np.ndarray) -> np.ndarray:
-        """(k, 4, 4) of the shapes."""
-        self.pin.updateGeometryPlacements(self.model, self.data, self.geometry, self.geometry_data, q)
-        return np.array([each.homogeneous for each in self.geometry_data.oMg])
 
     def one_by_one(self, q: np.ndarray) -> None:
         self.pin.computeCollisions(self.model, self.data, self.geometry, self.geometry_data, q, False)

@@ -2,28 +2,23 @@
 
     python benchmarks recording [balls | boxes | mixed]
 
-Times are of the processor, of the page's own thread and of the process that draws in software in place of a graphics
-card; so they do not depend on what else the machine does.
+Times are of the processor, so that other processes do not count.
 """
 
 from __future__ import annotations
 
-import os
 import random
-import subprocess
 import tempfile
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import pybullet as p
-from browser import Browser
 
 from harness.timing import Stopwatch
 from overlapper.simulation import Bodies
 from overlapper.viewer import Recording
 
 BODIES = 100
-FRAMES = 20  # shown for the measurement
 
 
 def build(kind: str) -> int:
@@ -68,41 +63,3 @@ def main(chosen: Namespace) -> None:
             print(f"{kind}: {BODIES} bodies, {chosen.steps} frames, {shared:,} overlaps: {size:.1f} MB", flush=True)
             frame = us["a frame"] / 1e3 / chosen.steps
             print(f"  recorded: {frame:.0f} ms a frame, and {us['saving'] / 1e6:.0f} s to save", flush=True)
-            page_thread, drawing = shown(page, Path(folder, "profile"))
-        print(f"  shown, at 1280 x 800: {page_thread:.0f} ms a frame on the page's thread, {drawing:.0f} ms to draw it")
-
-
-def shown(page: Path, profile: Path) -> tuple[float, float]:
-    """ms of the processor for a frame: of the page's own thread, and of the software in place of a graphics card."""
-    browser = Browser(profile, size=(1280, 800))
-    try:
-        browser.open(page.as_uri() + "#t=1", until="document.querySelector('#time output').textContent")
-        browser.picture()
-        browser("Performance.enable", timeDomain="threadTicks")
-        before = thread_seconds(browser), drawing_seconds()
-        for _ in range(FRAMES):
-            browser.press("ArrowRight")
-            browser.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        after = thread_seconds(browser), drawing_seconds()
-    finally:
-        browser.close()
-    page_thread, drawing = (1e3 * (b - a) / FRAMES for a, b in zip(before, after))
-    return page_thread, drawing
-
-
-def thread_seconds(browser: Browser) -> float:
-    return {each["name"]: each["value"] for each in browser("Performance.getMetrics")["metrics"]}["TaskDuration"]
-
-
-def drawing_seconds() -> float:
-    """Processor time of the graphics processes of all Chromiums that this process has started."""
-    family, seconds = {os.getpid()}, 0.0
-    processes = subprocess.run(["ps", "-eo", "pid=,ppid=,args="], capture_output=True, text=True, check=True).stdout
-    rows = sorted((row.split(None, 2) for row in processes.splitlines()), key=lambda row: int(row[0]))
-    for number, parent, arguments in rows:
-        if int(parent) in family:
-            family.add(int(number))
-            if "--type=gpu-process" in arguments:
-                fields = Path("/proc", number, "stat").read_text().rpartition(")")[2].split()
-                seconds += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-    return seconds

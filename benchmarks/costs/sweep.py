@@ -5,8 +5,8 @@
 Overhead, by the processor's time, which is much the same when others are at work on the machine: in a worker, runs of a
 scene of one ball and one step alternate with the same as tasks, and the median of their differences is told; in the
 parent, all that it does for a task of a sweep; and by the clock, an item that needs no work.
-Scaling: tasks of the grasp scene by one worker and by two, in turns, by the clock from the first tasks done on, beside
-what plain arithmetic gains from a second process in the same round. Medians of the rounds, the least and the largest.
+Scaling: tasks of the grasp scene by one worker and by two, in turns, by the clock from the first tasks done on. Medians
+of the rounds, the least and the largest.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
@@ -106,18 +105,6 @@ def there_and_back(count: int) -> float:
     return timed(lambda: list(found), time.perf_counter) / (count - 1)
 
 
-def arithmetic(_: int = 0) -> int:
-    return sum(k * k for k in range(3_000_000))
-
-
-def gain() -> float:
-    """How much faster two processes are than one, of what needs nothing but the processor."""
-    with get_context("spawn").Pool(2) as pool:
-        pool.map(arithmetic, range(2))
-        one = timed(lambda: [pool.apply(arithmetic) for _ in range(6)], time.perf_counter)
-        return one / timed(lambda: pool.map(arithmetic, range(6), chunksize=1), time.perf_counter)
-
-
 def options(parser: ArgumentParser) -> None:
     parser.add_argument("rounds", nargs="?", type=int, default=5)
     parser.add_argument("--tasks", type=int, default=200, help="of the empty scene")
@@ -138,17 +125,15 @@ def main(chosen: Namespace) -> None:
         words = ("a run", "more in the worker", "in the parent", "there and back", "overhead per task")
         for word, figures in zip(words, zip(*beside)):
             tell(word, figures, "ms")
-    ratios, gains, work = [], [], []
+    ratios, work = [], []
     for _ in range(chosen.rounds if chosen.grasps else 0):
         masses = f"mass=0.05:5:{chosen.grasps}:log"
         one, two = (swept(grasp, GRASP_STEPS, masses, workers) for workers in (1, 2))
         ratios.append(one.clock / two.clock)
         work.append(1e3 * one.processor / chosen.grasps)
-        gains.append(gain())
     for word, figures, unit in (
         ("a grasp", work, "ms"),
         ("grasps, 2 to 1", ratios, "times"),
-        ("arithmetic, 2 to 1", gains, "times"),
     ):
         if figures:
             tell(word, figures, unit)

@@ -186,7 +186,7 @@ def growth_panel(shown: Growth, decades: dict[float, str]) -> Panel:
         axes,
         xticks=ticks,
         yticks=decades,
-        legend={"title": "grows with the power of", "loc": "upper left"},
+        legend=key,
     )
 
 

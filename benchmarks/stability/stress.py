@@ -11,7 +11,7 @@ benchmarks/results for the stability page. The command fails if a rule is broken
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from itertools import count as counting
@@ -24,12 +24,10 @@ import exact
 import families
 import numpy as np
 import rules
-from rich import box
-from rich.console import Console
-from rich.table import Table
 
 from harness import results
 from harness.command import ROOT
+from harness.page import table
 from harness.watched import Watched
 
 ROWS, TABLE = ROOT / "out" / "stress.csv", results.FOLDER / "stress.csv"
@@ -126,7 +124,7 @@ def run(wanted: Iterable[Job], workers: int, path: Path) -> list[Row]:
 # The table of the results
 
 
-def table(done: list[Row]) -> list[Row]:
+def by_family(done: list[Row]) -> list[Row]:
     """A row for each family, and one for all."""
     groups: dict[str, list[Row]] = {}
     for row in done:
@@ -152,15 +150,6 @@ def worst(group: list[Row], column: str) -> str:
     return f"{max(float(row[column]) for row in group if column in row):.1e}" if any(column in r for r in group) else ""
 
 
-def print_table(lines: Sequence[Row]) -> None:
-    shown = Table(box=box.SIMPLE_HEAD)
-    for name in lines[0]:
-        shown.add_column(name, justify="left" if name == "family" else "right", no_wrap=True)
-    for line in lines:
-        shown.add_row(*map(str, line.values()))
-    Console(width=120).print(shown)
-
-
 def options(parser: ArgumentParser) -> None:
     parser.add_argument("--first", type=int, default=0, help="the seed to begin with")
     parser.add_argument("--count", type=int, default=1000, help="so many cases")
@@ -174,8 +163,8 @@ def main(chosen: Namespace) -> bool:
     """True if a rule is broken."""
     np.seterr(all="ignore")
     done = run(islice(jobs(chosen.first, chosen.family or ()), chosen.count), chosen.workers, chosen.out)
-    lines = table(done)
-    print_table(lines)
+    lines = by_family(done)
+    print(table(list(lines[0]), (map(str, line.values()) for line in lines)))
     if chosen.record:
         with results.writing(TABLE, list(lines[0]), f"seeds from {chosen.first} on") as write:
             write(line.values() for line in lines)
