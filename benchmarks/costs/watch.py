@@ -41,6 +41,8 @@ for _ in range(int(sys.argv[2])):
 print((time.process_time() - start) / int(sys.argv[2]) * 1e6)
 """
 
+START = "import pybullet; pybullet.connect(pybullet.DIRECT); pybullet.stepSimulation()"
+
 SCENES = ("r2d2", "200 boxes")
 
 WAYS = {
@@ -65,7 +67,7 @@ def main(chosen: Namespace) -> None:
     ways = ["without us", *(chosen.way or [way for way in WAYS if WAYS[way] is not None])]
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "script.py").write_text(SCRIPT, encoding="utf-8")
-        Path(folder, "start.py").write_text("import pybullet", encoding="utf-8")
+        Path(folder, "start.py").write_text(START, encoding="utf-8")
         for scene in chosen.scene or SCENES:
             taken: dict[str, list[float]] = {way: [] for way in ways}
             for _ in range(chosen.rounds):
@@ -76,7 +78,7 @@ def main(chosen: Namespace) -> None:
             for way, figures in taken.items():
                 middle = median(figures)
                 print(f"  {way:28}{middle:8.0f}{middle - plain:8.0f}   {min(figures):.0f} … {max(figures):.0f}")
-        # The least of so many starts of a script that only imports pybullet.
+        # The least of so many runs of a script that makes one step of nothing.
         plain, watched = (
             min(timed(lambda: said(folder, options, "start.py"), time.perf_counter) for _ in range(chosen.rounds))  # noqa: B023
             for options in (None, [])
