@@ -288,6 +288,24 @@ def test_a_corner_in_the_side_of_a_cylinder_leaves_it_straight_away_from_the_axi
         assert abs(Fraction(answer.depth) - truth) <= answer.errors.depth <= 1e-15
 
 
+@pytest.mark.parametrize("sunk", [1e-2, 1e-9])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_tilted_cylinder_in_a_facet_of_a_hull_leaves_it_along_the_normal_of_the_facet(seed, sunk):
+    rng = np.random.default_rng(seed)
+    q, p = quaternion(rng), quaternion(rng)
+    x, _, normal = rotation(q).T
+    hull = Placed(Hull(np.array([[6, 0, 0], [-3, 5, 0], [-3, -5, 0], [0.1, 0.2, -7]]) @ rotation(q).T))
+    a, b, c = (exact.vector(corner) for corner in hull.shape.vertices if corner @ normal > -1)
+    outward = exact.cross(exact.subtract(b, a), exact.subtract(c, a))
+    outward = outward if exact.dot(outward, exact.vector(normal)) > 0 else [-each for each in outward]
+    lowest = float(support(Placed(Cylinder(1, 2), orientation=p), -normal))
+    cylinder = Placed(Cylinder(1, 2), normal * (lowest - sunk) + x * rng.normal() * 0.5, p)
+    truth = way_out(cylinder, hull, outward)
+    for bodies in ((cylinder, hull), (hull, cylinder)):
+        answer = overlap(*bodies)
+        assert abs(Fraction(answer.depth) - truth) <= answer.errors.depth <= 1e-15 * answer.depth
+
+
 @pytest.mark.parametrize("tilt", [1e-1, 1e-4, 1e-8, 1e-12, 0])
 def test_a_cylinder_that_stands_askew_in_another_has_the_depth_of_its_lowest_rim_point(tilt):
     """Its rim is inside of the other's cap, whose normal is the way out; only the cap itself is as deep."""
