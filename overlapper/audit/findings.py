@@ -46,7 +46,7 @@ def remarks(robot: Robot) -> list[str]:
     for kind, name in robot.unmoved:
         why = "pybullet does not move it" if kind == "planar" else "it has no limits"
         lines.append(f"The {kind} joint {name} stays where it is, as {why}.")
-    return lines
+    return [*lines, *robot.notes]
 
 
 def _how_often(audited: PairAudit) -> str:

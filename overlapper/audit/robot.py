@@ -57,12 +57,14 @@ class Degree:
 class Robot:
     """Links, shapes and joints as pybullet has read them; `mimics` has, by name, the joints that follow others.
 
-    `name` is that of the robot in the file, or else of its first body.
+    `name` is that of the robot in the file, or else of its first body. `notes` are sentences on what of the file is not
+    read.
     """
 
     name: str
     tree: KinematicTree
     mimics: Mapping[str, Mimic]
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def link_names(self) -> tuple[str, ...]:
@@ -155,7 +157,9 @@ def _answers(request: tuple[Path, Modelling]) -> Generator[Robot | str, None, No
         if path.suffix.lower() == ".urdf":
             yield Robot(root.get("name") or tree.bodies[0], tree, _mimics(root, tree))
         else:
-            yield Robot(tree.bodies[0], tree, {})
+            tied = root.find("equality/*") is not None
+            notes = ("The <equality> of the file is not read: what it ties moves freely.",) if tied else ()
+            yield Robot(tree.bodies[0], tree, {}, notes)
     except (NotRead, ValueError) as error:
         yield str(error)
 

@@ -9,7 +9,7 @@ from robots import joint, limit, link, mimic, turntable, urdf
 
 from overlapper.audit.assets import read_asset
 from overlapper.audit.audit import audit
-from overlapper.audit.findings import findings
+from overlapper.audit.findings import findings, remarks
 from overlapper.audit.robot import not_modelled, read_robot
 from overlapper.audit.srdf import read_srdf, write_srdf
 from overlapper.audit.table import facts, write_table
@@ -159,8 +159,15 @@ def mjcf(path, compiler="", more='type="hinge" range="-20 20" limited="true"', g
 
 def test_mjcf_that_pybullet_reads_as_it_is_meant_is_read(tmp_path):
     robot = read_robot(mjcf(tmp_path / "robot.xml", '<compiler angle="degree"/>'))
+    assert remarks(robot) == []
     (degree,) = robot.degrees
     assert (degree.name, round(degree.upper, 6), not_modelled(robot)) == ("bend", 0.349066, {})
+
+
+def test_what_mjcf_ties_by_equality_is_remarked_upon(tmp_path):
+    tie = '<compiler/><equality><joint joint1="bend" joint2="other"/></equality>'
+    robot = read_robot(mjcf(tmp_path / "robot.xml", tie))
+    assert remarks(robot) == ["The <equality> of the file is not read: what it ties moves freely."]
 
 
 DEFAULT = '<compiler/><default><default class="knee"><joint range="-20 20" limited="true"/></default></default>'

@@ -20,7 +20,7 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="only Linux keeps to 
 
 @pytest.fixture(scope="module")
 def confine():
-    confine = Confined(20.0, 256)
+    confine = Confined(25.0, 256)
     yield confine
     confine.close()
 
@@ -108,9 +108,11 @@ def test_a_call_without_an_answer_is_a_sentence_and_the_next_call_is_answered(co
 
 
 def test_a_function_that_hangs_is_given_up_after_the_limit(confine, monkeypatch):
-    monkeypatch.setattr(confine, "seconds", 1.0)
-    with pytest.raises(Unanswered, match=r"^took longer than 1 s$"):
-        confine(hang_in_c)
+    confine(place)  # so that the limit is not for the start
+    with monkeypatch.context() as brief:
+        brief.setattr(confine, "seconds", 2.0)
+        with pytest.raises(Unanswered, match=r"^took longer than 2 s$"):
+            confine(hang_in_c)
     assert confine(place) != os.getpid()
 
 
@@ -131,11 +133,12 @@ def test_a_limit_of_memory_is_kept(confine):
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no process groups")
 @pytest.mark.parametrize(
     ("how", "sentence"),
-    [("dies", "ended its process with signal SIGKILL"), ("hangs", "took longer than 1 s"), ("answers", "")],
+    [("dies", "ended its process with signal SIGKILL"), ("hangs", "took longer than 2 s"), ("answers", "")],
 )
 def test_children_that_hold_a_pipe_end_with_the_process(confine, tmp_path, monkeypatch, how, sentence):
+    confine(place)
     if how == "hangs":
-        monkeypatch.setattr(confine, "seconds", 1.0)
+        monkeypatch.setattr(confine, "seconds", 2.0)
     file, start = tmp_path / "child", time.monotonic()
     if sentence:
         with pytest.raises(Unanswered, match=sentence):
@@ -143,7 +146,7 @@ def test_children_that_hold_a_pipe_end_with_the_process(confine, tmp_path, monke
     else:
         confine(leave_a_child, file, how)
         confine.close()
-    assert time.monotonic() - start < 10
+    assert time.monotonic() - start < 30  # and not the minute of the child
     assert ended(int(file.read_text()))
 
 
@@ -152,7 +155,7 @@ def test_a_child_that_has_left_the_group_delays_nothing_and_ends_on_linux(confin
     file, start = tmp_path / "child", time.monotonic()
     with pytest.raises(Unanswered, match="ended its process with signal SIGKILL"):
         confine(leave_a_child, file, "escapes")
-    assert time.monotonic() - start < 10
+    assert time.monotonic() - start < 30  # and not the minute of the child
     if sys.platform == "linux":
         assert ended(int(file.read_text()))
     else:
@@ -192,7 +195,7 @@ def test_nothing_is_left_when_python_exits():
 
 def ended(pid):
     """Whether a process ends soon."""
-    until = time.monotonic() + 10
+    until = time.monotonic() + 20
     with contextlib.suppress(psutil.NoSuchProcess):
         while psutil.Process(pid).status() != psutil.STATUS_ZOMBIE:
             if time.monotonic() > until:
