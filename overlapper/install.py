@@ -12,7 +12,8 @@ def hint(*packages: str) -> str:
 
 
 def simulator_hint() -> str:
-    """That of pybullet, which pip compiles where it has no wheel."""
+    """The hint for pybullet. conda-forge builds it for more systems and versions than PyPI has wheels for."""
     has_wheel = sys.version_info < (3, 12) and sysconfig.get_platform() == "linux-x86_64"
-    where = " (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; elsewhere pip has to compile it)"
-    return hint("pybullet") + ("" if has_wheel else where)
+    where = ", or conda install -c conda-forge pybullet"
+    wheels = " (pip has wheels for CPython 3.10 and 3.11 on Linux x86-64, and compiles it elsewhere)"
+    return hint("pybullet") + where + ("" if has_wheel else wheels)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 from typing import Annotated, Any, NoReturn
 
@@ -21,7 +22,9 @@ from overlapper.cli.view import view
 from overlapper.cli.watch import watch
 from overlapper.scenes.scene import headline, scene_paths
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(
+    add_completion=False, pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]}
+)
 
 
 def main() -> NoReturn:
@@ -77,7 +80,12 @@ def scenes() -> None:
         say(f"{name:22}{headline(path)}")
 
 
+def reflowed(text: str) -> str:
+    """The text with each paragraph on one line. The help is then broken at the margin only."""
+    return "\n\n".join(" ".join(paragraph.split("\n")) for paragraph in inspect.cleandoc(text).split("\n\n"))
+
+
 # Options behind the path of the script belong to the script.
-app.command(context_settings={"allow_interspersed_args": False})(watch)
+app.command(context_settings={"allow_interspersed_args": False}, help=reflowed(watch.__doc__ or ""))(watch)
 for command in (scenes, run, sweep, view, check, diff, intersect, clashes, shapes, audit, stability, chart):
-    app.command()(command)
+    app.command(help=reflowed(command.__doc__ or ""))(command)

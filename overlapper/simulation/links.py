@@ -115,6 +115,8 @@ class LinkContacts(Tabular, list[LinkContact]):
 
 def link_contacts(contacts: Iterable[Contact]) -> LinkContacts:
     """The contacts that `Bodies.overlaps` found, per pair of links, sorted by (bodyA, linkA, bodyB, linkB)."""
+    if not isinstance(contacts, Iterable):
+        raise TypeError(f"contacts must be what Bodies.overlaps() returns, not {contacts!r}")
     ordered = sorted(contacts, key=lambda each: (*_links(each), each.shapeA, each.shapeB))
     pairs = [LinkContact(*links, (each := tuple(group)), _union(each)) for links, group in groupby(ordered, _links)]
     return LinkContacts(pairs, contacts.names if isinstance(contacts, Contacts) else None)

@@ -8,12 +8,12 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
 
 from overlapper.simulation.bodies import AnyBodies
+from overlapper.simulation.contacts import Contacts
 from overlapper.tables.outputs import StepTable
 from overlapper.tables.table_file import origin
 
 if TYPE_CHECKING:
     from overlapper.simulation import Forces
-    from overlapper.simulation.contacts import Contacts
 
 
 class Log:
@@ -34,8 +34,8 @@ class Log:
     end of the `with`, or by `close()`, also if Ctrl-C or sys.exit() ends the loop. It stays where it is after an error,
     and when the process is killed, and is a table like any other; `unfinished` says where. Parquet grows as CSV, too.
 
-    ValueError for another ending or `per`, or without bodies, OSError if there can be no such file, ImportError without
-    the library that writes it.
+    ValueError for another ending or `per`, TypeError without bodies, OSError if there can be no such file, ImportError
+    without the library that writes it.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Log:
         **settings: Any,
     ) -> None:
         if not isinstance(bodies, AnyBodies):
-            raise ValueError(f"bodies must be the Bodies of a simulation, not {bodies!r}")
+            raise TypeError(f"bodies must be the Bodies of a simulation, not {bodies!r}")
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         self.steps = 0
         """The number of the last step added."""
@@ -71,6 +71,8 @@ class Log:
         """
         if self._table is None:
             raise ValueError(f"this Log is closed: {contacts!r} came too late")
+        if not isinstance(contacts, Contacts):
+            raise TypeError(f"contacts must be what Bodies.overlaps() returns, not {contacts!r}")
         if forces is not None and not self._forces:
             raise ValueError("this Log has no columns of forces: say Log(..., forces=True)")
         step = self.steps + 1 if step is None else step

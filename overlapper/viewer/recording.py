@@ -15,6 +15,7 @@ import math
 import pickle
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,8 @@ class Recording:
         `time` in seconds must increase from call to call; the page counts from the first. Frames with a `name` are no
         moments of one run: the page shows their names in the place of times.
         """
+        if not isinstance(time, Real):
+            raise TypeError(f"time must be a number of seconds, not {time!r}")
         if self._stage is None or self._framing is None:
             self._framing = Framing(bodies)
             self._stage = Stage(self._framing, *self._looks.values())

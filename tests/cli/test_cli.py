@@ -71,8 +71,9 @@ def scene_file(tmp_path, monkeypatch):
     (tmp_path / "two_cubes.py").write_text(TWO_CUBES)
 
 
-def overlapper(*arguments):
-    return subprocess.run([sys.executable, "-m", "overlapper", *arguments], capture_output=True, text=True, timeout=60)
+def overlapper(*arguments, **environment):
+    command = [sys.executable, "-m", "overlapper", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, env={**os.environ, **environment})
 
 
 def refusal(*arguments):
@@ -101,6 +102,11 @@ def test_help_shows_examples_and_a_bare_command_prints_help():
     assert "overlapper watch --html mine.html my_script.py" in overlapper().stdout
     assert "--html my_scene.html" in overlapper("run", "--help").stdout
     assert "overlapper watch --direct my_script.py" in overlapper("watch", "--help").stdout
+
+
+def test_help_is_broken_at_the_margin_only_and_has_a_short_name():
+    text = overlapper("run", "-h", COLUMNS="200", TERMINAL_WIDTH="200").stdout
+    assert "which fills a pybullet client. It may return a function step(i), which is called before" in text
 
 
 def test_scenes_are_listed_with_what_happens_in_them():
@@ -334,7 +340,7 @@ def test_a_bad_option_is_refused_in_one_sentence(arguments, words):
     [
         ("typer", [], "typer rich"),
         ("rich", [], "typer rich"),
-        ("pybullet", [], "pybullet"),
+        ("pybullet", [], "pybullet, or conda install -c conda-forge pybullet"),
         ("fcl", ["--check", "fcl"], "python-fcl"),
         ("meshcat", ["--html", "two.html"], "meshcat"),
         ("pyarrow", ["--out", "two.parquet"], "pyarrow"),
@@ -484,7 +490,7 @@ def test_names_reach_no_terminal_with_their_escapes(tmp_path):
     (tmp_path / "scenes").mkdir()
     (tmp_path / "scenes" / "blue.py").write_text('"""In \x1b[34mblue."""')
     for command in (
-        ["shapes", "red.urdf"],
+        ["shapes", "\x1b[31m.urdf"],
         ["run", "red.py", "--out", "red.csv"],
         ["run", "bad.py"],
         ["view", "\x1b[31m.csv"],

@@ -174,6 +174,11 @@ def test_frames_must_come_in_the_order_of_time(tmp_path):
         recording.add(hand_at(0.2), [], time=0.5)
 
 
+def test_a_time_that_is_not_a_number_is_refused():
+    with pytest.raises(TypeError, match=r"^time must be a number of seconds, not 'first'$"):
+        Recording().add(hand_at(0.3), [], "first")
+
+
 def test_a_recording_without_frames_is_not_saved(tmp_path):
     with pytest.raises(ValueError, match="add at least one frame"):
         Recording().save(tmp_path / "empty.html")

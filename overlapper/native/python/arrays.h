@@ -115,8 +115,10 @@ inline Vec3 to_vec3(nb::handle value, const std::string& name) {
   return {array.data()[0], array.data()[1], array.data()[2]};
 }
 
+/// Four numbers, or a rotation of scipy.
 inline Quaternion to_quaternion(nb::handle value) {
-  const Doubles array = to_doubles(value, "orientation", "a quaternion (x, y, z, w)");
+  const nb::object numbers = nb::hasattr(value, "as_quat") ? value.attr("as_quat")() : nb::borrow(value);
+  const Doubles array = to_doubles(numbers, "orientation", "a quaternion (x, y, z, w)");
   if (array.ndim() != 1 || array.shape(0) != 4)
     fail("orientation", "must be a quaternion (x, y, z, w), not an array of shape " + shape_text(array));
   return {array.data()[0], array.data()[1], array.data()[2], array.data()[3]};

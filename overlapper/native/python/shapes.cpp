@@ -20,6 +20,11 @@ bool try_shapes(nb::handle value, Shape& shape, std::variant<Types...>*) {
 
 bool is_shape(nb::handle value, Shape& shape) { return try_shapes(value, shape, static_cast<Shape*>(nullptr)); }
 
+bool is_body(nb::handle value) {
+  Shape shape;
+  return nb::isinstance<Placed>(value) || is_shape(value, shape);
+}
+
 }  // namespace
 
 nb::object to_python(const Shape& shape) {
@@ -32,10 +37,13 @@ Shape to_shape(nb::handle value, const std::string& name) {
   if (nb::isinstance<Placed>(value))
     throw nb::type_error((name + " must be a bare shape, it is already placed").c_str());
   const bool array_like = PySequence_Check(value.ptr()) || nb::hasattr(value, "__array__");
-  if (!array_like || nb::isinstance<nb::str>(value) || nb::isinstance<nb::bytes>(value))
-    throw nb::type_error((name + " must be a shape or an (n, 3) array of points, not " +
-                          nb::cast<std::string>(value.type().attr("__name__")))
-                             .c_str());
+  if (!array_like || nb::isinstance<nb::str>(value) || nb::isinstance<nb::bytes>(value)) {
+    const std::string type = nb::cast<std::string>(value.type().attr("__name__"));
+    const std::string hint = nb::hasattr(value, "vertices") ? ": Hull(mesh.vertices) makes a shape of a mesh" : "";
+    throw nb::type_error((name + " must be a shape or an (n, 3) array of points, not " + type + hint).c_str());
+  }
+  if (nb::isinstance<nb::sequence>(value) && nb::len(value) > 0 && is_body(value[0]))
+    throw nb::type_error((name + " must be one shape, not a list of shapes: overlap(*shapes) takes a list").c_str());
   const std::vector<Vec3> points = to_rows(value, name);
   return unlocked([&] { return make_hull(points); });
 }
@@ -308,13 +316,36 @@ void define(nb::module_& m, const RoundedHull*) {
       nb::sig("def __setstate__(self, state: tuple[object, ...]) -> None"));
 }
 
+/// The pose of a homogeneous matrix. The quaternion is made of its largest component, which loses no digits.
+std::pair<Vec3, Quaternion> to_pose(nb::handle value) {
+  constexpr double kMostSkew = 1e-6;
+  const Doubles array = to_doubles(value, "matrix", "an array of numbers of shape (4, 4)");
+  if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4)
+    fail("matrix", "must be an array of numbers of shape (4, 4), not of shape " + shape_text(array));
+  const auto at = [&](int row, int column) { return array.data()[4 * row + column]; };
+  const Vec3 x{at(0, 0), at(1, 0), at(2, 0)}, y{at(0, 1), at(1, 1), at(2, 1)}, z{at(0, 2), at(1, 2), at(2, 2)};
+  const bool turns = norm(cross(x, y) - z) <= kMostSkew && norm(cross(y, z) - x) <= kMostSkew &&
+                     norm(cross(z, x) - y) <= kMostSkew && std::abs(norm(x) - 1) <= kMostSkew;
+  if (!turns) fail("matrix", "must have a rotation in its first three rows and columns");
+  if (!(at(3, 0) == 0 && at(3, 1) == 0 && at(3, 2) == 0 && at(3, 3) == 1))
+    fail("matrix", "must have the last row (0, 0, 0, 1)");
+  const double trace = x.x + y.y + z.z;
+  const double largest = std::max({trace, x.x, y.y, z.z});
+  Quaternion q;
+  if (largest == trace) q = {y.z - z.y, z.x - x.z, x.y - y.x, 1 + trace};
+  else if (largest == x.x) q = {1 + x.x - y.y - z.z, x.y + y.x, z.x + x.z, y.z - z.y};
+  else if (largest == y.y) q = {x.y + y.x, 1 - x.x + y.y - z.z, y.z + z.y, z.x - x.z};
+  else q = {z.x + x.z, y.z + z.y, 1 - x.x - y.y + z.z, x.y - y.x};
+  return {{at(0, 3), at(1, 3), at(2, 3)}, unit(q)};
+}
+
 void define_placed(nb::module_& m) {
   nb::class_<Placed> placed(m, "Placed",
                             R"(A shape and where it is in the world.
 
-position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0. The body is turned
-by what the numbers say as given, M(q) / |q|² without rounding; the attribute `orientation` is divided by the length,
-which rounds.)");
+position is (3,) in m. orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0, or a
+scipy.spatial.transform.Rotation. The body is turned by M(q) / |q|² for the quaternion as given, without rounding. The
+attribute `orientation` is divided by the length, which rounds.)");
   placed.def(
       "__init__",
       [](Placed* self, nb::handle shape, nb::handle position, nb::handle orientation) {
@@ -327,6 +358,19 @@ which rounds.)");
                " | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), "
                "orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None")
                   .c_str()));
+  placed.def_static(
+      "from_matrix",
+      [](nb::handle shape, nb::handle matrix) {
+        const auto [position, orientation] = to_pose(matrix);
+        return make_placed(to_shape(shape, "shape"), position, orientation);
+      },
+      "shape"_a.none(), "matrix"_a.none(),
+      nb::sig(("def from_matrix(shape: " + any_shape() +
+               " | numpy.typing.ArrayLike, matrix: numpy.typing.ArrayLike) -> Placed")
+                  .c_str()),
+      R"(A shape placed by a homogeneous matrix (4, 4), as of trimesh: a rotation, and a position in m.
+
+ValueError if the matrix scales, shears or mirrors by more than 1e-6, or if its last row is not (0, 0, 0, 1).)");
   placed.def_prop_ro(
       "shape", [](const Placed& p) { return to_python(p.shape); },
       nb::sig(("def shape(self) -> " + any_shape()).c_str()));

@@ -84,6 +84,8 @@ class VolumetricContact:
         friction: float | OfPair | Literal["distributed"] | None = None,
         substeps: int | Literal["auto"] = "auto",
     ) -> None:
+        if not isinstance(bodies, AnyBodies):
+            raise TypeError(f"bodies must be the Bodies of a simulation, not {bodies!r}")
         self.bodies = bodies
         among: Among = "simulated" if pairs is None else pairs
         self._among: Among = among if isinstance(among, str) else listed(among)

@@ -6,6 +6,7 @@ import re
 import signal
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -366,6 +367,10 @@ def test_a_bad_argument_is_named(change, sentence):
 def test_an_argument_that_is_not_a_shape_is_named():
     with pytest.raises(TypeError, match=re.escape("shapes[1] must be a shape or an (n, 3) array of points, not str")):
         overlaps([Sphere(1), "ball"], *POSES)
+    with pytest.raises(TypeError, match=r"^shapes\[0\] must be one shape, not a list of shapes: overlap\(\*shapes\)"):
+        overlap([Sphere(1), Placed(Sphere(1))])
+    with pytest.raises(TypeError, match=r"not SimpleNamespace: Hull\(mesh\.vertices\) makes a shape of a mesh$"):
+        overlap(Sphere(1), SimpleNamespace(vertices=POSES[0]))
     with pytest.raises(TypeError, match="shapes must be a sequence"):
         Batch(7)
     with pytest.raises(TypeError, match="threads must be a whole number, or None"):

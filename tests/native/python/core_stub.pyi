@@ -358,12 +358,20 @@ class Placed:
     """
     A shape and where it is in the world.
 
-    position is (3,) in m; orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0. The body is turned
-    by what the numbers say as given, M(q) / |q|² without rounding; the attribute `orientation` is divided by the length,
-    which rounds.
+    position is (3,) in m. orientation is a quaternion (x, y, z, w) as in pybullet, of any length but 0, or a
+    scipy.spatial.transform.Rotation. The body is turned by M(q) / |q|² for the quaternion as given, without rounding. The
+    attribute `orientation` is divided by the length, which rounds.
     """
 
     def __init__(self, shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike, position: numpy.typing.ArrayLike = (0, 0, 0), orientation: numpy.typing.ArrayLike = (0, 0, 0, 1)) -> None: ...
+
+    @staticmethod
+    def from_matrix(shape: Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid | numpy.typing.ArrayLike, matrix: numpy.typing.ArrayLike) -> Placed:
+        """
+        A shape placed by a homogeneous matrix (4, 4), as of trimesh: a rotation, and a position in m.
+
+        ValueError if the matrix scales, shears or mirrors by more than 1e-6, or if its last row is not (0, 0, 0, 1).
+        """
 
     @property
     def shape(self) -> Sphere | Box | Capsule | Cylinder | Hull | HalfSpace | RoundedHull | Ellipsoid: ...

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 from fractions import Fraction
 
 import exact
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 from strategies import (
     directions,
     hull_points,
@@ -28,6 +30,7 @@ from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, Sphere
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 AXES = np.eye(3)
+CUBE = Box([0.5, 0.5, 0.5])
 EPS = np.finfo(float).eps
 
 
@@ -274,6 +277,33 @@ def test_placed_stands_at_the_origin_by_default():
     body = Placed(Sphere(1))
     assert_array_equal(body.position, [0, 0, 0])
     assert_array_equal(body.orientation, [0, 0, 0, 1])
+
+
+@given(quaternions())
+def test_a_matrix_and_a_rotation_of_scipy_place_as_their_quaternion(q):
+    turned = Rotation.from_quat(q)
+    assert_array_equal(Placed(CUBE, (1, 2, 3), turned).given_orientation, turned.as_quat())
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turned.as_matrix(), (1, 2, 3)
+    found, unit = Placed.from_matrix(CUBE, matrix), turned.as_quat()
+    assert_array_equal(found.position, (1, 2, 3))
+    assert_allclose(found.orientation * np.sign(found.orientation @ unit), unit, rtol=0, atol=8 * EPS)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "sentence"),
+    [
+        (np.eye(3), r"matrix must be an array of numbers of shape (4, 4), not of shape (3, 3)"),
+        ("turn", "matrix must be an array of numbers of shape (4, 4)"),
+        (np.diag([1, 1, 1.1, 1]), "matrix must have a rotation in its first three rows and columns"),
+        (np.diag([1, 1, -1, 1]), "matrix must have a rotation in its first three rows and columns"),
+        (np.full((4, 4), np.nan), "matrix must have a rotation in its first three rows and columns"),
+        (np.diag([1, 1, 1, 2]), "matrix must have the last row (0, 0, 0, 1)"),
+    ],
+)
+def test_a_matrix_that_is_not_a_pose_is_refused(matrix, sentence):
+    with pytest.raises(ValueError, match=f"^{re.escape(sentence)}$"):
+        Placed.from_matrix(CUBE, matrix)
 
 
 @given(placed(solids))

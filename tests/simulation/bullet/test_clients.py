@@ -132,15 +132,15 @@ def test_no_file_is_left_behind(client, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-MISSING = "overlapper.simulation needs pybullet: pip install pybullet"
+MISSING = "overlapper.simulation needs pybullet: pip install pybullet, or conda install -c conda-forge pybullet"
 
 
 @pytest.mark.parametrize(
     ("system", "said"),
     {
         "linux-x86_64": MISSING,
-        "macosx-11.0-arm64": f"{MISSING} (it has wheels for CPython 3.10 and 3.11 on Linux x86-64; "
-        "elsewhere pip has to compile it)",
+        "macosx-11.0-arm64": f"{MISSING} (pip has wheels for CPython 3.10 and 3.11 on Linux x86-64, "
+        "and compiles it elsewhere)",
     }.items(),
 )
 def test_a_missing_pybullet_is_one_clear_sentence(system, said):
