@@ -1,31 +1,42 @@
 """The cost of a sweep beside the runs themselves, and how much faster two cores are than one.
 
     python benchmarks sweep [ROUNDS]
+    python benchmarks sweep 0 --empty 1000000 [--engine ray]
 
 Overhead, by the processor's time, which is much the same when others are at work on the machine: in a worker, runs of a
 scene of one ball and one step alternate with the same as tasks, and the median of their differences is told; in the
 parent, all that it does for a task of a sweep; and by the clock, an item that needs no work.
 Scaling: tasks of the grasp scene by one worker and by two, in turns, by the clock from the first tasks done on. Medians
 of the rounds, the least and the largest.
+
+With --empty, so many tasks that need no work are swept and summed up, and once more, when nothing is left to do: the
+processor's time of the parent for each, and its largest memory.
 """
 
 from __future__ import annotations
 
+import os
 import resource
+import sys
 import tempfile
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from harness.command import ROOT
 from harness.timing import timed
+from overlapper.jobs.cluster import Cluster
+from overlapper.jobs.executor import Executor, Shared, outcomes
 from overlapper.jobs.hand import Job
 from overlapper.jobs.processes import Processes
 from overlapper.scenes.run import run
+from overlapper.sweep import page, tasks
+from overlapper.sweep.measures import Measures
 from overlapper.sweep.points import Space
 from overlapper.sweep.study import Study, Task
 from overlapper.sweep.sweep import Progress, Sweep
@@ -37,7 +48,7 @@ import pybullet as p
 STEPS = 1
 
 
-def build(client, *, seed=0):
+def build(client, *, mass=1.0, seed=0):
     ball = p.createCollisionShape(p.GEOM_SPHERE, radius=0.1, physicsClientId=client)
     p.createMultiBody(1, ball, physicsClientId=client)
 '''
@@ -98,9 +109,57 @@ def nothing(setup: None) -> Callable[[int], int]:
     return lambda item: item
 
 
+gathered = tasks.gathered  # of the same module as the job
+
+
+def empty(study: Study) -> Callable[[Task], dict[str, Any]]:
+    """A job whose tasks take no time, and differ in what they came to."""
+    row = Measures().row() | {"steps": 1, "time_s": 1 / 240}
+    return lambda task: {"tasks": row | {"largest_volume_m3": 1e-9 * (task.number % 1013)}}
+
+
+@dataclass
+class OfNothing:
+    """An executor whose tasks are empty, whatever they were."""
+
+    engine: Executor
+    workers: int = 1
+
+    def shares(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Generator[Shared, None, None]:
+        return self.engine.shares(replace(job, module=__name__, prepare=empty.__name__), items, limit)
+
+
+def driver(count: int, engine: Executor) -> None:
+    """Tell what so many empty tasks cost the parent."""
+    side = max(round(count**0.5), 1)
+    with tempfile.TemporaryDirectory() as folder:
+        scene = Path(folder, "empty.py")
+        scene.write_text(EMPTY, encoding="utf-8")
+        for words in ("swept", "nothing left to do"):
+            before, clock = time.process_time(), time.perf_counter()
+            study = Study.of(scene, 1)
+            space = Space(study.scene, study.loaded().parameters)
+            sweep = Sweep(study, space.crossed([space.grid(f"mass=0.1:10:{side}"), space.seeds(count // side)]))
+            with sweep.opened(Path(folder, "runs")) as store:
+                reached = sweep.run(store, OfNothing(engine))
+                page.write(sweep, store, "empty.py")
+            spent, passed = time.process_time() - before, time.perf_counter() - clock
+            there = reached.before + reached.done
+            print(
+                f"{words}: {there:,} of {len(sweep):,} tasks, {1e6 * spent / len(sweep):.0f} µs each in the parent,",
+                end=" ",
+            )
+            print(f"{passed:.0f} s in all, at most {most_memory():.0f} MB", flush=True)
+
+
+def most_memory() -> float:
+    """MB that this process has had at most."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
 def there_and_back(count: int) -> float:
     """Seconds per item by the clock."""
-    found = Processes(1).outcomes(Job(__name__, "nothing", None), range(count))
+    found = outcomes(Processes(1), Job(__name__, "nothing", None), range(count))
     next(found)
     return timed(lambda: list(found), time.perf_counter) / (count - 1)
 
@@ -109,9 +168,16 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument("rounds", nargs="?", type=int, default=5)
     parser.add_argument("--tasks", type=int, default=200, help="of the empty scene")
     parser.add_argument("--grasps", type=int, default=60, help="of the grasp scene")
+    parser.add_argument("--empty", type=int, default=0, help="tasks that need no work")
+    parser.add_argument("--engine", choices=("processes", "ray"), default="processes", help="of the empty tasks")
+    parser.add_argument("--address", help="of the Ray cluster")
 
 
 def main(chosen: Namespace) -> None:
+    if chosen.empty:
+        # What Ray starts must find this module, too.
+        os.environ["PYTHONPATH"] = os.pathsep.join(sys.path)
+        driver(chosen.empty, Cluster(chosen.address) if chosen.engine == "ray" else Processes())
     grasp = ROOT / "scenes" / "franka_grasp.py"
     with tempfile.TemporaryDirectory() as folder:
         empty = Path(folder, "empty.py")

@@ -15,7 +15,7 @@ from overlapper.audit.pairs import LinkPair
 from overlapper.audit.robot import Robot, shape_keys
 from overlapper.audit.sampling import Sampling
 from overlapper.audit.tally import Array, Tally
-from overlapper.jobs.executor import Executor
+from overlapper.jobs.executor import Executor, outcomes
 from overlapper.jobs.hand import Failed, Job
 from overlapper.simulation.contacts import Contacts
 from overlapper.simulation.links import LinkContact, link_contacts
@@ -118,7 +118,7 @@ def _tallies(examiner: Examiner, engine: Executor | None) -> Iterator[Tally]:
         yield from map(examiner, blocks)
         return
     job = Job("overlapper.audit.examiner", "prepared", examiner.setup)
-    for block, outcome in engine.outcomes(job, blocks):
+    for block, outcome in outcomes(engine, job, blocks):
         if isinstance(outcome, Failed):
             raise RuntimeError(f"configurations of block {block}: {outcome.sentence}\n{outcome.traceback}")
         yield outcome.value

@@ -91,14 +91,15 @@ def _in_turn(pages: Mapping[Path, Path], record: bool) -> Generator[_Held, None,
 
 def _at_once(pages: Mapping[Path, Path], record: bool, workers: int | None) -> Generator[_Held, None, None]:
     """As _in_turn, in the same order, by several processes."""
+    from overlapper.jobs.executor import outcomes
     from overlapper.jobs.hand import Done, Job, Outcome
     from overlapper.jobs.processes import Processes
 
     job = Job(__name__, prepared.__name__, record)
     found: dict[int, Outcome] = {}
     told = 0
-    with closing(Processes(workers).outcomes(job, [*pages.items()])) as outcomes:
-        for number, outcome in outcomes:
+    with closing(outcomes(Processes(workers), job, [*pages.items()])) as done:
+        for number, outcome in done:
             found[number] = outcome
             while told in found:
                 ready = found.pop(told)

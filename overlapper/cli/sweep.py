@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from overlapper.jobs.executor import Executor
     from overlapper.sweep.comparison import Comparison
     from overlapper.sweep.left_out import LeftOut
-    from overlapper.sweep.points import Point, Space
+    from overlapper.sweep.points import Axis, Space
     from overlapper.sweep.store import Store
     from overlapper.sweep.sweep import Progress as Reached
     from overlapper.sweep.sweep import Sweep
@@ -42,7 +42,7 @@ class Axes:
     ranges: list[str] | None
     sample_seed: int
 
-    def of(self, space: Space) -> list[list[Point]]:
+    def of(self, space: Space) -> list[Axis]:
         """The points of each axis, seeds last."""
         axes = [space.read(self.points)] if self.points else []
         axes += [space.samples(self.sample, self.ranges or [], self.sample_seed)] if self.sample else []
@@ -162,11 +162,11 @@ def sweep(
         working = stack.enter_context(engine)
         reached, finished = _run(todo, store, working, limit, memory, retry)
         compared = recorded.compare(store) if recorded and finished else None
-        done = store.done & todo.tasks.keys()
-        left_out = LeftOut.of(todo, store.rows("tasks"))
-        shown = page.write(todo, store, scene, pages, comparison=compared) if done else None
-        failures = store.rows("failures")
-    _tell(todo, store, reached, finished, failures, left_out, compared, shown, as_json)
+        left_out = LeftOut.of(todo, store)
+        shown = page.write(todo, store, scene, pages, comparison=compared)
+        failed = store.columns("failures", todo, [])[0].tolist()
+        failures = store.rows_of("failures", todo, failed if as_json else failed[:FAILURES_SHOWN], but="traceback")
+    _tell(todo, store, reached, finished, len(failed), failures, left_out, compared, shown, as_json)
 
 
 def _kept(text: str) -> int:
@@ -186,7 +186,7 @@ def _run(
     from overlapper.sweep.sweep import Progress as Reached
 
     console = Console(stderr=True)
-    reached = Reached(len(todo.tasks))
+    reached = Reached(len(todo))
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -195,7 +195,7 @@ def _run(
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        bar = progress.add_task(todo.study.scene, total=len(todo.tasks), rate="")
+        bar = progress.add_task(todo.study.scene, total=len(todo), rate="")
 
         def heard(now: Reached) -> None:
             nonlocal reached
@@ -219,6 +219,7 @@ def _tell(
     store: Store,
     reached: Reached,
     finished: bool,
+    failed: int,
     failures: list[dict[str, Any]],
     left_out: LeftOut,
     compared: Comparison | None,
@@ -226,7 +227,6 @@ def _tell(
     as_json: bool,
 ) -> None:
     """Report the result of the sweep, and exit with its code."""
-    failures = [row for row in failures if row["task"] in todo.tasks]
     if as_json:
         told = {
             "scene": todo.study.scene,
@@ -238,7 +238,8 @@ def _tell(
             "there_before": reached.before,
             "done": reached.done,
             "missing": reached.missing,
-            "failed": [{name: row[name] for name in row if name != "traceback"} for row in failures],
+            "failed": failures,
+            "broken": [str(path) for path in store.broken],
             "skipped": left_out.skipped,
             "diverged": left_out.diverged,
             "finished": finished,
@@ -256,13 +257,15 @@ def _tell(
     else:
         before = f", {reached.before:,} of them before" if reached.before else ""
         say(f"{todo.study.scene}: {reached.before + reached.done:,} of {reached.total:,} tasks are done{before}.")
+        for path in store.broken:
+            say(f"Not as it was written, and so done again: {path}")
         for line in left_out.lines():
             say(line)
-        for row in failures[:FAILURES_SHOWN]:
+        for row in failures:
             say(f"Failed: {_point(todo, row)}: {row['sentence']}")
-        if len(failures) > FAILURES_SHOWN:
-            say(f"and {len(failures) - FAILURES_SHOWN:,} more")
-        if failures:
+        if failed > FAILURES_SHOWN:
+            say(f"and {failed - FAILURES_SHOWN:,} more")
+        if failed:
             say(f"Tracebacks: {store.path('failures')}; --retry does them again")
         if not finished:
             say("Interrupted; the same command goes on with what is missing.")
@@ -270,13 +273,13 @@ def _tell(
             say(line)
         for path in filter(None, (store.path("tasks") if page else None, page)):
             say(f"Written: {path}")
-    wrong = bool(failures or left_out)
+    wrong = bool(failed or left_out)
     if compared:
-        wrong = bool(compared.moved or {row["task"] for row in failures} - compared.failures)
+        wrong = bool(compared.moved or failed > len(compared.failures))
     raise typer.Exit(130 if not finished else int(wrong))
 
 
 def _point(todo: Sweep, row: dict[str, Any]) -> str:
     from overlapper.scenes.parameters import described
 
-    return described(todo.tasks[row["task"]].parameters) or todo.study.scene
+    return described({name: row[name] for name in todo.points[0]}) or todo.study.scene

@@ -1,27 +1,38 @@
-"""The executor of many machines: shares of items as tasks of Ray, each done by a hand beside Ray's own process.
+"""The executor of many machines: shares of items as tasks of Ray, each done by hands beside Ray's own process.
 
-What raises, hangs or dies of an item is the hand's business, as on one machine. A node that is lost loses the shares
-that were under way there, and these are sent once more.
+What raises, hangs or dies of an item is the business of a hand, as on one machine. A node that is lost loses the shares
+that were under way there, and these are sent once more. On a large cluster a share is for several CPUs of a node, and
+lasts longer: whoever started the job has to do with hundreds of shares at a time, and with hundreds a second.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import os
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
+from operator import itemgetter
+from statistics import median_low
 from typing import Any
 
 from overlapper.install import hint
-from overlapper.jobs.executor import Found
+from overlapper.jobs.executor import Shared
 from overlapper.jobs.hand import Done, Hand, Job, Outcome
+from overlapper.jobs.processes import SHARE as SHARE_OF_A_HAND
 from overlapper.jobs.shares import Shares
 from overlapper.jobs.worker import NotStarted
 from overlapper.printable import first_line
 
 SHARE = 1.0  # s of work that are sent at once: a task of Ray costs some milliseconds
+RATE = 100  # shares that come back in a second, at most: on more crews, shares last longer
 
-# Shares that may be lost one after the other, for each worker: no more nodes than that die without a cause.
-LOSSES = 10
+CREWS = 500  # shares that are done at a time, at most: on more CPUs, each is for several
+
+# Shares that may be lost before the first one is done: beyond, the installation is broken. Later, as many more as are
+# sent: a large part of the cluster may go at once.
+LOSSES = 20
 
 
 class Cluster:
@@ -49,38 +60,44 @@ class Cluster:
         """How many at a time, as the cluster is now."""
         return self._asked or max(int(self._ray.cluster_resources().get("CPU", 1)), 1)
 
-    def outcomes(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Found:
+    def _crew(self) -> int:
+        """The CPUs for a share: as many as keep the number of shares small, and as most nodes have."""
+        cpus = [int(node["Resources"].get("CPU", 0)) for node in self._ray.nodes() if node["Alive"]]
+        most = median_low([each for each in cpus if each] or [1])
+        return min(math.ceil(self.workers / CREWS), most)
+
+    def shares(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Generator[Shared, None, None]:
         """See Executor."""
-        ray = self._ray
+        ray, crew = self._ray, self._crew()
+        crews = max(self.workers // crew, 1)
         # Those that are lost are sent anew by us, who know what has arrived.
-        remote = ray.remote(num_cpus=1, max_retries=0)(_work)
-        shares = Shares(len(items), self.workers, SHARE)
+        remote = ray.remote(num_cpus=crew, max_retries=0)(_work)
+        shares = Shares(len(items), crews, crew * max(SHARE, crews / RATE), crew)
         under_way: dict[Any, list[int]] = {}
-        losses = 0
+        losses, done = 0, False
+        sent = ray.put(job)
         try:
             while True:
                 # One share more than can be done, so that nobody waits for the next.
-                while len(under_way) < 2 * self.workers and (share := shares.take()):
-                    under_way[remote.remote(job, [items[number] for number in share], limit)] = share
+                while len(under_way) < 2 * max(self.workers // crew, 1) and (share := shares.take()):
+                    under_way[remote.remote(sent, [items[number] for number in share], limit, crew)] = share
                 if not under_way:
                     return
-                for ready in ray.wait([*under_way], num_returns=1)[0]:
+                for ready in ray.wait([*under_way], num_returns=min(len(under_way), RATE), timeout=0.1)[0]:
                     share = under_way.pop(ready)
                     try:
-                        outcomes: list[Outcome] = ray.get(ready)
+                        gathered, count, seconds = ray.get(ready)
                     except ray.exceptions.RayTaskError as error:
                         raise NotStarted(first_line(error.cause)) from error
                     except ray.exceptions.RayError as error:
                         losses += 1
-                        if losses > LOSSES * self.workers:
+                        if losses > LOSSES + done * 2 * crews:
                             raise NotStarted(f"the cluster loses what it is given: {first_line(error)}") from error
                         shares.give_back(share)
                         continue
-                    losses = 0
-                    for number, outcome in zip(share, outcomes):
-                        if isinstance(outcome, Done):
-                            shares.learn(1, outcome.seconds)
-                        yield number, outcome
+                    losses, done = 0, True
+                    shares.learn(count, seconds)
+                    yield share, gathered
         finally:
             for reference in under_way:
                 ray.cancel(reference, force=True)
@@ -90,14 +107,47 @@ class Cluster:
         self._ray.shutdown()
 
 
-_hand: tuple[Job, float | None, Hand] | None = None
+class _Crew:
+    """The hands of a process of Ray's, which are kept for the next share. Their threads are, too: a hand ends with the
+    thread that has started it."""
+
+    def __init__(self, job: Job, limit: float | None, count: int) -> None:
+        self.job, self.limit, self.count = job, limit, count
+        self._hands = [Hand(job, limit) for _ in range(count)]
+        self._threads = ThreadPoolExecutor(count)
+
+    def work(self, items: Sequence[Any]) -> list[Outcome]:
+        """The outcome of each item."""
+        shares = Shares(len(items), self.count, SHARE_OF_A_HAND)
+
+        def serve(hand: Hand) -> list[tuple[int, Outcome]]:
+            found: list[tuple[int, Outcome]] = []
+            while share := shares.take():
+                for number, outcome in zip(share, hand.work([items[number] for number in share])):
+                    found.append((number, outcome))
+                    if isinstance(outcome, Done):
+                        shares.learn(1, outcome.seconds)
+            return found
+
+        return [outcome for _, outcome in sorted(chain(*self._threads.map(serve, self._hands)), key=itemgetter(0))]
+
+    def close(self) -> None:
+        """End the processes."""
+        for hand in self._hands:
+            hand.close()
+        self._threads.shutdown()
 
 
-def _work(job: Job, items: Sequence[Any], limit: float | None) -> list[Outcome]:
-    """A share, in a process of Ray's, which keeps its hand for the next one."""
-    global _hand
-    if _hand is None or _hand[:2] != (job, limit):
-        if _hand:
-            _hand[2].close()
-        _hand = job, limit, Hand(job, limit)
-    return [*_hand[2].work(items)]
+_crew: _Crew | None = None
+
+
+def _work(job: Job, items: Sequence[Any], limit: float | None, hands: int) -> tuple[Any, int, float]:
+    """A share: what the job gathers of it, how many items were done, and the seconds that they took."""
+    global _crew
+    if _crew is None or (_crew.job, _crew.limit, _crew.count) != (job, limit, hands):
+        if _crew:
+            _crew.close()
+        _crew = _Crew(job, limit, hands)
+    outcomes = _crew.work(items)
+    seconds = [outcome.seconds for outcome in outcomes if isinstance(outcome, Done)]
+    return job.gathered([*zip(items, outcomes)]), len(seconds), sum(seconds)

@@ -41,14 +41,23 @@ class Job:
     """The function to call with every item. `prepare`, named by module and name, makes it from `setup` in each process.
 
     It must find the same bits of an item in whatever process, after whatever others. Paths are meant from `folder`,
-    where there is such a folder. `megabytes` is the memory that a process may take beyond that of a new one, on Linux.
+    where there is such a folder. `gather`, of the same module, makes one result of `setup` and some items, each with
+    its outcome. It is called where these were done, before the result is sent. `megabytes` is the memory that a process
+    may take beyond that of a new one, on Linux.
     """
 
     module: str
     prepare: str
     setup: Any
+    gather: str | None = None
     folder: str = field(default_factory=os.getcwd)
     megabytes: int | None = None
+
+    def gathered(self, found: Sequence[tuple[Any, Outcome]]) -> Any:
+        """The result of some items; the outcomes themselves if nothing gathers them."""
+        if self.gather is None:
+            return [outcome for _, outcome in found]
+        return getattr(import_module(self.module), self.gather)(self.setup, found)
 
 
 @dataclass(frozen=True, slots=True)

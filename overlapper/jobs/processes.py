@@ -5,21 +5,21 @@ from __future__ import annotations
 import os
 import queue
 import threading
-from collections.abc import Sequence
+import time
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
-from overlapper.jobs.executor import Found
+from overlapper.jobs.executor import Shared
 from overlapper.jobs.hand import Done, Hand, Job, Outcome
 from overlapper.jobs.shares import Shares
-from overlapper.jobs.worker import NotStarted
 
 SHARE = 0.2  # s of work that are sent at once
 
 # Outcomes that may wait for whoever writes them down, so that memory is not what a slow disk fills.
 WAITING = 64
 
-Report = tuple[int, Outcome] | NotStarted
+Report = Shared | Exception
 
 
 def cores() -> int:
@@ -38,19 +38,22 @@ class Processes:
         """How many at a time."""
         return self._workers
 
-    def outcomes(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Found:
+    def shares(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Generator[Shared, None, None]:
         """See Executor."""
         hands = [Hand(job, limit) for _ in range(min(self.workers, len(items)))]
         reports: queue.Queue[Report] = queue.Queue(WAITING)
         shares = Shares(len(items), len(hands), SHARE)
-        threads = [threading.Thread(target=_serve, args=(hand, items, shares, reports), daemon=True) for hand in hands]
+        rest = job, items, shares, reports
+        threads = [threading.Thread(target=_serve, args=(hand, *rest), daemon=True) for hand in hands]
         try:
             for thread in threads:
                 thread.start()
-            for _ in items:
+            left = len(items)
+            while left:
                 report = reports.get()
-                if isinstance(report, NotStarted):
+                if isinstance(report, Exception):
                     raise report
+                left -= len(report[0])
                 yield report
         finally:
             for hand in hands:
@@ -60,17 +63,29 @@ class Processes:
                     reports.get(timeout=0.01)
 
 
-def _serve(hand: Hand, items: Sequence[Any], shares: Shares, reports: queue.Queue[Report]) -> None:
+def _serve(hand: Hand, job: Job, items: Sequence[Any], shares: Shares, reports: queue.Queue[Report]) -> None:
     try:
         while share := shares.take():
-            outcomes = hand.work([items[number] for number in share])
-            for number, outcome in zip(share, outcomes):
-                if isinstance(outcome, Done):
-                    shares.learn(1, outcome.seconds)
-                reports.put((number, outcome))
+            for found in _batches(hand, [(number, items[number]) for number in share], shares):
+                reports.put(([number for number, _, _ in found], job.gathered([each[1:] for each in found])))
             if hand.closed:
                 return
-    except NotStarted as error:
+    except Exception as error:  # whoever waits for reports must hear of it
         reports.put(error)
     finally:
         hand.close()
+
+
+def _batches(hand: Hand, share: Sequence[tuple[int, Any]], shares: Shares) -> Iterator[list[tuple[int, Any, Outcome]]]:
+    """A share done: numbers and items with their outcomes, as many at a time as have taken SHARE together."""
+    batch: list[tuple[int, Any, Outcome]] = []
+    due = time.monotonic() + SHARE
+    for (number, item), outcome in zip(share, hand.work([item for _, item in share])):
+        if isinstance(outcome, Done):
+            shares.learn(1, outcome.seconds)
+        batch.append((number, item, outcome))
+        if time.monotonic() >= due:
+            yield batch
+            batch, due = [], time.monotonic() + SHARE
+    if batch:
+        yield batch

@@ -6,13 +6,19 @@ import threading
 from collections import deque
 from collections.abc import Sequence
 
+# Items of a share, for each that its taker does at once: the outcomes of more would fill the memory.
+LARGEST = 2_000
+
 
 class Shares:
-    """Numbers of items, to be taken by several threads in shares of about `seconds`; each is in one share only."""
+    """Numbers of items, to be taken by several threads in shares of about `seconds`; each is in one share only.
 
-    def __init__(self, count: int, takers: int, seconds: float) -> None:
+    A share has `least` items, as long as there are any: those that its taker does at once.
+    """
+
+    def __init__(self, count: int, takers: int, seconds: float, least: int = 1) -> None:
         self._next, self._count, self._seconds = 0, count, seconds
-        self._takers = takers
+        self._takers, self._least = takers, least
         self._back: deque[int] = deque()
         self._done, self._spent = 0, 0.0
         self._lock = threading.Lock()
@@ -21,11 +27,11 @@ class Shares:
         """The next share, empty if there is no more."""
         with self._lock:
             left = self._count - self._next + len(self._back)
-            # Nobody is to work long when all others are through; before anything is known, a share is one item.
+            # Nobody is to work long when all others are through. Before anything is known, a share is small.
             fair = max(left // (2 * self._takers), 1)
             most = int(self._seconds * self._done / self._spent) if self._spent else 1
             share = []
-            for _ in range(min(left, max(1, min(fair, most)))):
+            for _ in range(min(left, max(self._least, min(fair, most, LARGEST * self._least)))):
                 if self._back:
                     share.append(self._back.popleft())
                 else:

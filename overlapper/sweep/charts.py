@@ -52,16 +52,16 @@ class Axis:
     log: bool = False
 
 
-def axis(name: str, values: Sequence[Any]) -> Axis:
+def axis(name: str, values: Sequence[Any] | NDArray[Any]) -> Axis:
     """The axis of a parameter with these values. There are at least two."""
-    kinds = sorted(set(values))
-    if not isinstance(kinds[0], float | int) or isinstance(kinds[0], bool):
-        at = {value: k for k, value in enumerate(kinds)}
+    values = np.asarray(values)
+    if values.dtype.kind not in "if":
+        kinds, group = np.unique(values, return_inverse=True)
         middles = np.arange(len(kinds), dtype=float)
-        return Axis(name, np.array([at[value] for value in values]), middles, _edges(middles), list(map(str, kinds)))
-    found = np.array(values, dtype=float)
+        return Axis(name, group, middles, _edges(middles), list(map(str, kinds)))
+    found = values.astype(float)
     # Ten times from the least to the largest, in steps that grow: this was meant by factors.
-    log = bool(found.min() > 0 and found.max() >= 10 * found.min() and type(kinds[0]) is float)
+    log = bool(found.min() > 0 and found.max() >= 10 * found.min() and values.dtype.kind == "f")
     scaled = np.log(found) if log else found
     middles = np.unique(scaled)
     if len(middles) > APART:
@@ -99,11 +99,15 @@ def heat_map(
     across: Axis, up: Axis, measured: Sequence[tuple[Measure, Values]], middle: Callable[[Values], Any] = np.median
 ) -> str:
     """The middle of each measure for each pair of values of two parameters; what no task has is left white."""
+    cell = up.group * len(across.middles) + across.group
+    order = np.argsort(cell, kind="stable")
+    places, begins = np.unique(cell[order], return_index=True)
+    groups = np.split(order, begins[1:])
     figure = _figure(4.2 * len(measured), 3.1)
     for axes, (measure, values) in zip(np.atleast_1d(figure.subplots(1, len(measured))), measured):
         cells = np.full((len(up.middles), len(across.middles)), np.nan)
-        for i, j in set(zip(up.group.tolist(), across.group.tolist())):
-            cells[i, j] = middle(values[(up.group == i) & (across.group == j)]) * measure.factor
+        for place, group in zip(places, groups):
+            cells.flat[place] = middle(values[group]) * measure.factor
         drawn = axes.pcolormesh(across.edges, up.edges, cells, cmap="viridis", edgecolors="face", linewidth=0.2)
         figure.colorbar(drawn, ax=axes)
         axes.set(xlabel=across.name, ylabel=up.name, title=measure.label)

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,8 @@ from numpy.typing import NDArray
 from overlapper.printable import first_line
 from overlapper.scenes.parameters import Parameter, described
 from overlapper.sweep.measures import LEFT_OUT
-from overlapper.sweep.part import FAILURES, OF, TASK, TASKS
-from overlapper.sweep.store import Store, rows_in
+from overlapper.sweep.part import FAILURES, OF, TASK, TASKS, arrow
+from overlapper.sweep.store import Store, names_of, rows_in
 from overlapper.sweep.sweep import Sweep
 from overlapper.tables.table_file import read_metadata
 from overlapper.verdicts.comparison import off_by
@@ -125,7 +126,7 @@ class Recorded:
         rows = _rows(folder)
         if not rows:
             raise ValueError(f"--check {folder}: there is no sweep in it")
-        points = [task.parameters for task in sweep.tasks.values()]
+        points = sweep.points
         self._names = [name for name in points[0] if all(name in row for row in rows)]
         self._rows = self._by_point(rows, "the sweep in it")
         if not self._rows.keys() & self._by_point(points, "this sweep").keys():
@@ -145,15 +146,17 @@ class Recorded:
 
     def compare(self, store: Store) -> Comparison:
         """The comparison of the tasks that both sweeps have, as far as the sweep has come in its store."""
-        names = self._sweep.tasks.keys()
-        rows = [row for table in (TASKS, FAILURES) for row in store.rows(table) if row[TASK] in names]
+        rows = []
+        for part in chain(store.rows(TASKS), store.rows(FAILURES)):
+            ours = self._sweep.numbers(names_of(part.column(TASK))) >= 0
+            rows += part.filter(arrow().array(ours)).to_pylist()
         found = self._by_point(rows, "this sweep")
         both = [key for key in found if key in self._rows]
         tasks = [Compared(self._rows[key], found[key], self._changes(self._rows[key], found[key])) for key in both]
         return Comparison(self._folder, tasks, len(found) - len(both), len(self._rows) - len(both))
 
     def _changes(self, was: Row, now: Row) -> list[Change]:
-        parameters = self._sweep.tasks[now[TASK]].parameters
+        parameters = {name: now[name] for name in self._sweep.points[0]}
         before, after = (row.get("what", "done") for row in (was, now))
         if before != after:
             return [Change(parameters, TASK_ITSELF, before, after)]

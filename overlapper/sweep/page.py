@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from overlapper.simulation.settings import Asking, Modelling, settings_of
 from overlapper.sweep import charts
-from overlapper.sweep.comparison import Comparison, mean_force
+from overlapper.sweep.comparison import Comparison
 from overlapper.sweep.left_out import LeftOut
 from overlapper.sweep.part import FAILURES, TASKS
 from overlapper.sweep.store import Store
@@ -35,6 +36,7 @@ DRAWN = 5
 MOVED = charts.Measure("moved", "tasks that moved, %", 100.0)
 
 Row = Mapping[str, Any]
+Columns = Mapping[str, NDArray[Any]]
 
 
 def write(
@@ -43,17 +45,24 @@ def write(
     scene: str,
     pages: int = 0,
     comparison: Comparison | None = None,
-) -> Path:
-    """Write the summary of the tasks of a sweep that are done, at least one; returns where.
+) -> Path | None:
+    """Write the summary of the tasks of a sweep that are done, and return where; None if there are none.
 
     `scene` is the name or path that commands give to it. Of the `pages` worst tasks the pages are written, too. With a
     `comparison`, it shows what has moved.
     """
-    rows = [row for row in store.rows(TASKS) if row["task"] in sweep.tasks]
-    worst = sorted(rows, key=lambda row: (-row["largest_volume_m3"], row["task"]))[: max(WORST, pages)]
+    forces = [charts.FORCE] * (sweep.study.contact == "volumetric")
+    measures = [*charts.MEASURES, *forces]
+    stored = [name for each in measures for name in _stored(each)]
+    numbers, columns = store.columns(TASKS, sweep, [*sweep.points[0], *stored])
+    if not len(numbers):
+        return None
+    largest = np.lexsort((numbers, -columns["largest_volume_m3"]))[: max(WORST, pages)]
+    worst = store.rows_of(TASKS, sweep, numbers[largest].tolist())
     for row in worst[:pages]:
         _show(sweep, row, store.folder / _view(row))
-    opening = [_opening(sweep, rows), *LeftOut.of(sweep, rows).lines()]
+    varied = _varied({name: columns[name] for name in sweep.points[0]})
+    opening = [_opening(sweep, columns, varied), *LeftOut.of(sweep, store).lines()]
     place = store.folder / "summary.html"
     texts = {
         "title": html.escape(f"Sweep of {sweep.study.scene}"),
@@ -61,7 +70,7 @@ def write(
         "moved": "\n".join(_moved(sweep, comparison)) if comparison else "",
         "worst": _worst(sweep, store, scene, worst),
         "failed": _failed(sweep, store),
-        "charts": "\n".join(_charts(sweep, rows)),
+        "charts": "\n".join(_charts(columns, varied, measures)),
         "settings": _table((name, value) for name, value in sweep.study.identity().items()),
     }
     with beside(place) as begun:
@@ -69,18 +78,23 @@ def write(
     return place
 
 
-def _opening(sweep: Sweep, rows: Sequence[Row]) -> str:
-    touched = sum(row["largest_volume_m3"] > 0 for row in rows)
-    varied = ", ".join(f"{name} ({len({row[name] for row in rows}):,})" for name in _varied(sweep, rows))
-    over = f" over {varied}" if varied else ""
-    return f"{len(rows):,} of {len(sweep.tasks):,} tasks are done{over}. Something overlaps in {touched:,} of them."
+def _stored(measure: charts.Measure) -> list[str]:
+    """The columns of the table that a measure is drawn from."""
+    return [f"mean_force_{axis}_m2" for axis in "xyz"] if measure.column == "mean_force_m2" else [measure.column]
 
 
-def _varied(sweep: Sweep, rows: Sequence[Row]) -> list[str]:
-    """The parameters that have more than one value, one that is called seed last."""
-    names = next(iter(sweep.tasks.values())).parameters
-    varied = [name for name in names if len({row[name] for row in rows}) > 1]
-    return sorted(varied, key=lambda name: name == "seed")
+def _opening(sweep: Sweep, columns: Columns, varied: Mapping[str, int]) -> str:
+    volumes = columns["largest_volume_m3"]
+    told = ", ".join(f"{name} ({count:,})" for name, count in varied.items())
+    over = f" over {told}" if told else ""
+    touched = int((volumes > 0).sum())
+    return f"{len(volumes):,} of {len(sweep):,} tasks are done{over}. Something overlaps in {touched:,} of them."
+
+
+def _varied(columns: Columns) -> dict[str, int]:
+    """How many values each parameter has that has more than one, one that is called seed last."""
+    counts = {name: len(np.unique(values)) for name, values in columns.items()}
+    return {name: counts[name] for name in sorted(counts, key=lambda name: name == "seed") if counts[name] > 1}
 
 
 def _view(row: Row) -> Path:
@@ -90,7 +104,7 @@ def _view(row: Row) -> Path:
 def _show(sweep: Sweep, row: Row, place: Path) -> None:
     """The page of a task, as the command beside it writes it."""
     place.parent.mkdir(exist_ok=True)
-    parameters = sweep.tasks[row["task"]].parameters
+    parameters = {name: row[name] for name in sweep.points[0]}
     with recorder(place, []) as record, closing(sweep.study.frames(parameters)) as frames:
         for frame in frames:
             record(frame)
@@ -113,7 +127,7 @@ def command(sweep: Sweep, scene: str, row: Row, place: Path) -> str:
 
 
 def _worst(sweep: Sweep, store: Store, scene: str, worst: Sequence[Row]) -> str:
-    varied = _varied(sweep, worst)
+    varied = _varied({name: _values(row[name] for row in worst) for name in sweep.points[0]})
     heading = [*varied, "volume, cm³", "depth, mm", "pair", "step", "page"]
     cells = "".join(f"<th>{html.escape(name)}</th>" for name in heading)
     lines = [f"<tr>{cells}</tr>"]
@@ -124,7 +138,9 @@ def _worst(sweep: Sweep, store: Store, scene: str, worst: Sequence[Row]) -> str:
         shown = "".join(f'<td class="number">{html.escape(each)}</td>' for each in figures)
         moment = (row["worst_step"] or 1) * row["time_s"] / row["steps"]
         place = _view(row)
-        link = f'<a href="{place.as_posix()}#t={moment:.6g}">{place.name}</a>'
+        link = place.name
+        if (store.folder / place).exists():
+            link = f'<a href="{place.as_posix()}#t={moment:.6g}">{link}</a>'
         how = html.escape(command(sweep, scene, row, store.folder / place))
         lines.append(
             f'<tr>{shown}<td>{html.escape(pair)}</td><td class="number">{row["worst_step"] or ""}</td>'
@@ -140,7 +156,7 @@ def _moved(sweep: Sweep, comparison: Comparison) -> Iterable[str]:
     yield f"<h2>What has moved</h2><p>{html.escape(said)}</p>"
     if not comparison.moved:
         return
-    varied = _varied(sweep, [task.found for task in comparison.tasks])
+    varied = [*_varied({name: _values(task.found[name] for task in comparison.tasks) for name in sweep.points[0]})]
     heading = [*varied, "measure", "recorded", "now", "times its budget"]
     lines = ["<tr>" + "".join(f"<th>{html.escape(name)}</th>" for name in heading) + "</tr>"]
     for task in comparison.moved[:WORST]:
@@ -166,44 +182,49 @@ def _moved(sweep: Sweep, comparison: Comparison) -> Iterable[str]:
 
 
 def _failed(sweep: Sweep, store: Store) -> str:
-    rows = [row for row in store.rows(FAILURES) if row["task"] in sweep.tasks]
-    if not rows:
+    numbers, columns = store.columns(FAILURES, sweep, ["what"])
+    if not len(numbers):
         return ""
-    kinds = {what: sum(row["what"] == what for row in rows) for what in sorted({row["what"] for row in rows})}
-    counted = ", ".join(f"{count:,} {what}" for what, count in kinds.items())
-    names = next(iter(sweep.tasks.values())).parameters
+    kinds, counts = np.unique(columns["what"], return_counts=True)
+    counted = ", ".join(f"{count:,} {what}" for what, count in zip(kinds, counts))
+    rows = store.rows_of(FAILURES, sweep, numbers[:WORST].tolist())
+    names = sweep.points[0]
     shown = (
         (", ".join(f"{name}={_figure(row[name])}" for name in names), f"{row['what']}: {row['sentence']}")
-        for row in rows[:WORST]
+        for row in rows
     )
-    more = f"<p>{len(rows) - WORST:,} more are in {FAILURES}.parquet.</p>" if len(rows) > WORST else ""
+    more = f"<p>{len(numbers) - WORST:,} more are in {FAILURES}.parquet.</p>" if len(numbers) > WORST else ""
     return f'<h2>Failed: {counted}</h2><div class="wide"><table>{_table(shown)}</table></div>{more}'
 
 
-def _charts(sweep: Sweep, rows: Sequence[Row]) -> Iterable[str]:
-    varied = _varied(sweep, rows)
+def _charts(columns: Columns, varied: Iterable[str], measures: Sequence[charts.Measure]) -> Iterable[str]:
+    varied = [*varied]
     if not varied:
         return
-    measures = [*charts.MEASURES, *[charts.FORCE] * (charts.FORCE.column in rows[0])]
-    columns = {measure: np.array([_measured(row, measure.column) for row in rows]) for measure in measures}
-    axes = [charts.axis(name, [row[name] for row in rows]) for name in varied[:DRAWN]]
+    drawn = [(each, _measured(columns, each)) for each in measures]
+    axes = [charts.axis(name, columns[name]) for name in varied[:DRAWN]]
     yield "<h2>Over each parameter</h2>"
     yield '<p class="quiet">Line: the median of all tasks with that value. Band: from the least to the largest.</p>'
     for axis in axes:
-        yield charts.lines(axis, [*columns.items()])
+        yield charts.lines(axis, drawn)
     pairs = [*combinations((axis for axis in axes if axis.name != "seed"), 2)]
     if pairs:
         yield '<h2>Over two parameters</h2><p class="quiet">The median of all tasks with these values.</p>'
     for across, up in pairs:
-        yield charts.heat_map(across, up, [*columns.items()][:2])
+        yield charts.heat_map(across, up, drawn[:2])
     if len(varied) > DRAWN:
         yield f"<p>Not drawn: {html.escape(', '.join(varied[DRAWN:]))}.</p>"
 
 
-def _measured(row: Row, column: str) -> float:
-    if column == "mean_force_m2":
-        return float(np.linalg.norm(mean_force(row)))
-    return float(row[column])
+def _measured(columns: Columns, measure: charts.Measure) -> NDArray[np.float64]:
+    values = [columns[name] for name in _stored(measure)]
+    return values[0] if len(values) == 1 else np.linalg.norm(values, axis=0)
+
+
+def _values(values: Iterable[Any]) -> NDArray[Any]:
+    """The values of a parameter; texts stay as they are."""
+    values = [*values]
+    return np.array(values, object if isinstance(values[0], str) else None)
 
 
 def _figure(value: Any) -> str:

@@ -1,8 +1,9 @@
-"""A task as the bytes of Parquet files: a row of what it came to, and the rows of the steps that are kept."""
+"""The tables of some tasks as the bytes of Parquet files: what they came to, the steps that are kept, and failures."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from overlapper.install import hint
@@ -12,6 +13,7 @@ from overlapper.tables.table import FORCES as FORCE_COLUMNS
 
 if TYPE_CHECKING:
     from overlapper.scenes.parameters import Parameter
+    from overlapper.sweep.study import Task
     from overlapper.tables.table import Row
 
 # The name of the task, and of the tables in which tasks are.
@@ -25,6 +27,9 @@ OF: dict[str, Mapping[str, type]] = {TASKS: MEASURES, STEPS: COLUMNS, FAILURES: 
 
 # The columns that volumetric contact adds to them.
 FORCES_OF: dict[str, Mapping[str, type]] = {TASKS: FORCES, STEPS: FORCE_COLUMNS, FAILURES: {}}
+
+# In the metadata of a part of tasks: the name of the part with their steps. In that of steps: a digest of their tasks.
+STEPS_PART, OF_TASKS = b"steps part", b"of tasks"
 
 
 def arrow() -> Any:
@@ -44,29 +49,49 @@ def must_be_no_columns(defaults: Mapping[str, Parameter]) -> None:
             raise ValueError(f"the parameter {min(taken)!r} has the name of a column of the table of {table}")
 
 
-def part(
-    table: str,
-    name: str,
-    parameters: Mapping[str, Parameter],
-    rows: Iterable[Row],
-    heading: Mapping[str, str],
-) -> bytes:
-    """A Parquet file with the name and the parameters of a task in every row; equal rows are equal bytes.
+def filled(table: str, found: Iterable[tuple[Task, Sequence[Row]]], heading: Mapping[str, str]) -> Any:
+    """The Arrow table of some tasks, at least one, with the name and the parameters of each in all of its rows.
 
     `heading` says what the study is of: with volumetric contact, there are columns of forces.
     """
     pyarrow = arrow()
+    found = [*found]
     kinds = {int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string(), bool: pyarrow.bool_()}
+    parameters = found[0][0].parameters
     columns = {TASK: str, **{each: type(value) for each, value in parameters.items()}, **OF[table]}
     if heading.get("contact") == "volumetric":
         columns |= FORCES_OF[table]
     schema = pyarrow.schema([(column, kinds[kind]) for column, kind in columns.items()], dict(heading))
-    which = {TASK: name, **parameters}
-    filled = pyarrow.Table.from_pylist([{**which, **row} for row in rows], schema=schema)
+    lines = [{TASK: task.name, **task.parameters, **row} for task, rows in found for row in rows]
+    return pyarrow.Table.from_pylist(lines, schema=schema)
+
+
+def parts(tables: Mapping[str, Any]) -> dict[str, bytes]:
+    """The tables as Parquet files; equal rows are equal bytes. The part of tasks says which part has their steps."""
+    made: dict[str, bytes] = {}
+    for table in (STEPS, TASKS, FAILURES):  # the steps first, as their digest is in the tasks
+        if table in tables:
+            content = tables[table].combine_chunks()
+            said = dict(content.schema.metadata)
+            if table == STEPS:  # whether it has rows or not, it is of these tasks alone
+                said[OF_TASKS] = digest("".join(tables[TASKS].column(TASK).to_pylist()).encode())
+            elif table == TASKS and STEPS in made:
+                said[STEPS_PART] = digest(made[STEPS])
+            made[table] = _bytes(content.replace_schema_metadata(said))
+    return made
+
+
+def digest(data: bytes) -> str:
+    """The name of a part, 32 hexadecimal digits: whoever reads it sees whether a bit of it has changed."""
+    return hashlib.sha256(data).hexdigest()[:32]
+
+
+def _bytes(content: Any) -> bytes:
+    pyarrow = arrow()
     file = pyarrow.BufferOutputStream()
-    many = len(filled) > 1
+    many = len(content) > 1
     pyarrow.parquet.write_table(
-        filled,
+        content,
         file,
         # Compressing a single row makes the file larger, and takes a millisecond.
         compression="zstd" if many else "none",

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import csv
 import math
-from collections import ChainMap
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,52 @@ Point = dict[str, Parameter]
 MOST = 10_000_000  # tasks of a sweep; beyond, somebody has mistyped
 
 
+class Axis(Sequence[Point]):
+    """The points of an axis, as columns of values by the name of the parameter: dictionaries take ten times as much."""
+
+    def __init__(self, columns: Mapping[str, Sequence[Parameter]]) -> None:
+        self.columns = columns
+
+    @classmethod
+    def of(cls, names: Sequence[str], rows: Iterable[Sequence[Parameter]]) -> Axis:
+        """The axis of some rows, at least one."""
+        return cls(dict(zip(names, zip(*rows))))
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def __getitem__(self, number: Any) -> Any:
+        return {name: values[number] for name, values in self.columns.items()}
+
+    def unique(self) -> Axis:
+        """Each point once."""
+        if any(isinstance(values, range) for values in self.columns.values()):
+            return self
+        if len(self.columns) == 1:  # without a tuple for each value
+            ((name, values),) = self.columns.items()
+            return Axis({name: [*dict.fromkeys(values)]})
+        return Axis.of([*self.columns], [*dict.fromkeys(zip(*self.columns.values()))])
+
+
+class Points(Sequence[Point]):
+    """All parameters of each point of the product of some axes, the last one moving fastest, made when asked for."""
+
+    def __init__(self, start: Mapping[str, Parameter], axes: Sequence[Axis]) -> None:
+        self._start, self._axes = dict(start), axes
+
+    def __len__(self) -> int:
+        return math.prod(map(len, self._axes))
+
+    def __getitem__(self, number: Any) -> Any:
+        if not 0 <= number < len(self):
+            raise IndexError(number)
+        point = self._start.copy()
+        for axis in reversed(self._axes):
+            number, at = divmod(number, len(axis))
+            point.update(axis[at])
+        return point
+
+
 @dataclass(frozen=True, slots=True)
 class Space:
     """The parameters of a scene: their defaults, by name, and which of them are `settled` for all points."""
@@ -28,14 +73,14 @@ class Space:
     defaults: Mapping[str, Parameter]
     settled: Collection[str] = ()
 
-    def grid(self, text: str) -> list[Point]:
+    def grid(self, text: str) -> Axis:
         """A parameter with its values: "friction=0.3,0.5", or so many from one number to another, "mass=0.1:10:20",
         in equal steps or, with ":log", by equal factors."""
         name, values = self._named(text, "--grid")
         default = self.defaults[name]
         parts = values.split(":")
         if len(parts) == 1 or isinstance(default, (str, bool)):
-            return [{name: value_of(name, each, default)} for each in values.split(",")]
+            return Axis({name: [value_of(name, each, default) for each in values.split(",")]})
         log = parts[-1] == "log"
         if len(parts) != 3 + log:
             raise ValueError(f"--grid {text} must be {name}=FROM:TO:COUNT, {name}=FROM:TO:COUNT:log or {name}=A,B,...")
@@ -43,15 +88,15 @@ class Space:
         if not (parts[2].isdecimal() and 0 < (count := int(parts[2])) <= MOST):
             raise ValueError(f"--grid {text}: the count must be a whole number from 1 to {MOST:,}, not {parts[2]!r}")
         found = (np.geomspace if log else np.linspace)(low, high, count).tolist()
-        return [{name: round(each) if type(default) is int else each} for each in found]
+        return Axis({name: [round(each) for each in found] if type(default) is int else found})
 
-    def seeds(self, count: int) -> list[Point]:
+    def seeds(self, count: int) -> Axis:
         """The parameter `seed` from 0 on."""
         if type(self.defaults.get("seed")) is not int:
             raise ValueError(f"--seeds is for scenes with a parameter `seed`, a whole number; {self.scene} has none")
-        return [{"seed": seed} for seed in range(count)]
+        return Axis({"seed": range(count)})
 
-    def samples(self, count: int, ranges: Sequence[str], seed: int) -> list[Point]:
+    def samples(self, count: int, ranges: Sequence[str], seed: int) -> Axis:
         """A Latin hypercube of the ranges, "mass=0.1:10" or, with equal chances by factors, "mass=0.1:10:log"."""
         if not ranges:
             raise ValueError("--sample needs a --range NAME=FROM:TO for each parameter that it draws")
@@ -64,7 +109,8 @@ class Space:
         except ImportError as error:
             raise ImportError(f"--sample needs {hint('scipy')}") from error
         drawn = qmc.LatinHypercube(len(asked), seed=seed).random(count)
-        return [dict(zip(names, map(self._drawn, asked, each))) for each in drawn.tolist()]
+        columns = ([self._drawn(each, part) for part in parts] for each, parts in zip(asked, drawn.T.tolist()))
+        return Axis(dict(zip(names, columns)))
 
     def _range(self, text: str) -> tuple[str, float, float, bool]:
         name, bounds = self._named(text, "--range")
@@ -83,7 +129,7 @@ class Space:
             return min(max(round(value), math.ceil(low)), math.floor(high))
         return min(max(value, low), high)
 
-    def read(self, path: Path) -> list[Point]:
+    def read(self, path: Path) -> Axis:
         """The points of a CSV table: a column for each parameter that is not to be its default."""
         with path.open(encoding="utf-8", newline="") as file:
             reader = csv.reader(file)
@@ -93,31 +139,29 @@ class Space:
                 known(name, self.defaults, self.scene)
             if not names or len(set(names)) < len(names):
                 raise ValueError(f"{path} must have the names of parameters in its first line, each once")
-            points: list[Point] = []
+            points: list[list[Parameter]] = []
             for cells in rows:
                 if len(cells) != len(names):
                     raise ValueError(f"{path}, line {reader.line_num}: it has {len(cells)} cells and not {len(names)}")
                 try:
-                    points.append({name: value_of(name, cell, self.defaults[name]) for name, cell in zip(names, cells)})
+                    points.append([value_of(name, cell, self.defaults[name]) for name, cell in zip(names, cells)])
                 except ValueError as error:
                     raise ValueError(f"{path}, line {reader.line_num}: {error}") from error
         if not points:
             raise ValueError(f"{path} has no points")
-        return points
+        return Axis.of(names, points)
 
-    def crossed(self, axes: Iterable[Sequence[Point]]) -> list[Point]:
+    def crossed(self, axes: Iterable[Axis]) -> Points:
         """All parameters of each point of the product of the axes, the last one moving fastest; none of them twice."""
         axes = [*axes]
         taken = set(self.settled)
         for axis in axes:
-            if twice := taken & axis[0].keys():
+            if twice := taken & axis.columns.keys():
                 raise ValueError(f"{min(twice)} is given by two of --set, --grid, --seeds, --points and --range")
-            taken |= axis[0].keys()
+            taken |= axis.columns.keys()
         if (count := math.prod(map(len, axes))) > MOST:
             raise ValueError(f"that would be {count:,} tasks, more than {MOST:,}")
-        start = dict(self.defaults)
-        points = ([dict(start, **dict(ChainMap(*parts)))[name] for name in start] for parts in product(*axes))
-        return [dict(zip(start, each)) for each in dict.fromkeys(map(tuple, points))]
+        return Points(self.defaults, [axis.unique() for axis in axes])
 
     def _named(self, text: str, option: str) -> tuple[str, str]:
         name, sign, values = text.partition("=")

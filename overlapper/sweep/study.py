@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -74,15 +74,24 @@ class Study:
         digest = hashlib.sha256(self.source).hexdigest()
         return {"scene": self.scene, "scene file": digest} | {k: str(v) for k, v in told.items()} | dict(self.versions)
 
-    def digest(self, parameters: Mapping[str, Parameter]) -> str:
-        """The name of the task with these parameters, 32 hexadecimal digits; another where anything is another."""
-        told = json.dumps([self.identity(), dict(parameters)], sort_keys=True)
-        return hashlib.sha256(told.encode()).hexdigest()[:32]
+    def digests(self) -> Callable[[Mapping[str, Parameter]], bytes]:
+        """The function that digests parameters, in 16 bytes; they are others where anything is another."""
+        encode = json.JSONEncoder(sort_keys=True).encode
+        study = hashlib.sha256(encode(self.identity()).encode())
+
+        def digest(parameters: Mapping[str, Parameter]) -> bytes:
+            of_task = study.copy()
+            of_task.update(encode(parameters).encode())
+            return of_task.digest()[:16]
+
+        return digest
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A point, and what it is called."""
+    """A point of a sweep: its digest as 32 hexadecimal digits, its number, and that of the part in which its row is."""
 
     name: str
     parameters: Mapping[str, Parameter]
+    number: int = 0
+    part: int = 0

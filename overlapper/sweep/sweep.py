@@ -8,13 +8,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from overlapper.jobs.executor import Executor
-from overlapper.jobs.hand import Done, Failed, Job
+from overlapper.jobs.hand import Job
 from overlapper.scenes.parameters import Parameter
 from overlapper.sweep import tasks
-from overlapper.sweep.part import FAILURES, arrow, part
-from overlapper.sweep.store import Store
+from overlapper.sweep.part import arrow
+from overlapper.sweep.store import Names, Store, text_of
 from overlapper.sweep.study import Study, Task
+
+# A sweep has a thousand parts, more or less, or as many tasks. A part has so many rows at most, or those of one task.
+PARTS, ROWS = 1_000, 10_000
+
+Numbers = NDArray[np.intp]
 
 
 @dataclass(slots=True)
@@ -35,15 +43,32 @@ class Progress:
 
 @dataclass(slots=True)
 class Sweep:
-    """The tasks of a study, one for each point."""
+    """The tasks of a study, one for each point. A task has the number of its point; tasks in a row make a part."""
 
     study: Study
     points: Sequence[Mapping[str, Parameter]]
-    tasks: dict[str, Task] = field(init=False)
+    names: Names = field(init=False)
+    size: int = field(init=False)
+    _order: Numbers = field(init=False)
 
     def __post_init__(self) -> None:
-        made = (Task(self.study.digest(point), point) for point in self.points)
-        self.tasks = {task.name: task for task in made}
+        digest = self.study.digests()
+        self.names = np.fromiter(map(digest, self.points), "S16", len(self.points))
+        self._order = np.argsort(self.names)
+        kept = self.study.steps // self.study.kept if self.study.kept else 1
+        self.size = max(min(len(self) // PARTS, ROWS // max(kept, 1)), 1)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def numbers(self, names: Names) -> Numbers:
+        """The number of each task by its name; -1 for those of other sweeps."""
+        found = self._order[np.minimum(np.searchsorted(self.names, names, sorter=self._order), len(self) - 1)]
+        return np.where(self.names[found] == names, found, -1)
+
+    def task(self, number: int) -> Task:
+        """The task of a point."""
+        return Task(text_of(self.names[number]), self.points[number], number, number // self.size)
 
     def opened(self, folder: Path) -> Store:
         """The folder in which it is or will be. See Store."""
@@ -59,36 +84,70 @@ class Sweep:
         heard: Callable[[Progress], object] = lambda progress: None,
         megabytes: int | None = None,
     ) -> Progress:
-        """Do what is missing in the store, and with `retry` what has failed; `heard` is told of every task.
+        """Do what is missing in the store, and with `retry` what has failed; `heard` is told now and then.
 
         Tasks fail that raise, take longer than `limit` seconds, take more memory than `megabytes`, or end their
         process. They stop no other. NotStarted if no task can be run, OSError if a part cannot be written.
         """
-        progress = Progress(len(self.tasks), before=len(self.tasks.keys() & store.done))
-        missing = [task for name, task in self.tasks.items() if name not in store.done]
-        if not retry:
-            progress.failed_before = sum(task.name in store.failed for task in missing)
-            missing = [task for task in missing if task.name not in store.failed]
+        state, pieces = self._found(store)
+        progress = Progress(len(self), before=int((state == DONE).sum()))
+        missing = np.flatnonzero((state != DONE) if retry else (state == MISSING))
+        progress.failed_before = len(self) - progress.before - len(missing)
         heard(progress)
-        if not missing:
-            return progress
-        job = Job(tasks.__name__, tasks.prepared.__name__, self.study, megabytes=megabytes)
-        with closing(engine.outcomes(job, missing, limit)) as outcomes:
-            for number, outcome in outcomes:
-                task = missing[number]
-                if isinstance(outcome, Done):
-                    store.keep(task.name, outcome.value)
-                    progress.done += 1
+        left = np.bincount(missing // self.size, minlength=1)
+        for part in [part for part in pieces if part >= len(left) or not left[part]]:
+            store.assemble(self, pieces.pop(part))
+        gather = tasks.gathered.__name__
+        job = Job(tasks.__name__, tasks.prepared.__name__, self.study, gather, megabytes=megabytes)
+        with closing(engine.shares(job, _Tasks(self, missing), limit)) as shares:
+            for piece in (piece for _, gathered in shares for piece in gathered):
+                left[piece.part] -= piece.done + piece.failed
+                if piece.part not in pieces and not left[piece.part]:
+                    store.keep(piece.tables)
                 else:
-                    store.keep(task.name, {FAILURES: self._failure(task, outcome)})
-                    progress.failed += 1
+                    pieces.setdefault(piece.part, []).extend(store.keep_piece(piece.tables))
+                    if not left[piece.part]:
+                        store.assemble(self, pieces.pop(piece.part))
+                progress.done += piece.done
+                progress.failed += piece.failed
                 heard(progress)
+        if retry:
+            store.settle()
         return progress
 
-    def _failure(self, task: Task, failed: Failed) -> bytes:
-        row: dict[str, Any] = {
-            "what": failed.what,
-            "sentence": failed.sentence,
-            "traceback": failed.traceback,
-        }
-        return part(FAILURES, task.name, task.parameters, [row], self.study.identity())
+    def _found(self, store: Store) -> tuple[NDArray[np.uint8], dict[int, list[Path]]]:
+        """The state of each task, and the pieces of parts that are not whole."""
+        state = np.zeros(len(self), np.uint8)
+        pieces: dict[int, list[Path]] = {}
+        for names, said in ((store.failed, FAILED), (store.done, DONE)):
+            state[_known(self.numbers(names))] = said
+        for path, names in store.pieces.items():
+            numbers = self.numbers(names)
+            if len(of := np.unique(numbers // self.size)) == 1 and of[0] >= 0:
+                pieces.setdefault(int(of[0]), []).append(path)
+            else:  # of another sweep, or cut otherwise
+                store.assemble(self, [path])
+            known = _known(numbers)
+            state[known] = np.maximum(state[known], DONE if store.is_done(path) else FAILED)
+        return state, pieces
+
+
+MISSING, FAILED, DONE = range(3)
+
+
+def _known(numbers: Numbers) -> Numbers:
+    return numbers[numbers >= 0]
+
+
+@dataclass(frozen=True, slots=True)
+class _Tasks(Sequence[Task]):
+    """Some tasks of a sweep, which are made when asked for."""
+
+    sweep: Sweep
+    chosen: Numbers
+
+    def __len__(self) -> int:
+        return len(self.chosen)
+
+    def __getitem__(self, number: Any) -> Any:
+        return self.sweep.task(int(self.chosen[number]))

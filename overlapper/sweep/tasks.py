@@ -1,28 +1,43 @@
-"""A task done, in the process of a hand: the scene is run and its parts are made."""
+"""Tasks done: each in the process of a hand, and their rows made a part beside it, before they are sent or written."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
 
+from overlapper.jobs.hand import Done, Outcome
 from overlapper.scenes.scene import engine_in
 from overlapper.sweep.measures import Measures
-from overlapper.sweep.part import STEPS, TASKS, part
+from overlapper.sweep.part import FAILURES, STEPS, TASKS, arrow, filled, parts
 from overlapper.sweep.study import Study, Task
 from overlapper.tables.table import Row, rows
 from overlapper.tables.table_file import origin
 
-Parts = dict[str, bytes]
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Some tasks of a part, as parts of their own by table: how many of them are done, and how many have failed."""
+
+    part: int
+    done: int
+    failed: int
+    tables: Mapping[str, bytes]
 
 
-def prepared(study: Study) -> Callable[[Task], Parts]:
-    """The function that runs the tasks of a study. ValueError where a package that measures is of another version."""
+def prepared(study: Study) -> Callable[[Task], dict[str, Any]]:
+    """The function that runs the tasks of a study. ValueError where a package that measures is of another version.
+
+    It returns the row of the task, and, if steps are kept, the table of their rows.
+    """
     here = origin(engine_in(study.source))
     if here != dict(study.versions):
         raise ValueError(f"the sweep is of {_said(study.versions)}, but here is {_said(here)}")
     heading = study.identity()
 
-    def done(task: Task) -> Parts:
+    def done(task: Task) -> dict[str, Any]:
         measures = Measures()
         kept: list[Row] = []
         with closing(study.frames(task.parameters)) as frames:
@@ -30,10 +45,30 @@ def prepared(study: Study) -> Callable[[Task], Parts]:
                 measures.add(frame)
                 if study.kept and frame.step % study.kept == 0:
                     kept += rows(frame.step, frame.time, frame.bodies, frame.contacts, forces=frame.forces)
-        parts = {STEPS: part(STEPS, task.name, task.parameters, kept, heading)} if study.kept else {}
-        return parts | {TASKS: part(TASKS, task.name, task.parameters, [measures.row()], heading)}
+        steps = {STEPS: filled(STEPS, [(task, kept)], heading)} if study.kept else {}
+        return {TASKS: measures.row(), **steps}
 
     return done
+
+
+def gathered(study: Study, found: Sequence[tuple[Task, Outcome]]) -> list[Piece]:
+    """What has become of some tasks: a piece for each part that any of them is of."""
+    heading = study.identity()
+    pieces = []
+    for number, group in groupby(sorted(found, key=lambda each: each[0].number), lambda each: each[0].part):
+        done, failed, steps = [], [], []
+        for task, outcome in group:
+            if isinstance(outcome, Done):
+                done.append((task, [outcome.value[TASKS]]))
+                steps += [outcome.value[STEPS]] if STEPS in outcome.value else []
+            else:
+                row = {name: getattr(outcome, name) for name in ("what", "sentence", "traceback")}
+                failed.append((task, [row]))
+        tables = {name: filled(name, of, heading) for name, of in ((TASKS, done), (FAILURES, failed)) if of}
+        if steps:
+            tables[STEPS] = arrow().concat_tables(steps)
+        pieces.append(Piece(number, len(done), len(failed), parts(tables)))
+    return pieces
 
 
 def _said(versions: Mapping[str, str]) -> str:

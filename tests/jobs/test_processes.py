@@ -9,6 +9,7 @@ import psutil
 import pytest
 
 from overlapper.jobs import worker
+from overlapper.jobs.executor import outcomes
 from overlapper.jobs.hand import Done, Failed, Hand, Job
 from overlapper.jobs.processes import Processes, cores
 from overlapper.jobs.shares import Shares
@@ -84,7 +85,7 @@ def test_a_process_that_cannot_be_started_is_refused(monkeypatch):
     monkeypatch.setattr(worker.subprocess, "Popen", lacking)
     words = r"^a worker process could not be started \(.*Cannot allocate memory\)$"
     with pytest.raises(NotStarted, match=words):
-        [*Processes(2).outcomes(job(), [("give", 1)])]
+        [*outcomes(Processes(2), job(), [("give", 1)])]
 
 
 def test_a_process_ends_with_whoever_asked_it_even_while_it_hangs():
@@ -106,21 +107,21 @@ def test_a_process_ends_with_whoever_asked_it_even_while_it_hangs():
 def test_all_items_are_done_once_by_all_processes():
     engine = Processes(2)
     items = [("raise", k) if k % 7 == 3 else ("give", k) for k in range(200)]
-    found = [*engine.outcomes(job(), items)]
+    found = [*outcomes(engine, job(), items)]
     assert sorted(number for number, _ in found) == [*range(200)]
     for number, outcome in found:
         assert isinstance(outcome, Failed) if number % 7 == 3 else outcome.value[1] == number
     assert len({outcome.value[2] for _, outcome in found if isinstance(outcome, Done)}) == 2
     assert Processes().workers == cores() >= 1
-    assert [*engine.outcomes(job(), [])] == []
+    assert [*outcomes(engine, job(), [])] == []
 
 
 def test_stopping_early_leaves_no_process_behind():
     before = set(psutil.Process().children())
-    outcomes = Processes(2).outcomes(job(), [("give", 1)] + [("sleep", 30)] * 50)
-    assert next(outcomes)[0] == 0
+    found = outcomes(Processes(2), job(), [("give", 1)] + [("sleep", 30)] * 50)
+    assert next(found)[0] == 0
     start = time.monotonic()
-    outcomes.close()
+    found.close()
     assert time.monotonic() - start < 10 and set(psutil.Process().children()) <= before
 
 

@@ -5,8 +5,6 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
-import pyarrow
-import pyarrow.parquet
 import pytest
 from scripted_engine import World
 
@@ -114,9 +112,7 @@ def test_a_scene_is_held_against_its_expected_file():
 def test_a_task_of_a_sweep_is_done():
     study = Study.of(Path("sinking.py"), 8)
     assert [*study.versions] == ["overlapper"]
-    (written,) = prepared(study)(Task("one", {"sinks": 0.02})).values()
-    (row,) = pyarrow.parquet.read_table(pyarrow.BufferReader(written)).to_pylist()
-    assert row["sinks"] == 0.02
+    (row,) = prepared(study)(Task("one", {"sinks": 0.02})).values()
     assert max(sunk(step).volume for step in range(1, 9)) in row.values()
 
 

@@ -77,7 +77,7 @@ def begun(folder, *address):
 
 
 def parts(folder, table="tasks"):
-    """The bytes of each part of a table, by the name of its task."""
+    """The bytes of each part of a table, by its name."""
     return {part.stem: part.read_bytes() for part in sorted(Path(folder, f"{table}.parquet").glob("*.parquet"))}
 
 

@@ -11,7 +11,9 @@ import pytest
 import ray_nodes
 from sweeping import begun, parts
 
+from overlapper.jobs import cluster as cluster_module
 from overlapper.jobs.cluster import LOSSES, Cluster
+from overlapper.jobs.executor import outcomes
 from overlapper.jobs.hand import Done, Job
 from overlapper.jobs.worker import NotStarted
 
@@ -52,7 +54,7 @@ class Ray(types.ModuleType):
 
     def __init__(self, lost=0):
         super().__init__("ray")
-        self.lost, self.cancelled = lost, []
+        self.lost, self.cancelled, self.cpus, self.most = lost, [], 2.0, 0
         self.exceptions = types.SimpleNamespace(RayError=ConnectionError, RayTaskError=KeyError)
 
     def init(self, address, **_):
@@ -60,12 +62,19 @@ class Ray(types.ModuleType):
             raise ConnectionError("nobody is there.\nAt all")
 
     def cluster_resources(self):
-        return {"CPU": 2.0}
+        return {"CPU": self.cpus}
+
+    def nodes(self):
+        return [{"Alive": True, "Resources": {"CPU": self.cpus / 2}}, {"Alive": True, "Resources": {}}] * 2
+
+    def put(self, value):
+        return value
 
     def remote(self, **_):
         return lambda function: types.SimpleNamespace(remote=lambda *arguments: Share(function, arguments))
 
-    def wait(self, shares, num_returns):
+    def wait(self, shares, num_returns, timeout):
+        self.most = max(self.most, len(shares))
         return shares[:num_returns], shares[num_returns:]
 
     def get(self, share):
@@ -102,25 +111,35 @@ def test_shares_that_are_lost_are_sent_once_more(ray):
     ray.lost = 3
     with closing(Cluster()) as cluster:
         assert cluster.workers == 2
-        found = [*cluster.outcomes(Job("jobs", "doing", "x"), [("give", k) for k in range(30)])]
+        found = [*outcomes(cluster, Job("jobs", "doing", "x"), [("give", k) for k in range(30)])]
     assert sorted((number, outcome.value[1]) for number, outcome in found) == [(k, k) for k in range(30)]
     assert all(isinstance(outcome, Done) for _, outcome in found)
 
 
 def test_a_cluster_that_loses_every_task_is_refused(ray):
-    ray.lost = 10 * LOSSES
+    ray.lost, ray.cpus = LOSSES + 1, 64_000.0
     with (
-        closing(Cluster(workers=2)) as cluster,
+        closing(Cluster()) as cluster,
         pytest.raises(NotStarted, match=r"^the cluster loses what it is given: "),
     ):
-        [*cluster.outcomes(Job("jobs", "doing", "x"), [("give", k) for k in range(30)])]
-    assert ray.cancelled
+        [*outcomes(cluster, Job("jobs", "doing", "x"), [("give", k) for k in range(5000)])]
+    assert ray.cancelled and not ray.lost
+
+
+def test_a_large_cluster_is_sent_shares_for_several_cpus_each(ray, monkeypatch):
+    monkeypatch.setattr(cluster_module, "CREWS", 4)
+    ray.cpus, ray.lost = 16.0, LOSSES
+    with closing(Cluster()) as cluster:
+        found = [*outcomes(cluster, Job("jobs", "doing", "x"), [("give", k) for k in range(60)])]
+    assert sorted((number, outcome.value[1]) for number, outcome in found) == [(k, k) for k in range(60)]
+    assert ray.most == 2 * 4
+    assert len({outcome.value[2] for _, outcome in found}) == 4  # processes, of the one node that there is
 
 
 def test_a_job_that_cannot_be_prepared_is_refused(ray):
     words = r"^a worker process could not be prepared: there is no such thing$"
     with closing(Cluster()) as cluster, pytest.raises(NotStarted, match=words):
-        [*cluster.outcomes(Job("jobs", "doing", "never"), [("give", 1)])]
+        [*outcomes(cluster, Job("jobs", "doing", "never"), [("give", 1)])]
 
 
 def test_a_missing_cluster_is_refused(ray):

@@ -12,6 +12,7 @@ from sweeping import BALLS, rows, sweep_of, swept
 
 from overlapper.sweep import page
 from overlapper.sweep.comparison import Recorded
+from overlapper.sweep.part import TASKS, digest, parts
 
 GRIDS = ["apart=0.1:0.19:4", "seed=0,1"]
 NOWHERE = Path("expected/balls.csv")
@@ -39,12 +40,19 @@ def other(recorded, balls):
 
 def edit(**changes):
     """Rows of the folder `other` with some columns as functions of the row say."""
-    for part in Path("other/tasks.parquet").iterdir():
+    for part in [*Path("other/tasks.parquet").iterdir()]:
         table = pyarrow.parquet.read_table(part)
         (row,) = table.to_pylist()
         for name, change in changes.items():
             row[name] = change(row)
-        pyarrow.parquet.write_table(pyarrow.Table.from_pylist([row], schema=table.schema), part)
+        written(pyarrow.Table.from_pylist([row], schema=table.schema), part)
+
+
+def written(table, part):
+    """A part in place of another, named by its digest."""
+    data = parts({TASKS: table})[TASKS]
+    part.unlink()
+    part.with_stem(digest(data)).write_bytes(data)
 
 
 def compared(check, runs, grids=GRIDS, expected=NOWHERE):
@@ -164,8 +172,9 @@ def spoiled(table, data=b"none"):
 
 
 def without(column):
-    for part in Path("other/tasks.parquet").iterdir():
-        pyarrow.parquet.write_table(pyarrow.parquet.read_table(part).drop_columns([column]), part)
+    for part in [*Path("other/tasks.parquet").iterdir()]:
+        table = pyarrow.parquet.read_table(part)
+        written(table.drop_columns([column]), part)
 
 
 @pytest.mark.parametrize(

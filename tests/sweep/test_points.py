@@ -59,7 +59,7 @@ def test_axes_are_crossed_and_no_point_is_there_twice():
     found = SPACE.crossed(axes)
     assert [(point["mass"], point["seed"]) for point in found] == [(1.0, 0), (1.0, 1), (2.0, 0), (2.0, 1)]
     assert all(list(point) == list(SPACE.defaults) and point["count"] == 3 for point in found)
-    assert SPACE.crossed([]) == [SPACE.defaults]
+    assert [*SPACE.crossed([])] == [SPACE.defaults]
 
 
 def test_a_parameter_is_on_one_axis_only():
@@ -84,7 +84,7 @@ def test_seeds_are_for_scenes_that_have_one():
 def test_a_sample_is_a_latin_hypercube_of_its_ranges_and_the_same_again():
     ranges = ["mass=0.1:10:log", "count=1:4"]
     found = SPACE.samples(40, ranges, 0)
-    assert found == SPACE.samples(40, ranges, 0) != SPACE.samples(40, ranges, 1)
+    assert [*found] == [*SPACE.samples(40, ranges, 0)] != [*SPACE.samples(40, ranges, 1)]
     # One point in each fortieth of each range.
     tenths = np.log([point["mass"] / 0.1 for point in found]) / math.log(100) * 40
     assert sorted(int(part) for part in tenths) == list(range(40))
@@ -111,7 +111,7 @@ def test_an_invalid_range_is_refused_in_one_sentence(ranges, sentence):
 def test_a_table_has_a_column_for_each_parameter(tmp_path):
     table = tmp_path / "points.csv"
     table.write_text('# from a paper\nmass, kind\n1.5,"a, b"\n\n2,box\n')
-    assert SPACE.read(table) == [{"mass": 1.5, "kind": "a, b"}, {"mass": 2.0, "kind": "box"}]
+    assert [*SPACE.read(table)] == [{"mass": 1.5, "kind": "a, b"}, {"mass": 2.0, "kind": "box"}]
 
 
 @pytest.mark.parametrize(
