@@ -1,9 +1,11 @@
 """The cost of being watched: processor time per step of a pybullet loop, plain and under `overlapper watch`.
 
     python benchmarks watch [ROUNDS]
+    python benchmarks watch --long 100000
 
 Every way runs once in each round, one after the other; a figure is the median of the rounds. The script itself tells
-how long its loop took, the first steps left out, in which shapes are read.
+how long its loop took, the first steps left out, in which shapes are read. With --long, R2D2 is watched for so many
+steps, and the script tells after each tenth of them how long a step took and how much memory the process has.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from harness.timing import timed
 
 SCRIPT = """
 import sys, time
+import psutil
 import pybullet as p
 import pybullet_data
 
@@ -35,10 +38,13 @@ else:
         p.createMultiBody(1, cube, basePosition=[number % 5 * 0.11, number // 5 % 5 * 0.11, 0.06 + number // 25 * 0.11])
 for _ in range(100):
     p.stepSimulation()
-start = time.process_time()
-for _ in range(int(sys.argv[2])):
-    p.stepSimulation()
-print((time.process_time() - start) / int(sys.argv[2]) * 1e6)
+steps, parts = int(sys.argv[2]), int(sys.argv[3])
+for _ in range(parts):
+    start = time.process_time()
+    for _ in range(steps // parts):
+        p.stepSimulation()
+    taken = (time.process_time() - start) / (steps // parts) * 1e6
+    print(taken, psutil.Process().memory_info().rss / 1e6 if parts > 1 else "")
 """
 
 START = "import pybullet; pybullet.connect(pybullet.DIRECT); pybullet.stepSimulation()"
@@ -52,6 +58,7 @@ WAYS = {
     "every step": [],
     "every step, --out .csv": ["--out", "run.csv"],
     "every step, --out .parquet": ["--out", "run.parquet"],
+    "every step, --out .sqlite": ["--out", "run.sqlite"],
     "every step, --html": ["--html", "run.html"],
 }
 
@@ -59,11 +66,15 @@ WAYS = {
 def options(parser: ArgumentParser) -> None:
     parser.add_argument("rounds", nargs="?", type=int, default=5)
     parser.add_argument("--steps", type=int, default=500, help="of a script that are timed")
+    parser.add_argument("--long", type=int, help="watch R2D2 for so many steps, and tell of its memory")
     parser.add_argument("--scene", action="append", choices=SCENES, help="only this one; may be repeated")
     parser.add_argument("--way", action="append", choices=WAYS, help="beside the plain script, only this one")
 
 
 def main(chosen: Namespace) -> None:
+    if chosen.long:
+        watch_long(chosen.long, chosen.way or [way for way in WAYS if "--out" in way])
+        return
     ways = ["without us", *(chosen.way or [way for way in WAYS if WAYS[way] is not None])]
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "script.py").write_text(SCRIPT, encoding="utf-8")
@@ -72,7 +83,7 @@ def main(chosen: Namespace) -> None:
             taken: dict[str, list[float]] = {way: [] for way in ways}
             for _ in range(chosen.rounds):
                 for way in ways:
-                    taken[way].append(float(said(folder, WAYS[way], "script.py", scene, str(chosen.steps))))
+                    taken[way].append(float(said(folder, WAYS[way], "script.py", scene, str(chosen.steps), "1")))
             print(f"{scene}: µs per step, and over that without us (median of {chosen.rounds}, from least to most)")
             plain = median(taken["without us"])
             for way, figures in taken.items():
@@ -84,6 +95,17 @@ def main(chosen: Namespace) -> None:
             for options in (None, [])
         )
     print(f"start: {watched - plain:.2f} s more before the script begins")
+
+
+def watch_long(steps: int, ways: list[str]) -> None:
+    for way in ways:
+        with tempfile.TemporaryDirectory() as folder:
+            Path(folder, "script.py").write_text(SCRIPT, encoding="utf-8")
+            lines = said(folder, WAYS[way], "script.py", "r2d2", str(steps), "10").splitlines()
+            size = sum(file.stat().st_size for file in Path(folder).glob("run.*")) / 1e6
+        print(f"{way}: {steps:,} steps, a file of {size:.1f} MB; after each tenth, µs per step and MB of memory")
+        for taken, memory in (map(float, line.split()) for line in lines):
+            print(f"  {taken:8.0f}{memory:10.1f}", flush=True)
 
 
 def said(folder: str, options: list[str] | None, *script: str) -> str:

@@ -38,6 +38,13 @@ def test_a_watched_script_is_timed_beside_itself(capsys):
     assert re.match(r"start: -?\d+\.\d\d s more", lines[3])
 
 
+def test_a_long_script_tells_of_its_memory(capsys):
+    lines = said(capsys, "watch", "--long=20", "--way=every step, --out .csv").splitlines()
+    assert re.match(r"every step, --out \.csv: 20 steps, a file of [\d.]+ MB", lines[0])
+    figures = [[*map(float, line.split())] for line in lines[1:]]
+    assert len(figures) == 10 and all(taken > 0 and memory > 10 for taken, memory in figures)
+
+
 def test_a_robot_is_a_row_of_the_table_of_audits():
     cells = audit.row_of(audit.ROBOTS / audit.FRANKA, 4)
     assert len(cells) == 9 and cells[0] == "panda"
