@@ -105,6 +105,7 @@ class Recording:
         self._contacts: dict[Pair, DrawnContact] = {}  # the first contact of each pair
         self._presses: list[tuple[float, ...]] = []  # of each sighting
         self._depths: dict[int, float] = {}  # of polytopes
+        self._left_out: dict[str, None] = {}  # a sentence for each shape or body that is not modelled in some frame
         self._usual: list[tuple[float, float]] = []  # N and Pa, in each frame that has forces
 
     def add(
@@ -132,6 +133,8 @@ class Recording:
             raise ValueError(f"time must increase from frame to frame: {time} s came no later than the frame before")
         self._times.append(seconds)
         self._names.append(name)
+        for each in getattr(bodies, "skipped", ()):  # bodies that are not of a simulation have none
+            self._left_out[f"{each.name}, {each.reason}"] = None
         colors = bodies.colors
         places = {
             self._add_body(self._stage, path, placed, colors[key[:2]]): _pose(self._stage, placed)
@@ -193,6 +196,7 @@ class Recording:
         return {
             "times": self._times,
             "names": self._names if any(self._names) else None,
+            "leftOut": list(self._left_out),
             "pairs": list(self._pairs),
             "links": list(self._links.values()),
             "nodes": list(self._nodes),

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from pages import Scene, coloured, hand_at, looks, opened, panel, recorded, scene, sides
 
 from overlapper import Box, HalfSpace, Placed, Sphere
+from overlapper.simulation.model import Skipped
 from overlapper.viewer import Recording
 from overlapper.viewer.look import Look
 
@@ -413,3 +414,13 @@ def test_framed_bodies_stay_visible_in_a_narrow_window(browser, reach, sized):
     # From farther off, so that both bodies are seen whole: nothing green at the sides.
     assert coloured(narrow[:, :2], "green") == coloured(narrow[:, -2:], "green") == 0
     assert coloured(narrow, "green") / narrow.size > 0.2 * wide
+
+
+def test_the_page_counts_and_names_what_is_not_modelled(browser, tmp_path):
+    first, second = pile(), pile(lift=0.005)
+    second.skipped = [Skipped(30, -1, "net/base", "it is soft")]
+    opened(browser, recorded([first, second], tmp_path / "lost.html"))
+    assert text(browser, "#left-out") == "1 not modelled"
+    assert browser.ask("document.getElementById('left-out').title") == "net/base, it is soft"
+    opened(browser, recorded([first], tmp_path / "whole.html"), "#t=0")
+    assert browser.ask("document.getElementById('left-out').hidden")

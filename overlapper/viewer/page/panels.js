@@ -90,6 +90,9 @@ if (inside) byId("copy").hidden = byId("help").hidden = document.querySelector("
 byId("whole").onclick = () => lookAt(seenAs === "whole" ? "opening" : "whole");
 byId("help").onclick = () => byId("keys").showModal();
 document.querySelector("#head h1").textContent = film.title;
+byId("left-out").hidden = !film.leftOut.length;
+byId("left-out").textContent = `${film.leftOut.length} not modelled`;
+byId("left-out").title = film.leftOut.join("\n");
 document.title = film.title ? `${film.title}, overlapper` : "overlapper";
 
 if (film.forces) {
