@@ -107,8 +107,8 @@ def test_a_failed_block_is_reported(table, monkeypatch):
     class Broken:
         workers = 1
 
-        def outcomes(self, job, items, limit=None):
-            yield 7, Failed("died", "its process ended with signal SIGKILL", "words")
+        def shares(self, job, items, limit=None):
+            yield [7], [Failed("died", "its process ended with signal SIGKILL", "words")]
 
     monkeypatch.setattr(auditing, "FEW", 0)
     with pytest.raises(

@@ -390,7 +390,7 @@ def test_a_script_that_may_not_be_read_is_named(monkeypatch):
 @pytest.mark.parametrize(
     ("module", "arguments", "packages"),
     [
-        ("pybullet", [], "pybullet"),
+        ("pybullet", [], "pybullet, or conda install -c conda-forge pybullet"),
         ("fcl", ["--check", "fcl"], "python-fcl"),
         ("meshcat", ["--html", "own.html"], "meshcat"),
         ("pyarrow", ["--out", "own.parquet"], "pyarrow"),

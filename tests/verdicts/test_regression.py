@@ -84,7 +84,7 @@ def test_a_run_can_be_shorter_than_the_scene_or_show_some_steps_of_it(scene_file
         ),
         ("STEPS = 5\ndef build(client:", "cannot be loaded at line 2: SyntaxError"),
         (
-            "\nimport nothing_like_it",
+            "STEPS = 5\nimport nothing_like_it",
             "cannot be loaded at line 2: ModuleNotFoundError: No module named 'nothing_like_it'",
         ),
         ("STEPS = 5\ndef build(client):\n  1 / 0", "cannot be built at line 3: ZeroDivisionError"),
