@@ -174,10 +174,9 @@ def _gltf(path: Path) -> Any:
 
 
 def _chunks(data: bytes) -> Iterator[tuple[int, int]]:
-    """Where the chunks of a .glb file begin and end."""
-    (total,) = struct.unpack_from("<I", data, 8)
+    """Where the chunks of a .glb file begin and end, to the end of the file, whatever length it states."""
     end = 12
-    while end < total:
+    while end + 8 <= len(data):
         (length,) = struct.unpack_from("<I", data, end)
         begin, end = end + 8, end + 8 + length
         if end > len(data):

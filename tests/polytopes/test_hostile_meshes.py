@@ -205,6 +205,9 @@ def test_a_chunk_that_is_longer_than_its_file_is_refused(written, tmp_path):
     struct.pack_into("<I", whole, 20 + first, 4_000_000_000)
     (tmp_path / "x.glb").write_bytes(whole)
     assert refusal(tmp_path / "x.glb") == f"it has a chunk of 4,000,000,000 bytes, and room for {room}"
+    behind = struct.pack("<I4s", 4_000_000_000, b"BIN\0")  # behind the length that the file states
+    (tmp_path / "x.glb").write_bytes(written["glb"] + behind)
+    assert refusal(tmp_path / "x.glb") == "it has a chunk of 4,000,000,000 bytes, and room for 0"
 
 
 def test_numbers_in_a_file_beside_the_scene_are_there(tmp_path):
