@@ -1,6 +1,6 @@
 """The executor of many machines: shares of items as tasks of Ray, each done by hands beside Ray's own process.
 
-What raises, hangs or dies of an item is the business of a hand, as on one machine. A node that is lost loses the shares
+An item that raises, hangs or dies is the business of a hand, as on one machine. A node that is lost loses the shares
 that were under way there, and these are sent once more. On a large cluster a share is for several CPUs of a node, and
 lasts longer: whoever started the job has to do with hundreds of shares at a time, and with hundreds a second.
 """
@@ -78,8 +78,9 @@ class Cluster:
         sent = ray.put(job)
         try:
             while True:
-                # One share more than can be done, so that nobody waits for the next.
-                while len(under_way) < 2 * max(self.workers // crew, 1) and (share := shares.take()):
+                # Twice the shares that can be done at a time, so that nobody waits for the next. The cluster may grow.
+                most = 2 * max(self.workers // crew, 1)
+                while len(under_way) < most and (share := shares.take()):
                     under_way[remote.remote(sent, [items[number] for number in share], limit, crew)] = share
                 if not under_way:
                     return
