@@ -110,9 +110,9 @@ class Shelf:
                 _put(tables[table], begun, places[-1])
         return places
 
-    def steps_of(self, part: Path) -> Path | None:
-        """The part that has the steps of a part of tasks."""
-        name = (arrow().parquet.read_schema(part).metadata or {}).get(STEPS_PART)
+    def steps_of(self, part: Path, schema: Any = None) -> Path | None:
+        """The part that has the steps of a part of tasks; `schema` is that of the part, if it has been read."""
+        name = ((schema or arrow().parquet.read_schema(part)).metadata or {}).get(STEPS_PART)
         return self.path(STEPS) / f"{name.decode()}.parquet" if name else None
 
     def checked(self, broken: list[Path]) -> dict[Path, Names]:
@@ -124,8 +124,9 @@ class Shelf:
         steps: set[Path] = set()
         for path in (path for table in (TASKS, FAILURES) for path in self.files(table)):
             try:
-                names = names_of(content(path, [TASK]).column(TASK))
-                if with_steps := self.steps_of(path):
+                rows = content(path, [TASK])
+                names = names_of(rows.column(TASK))
+                if with_steps := self.steps_of(path, rows.schema):
                     _must_be_whole(with_steps)
                     steps.add(with_steps)
                 found[path] = names
