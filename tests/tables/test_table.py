@@ -219,13 +219,17 @@ def test_a_table_that_was_cut_is_noticed(tmp_path, ending):
             read_table(path)
 
 
-def test_rows_missing_from_a_database_are_noticed(tmp_path):
-    path = tmp_path / "run.sqlite"
+def changed_table(path, change):
+    """A table of one step, changed by an SQL statement after it was closed."""
     table = TABLES[".sqlite"](path, METADATA)
     table.write(Cubes().rows(1))
     table.close()
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute("DELETE FROM overlaps WHERE bodyB = 2")
+    database(path, change)
+    return path
+
+
+def test_rows_missing_from_a_database_are_noticed(tmp_path):
+    path = changed_table(tmp_path / "run.sqlite", "DELETE FROM overlaps WHERE bodyB = 2")
     with pytest.raises(ValueError, match=r"is not as it was written: 2 of its 3 rows are there$"):
         read_table(path)
 
@@ -281,19 +285,13 @@ def test_a_value_that_has_changed_is_noticed_whatever_holds_its_bits(tmp_path, e
         content = content.replace_schema_metadata({**content.schema.metadata, b"rows": seal.encode()})
         pyarrow.parquet.write_table(content, path)
     else:
-        with closing(sqlite3.connect(path)) as connection, connection:
-            connection.execute("UPDATE metadata SET value = ? WHERE name = 'rows'", (seal,))
+        database(path, f"UPDATE metadata SET value = '{seal}' WHERE name = 'rows'")
     with pytest.raises(ValueError, match=r"is not as it was written: a line of it is another$"):
         read_table(path)
 
 
 def test_a_table_of_an_earlier_version_has_the_number_of_its_rows_alone(tmp_path):
-    path = tmp_path / "run.sqlite"
-    table = TABLES[".sqlite"](path, METADATA)
-    table.write(Cubes().rows(1))
-    table.close()
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute("UPDATE metadata SET value = '3' WHERE name = 'rows'")
+    path = changed_table(tmp_path / "run.sqlite", "UPDATE metadata SET value = '3' WHERE name = 'rows'")
     assert read_table(path) == Cubes().rows(1)
 
 
