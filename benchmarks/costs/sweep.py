@@ -175,7 +175,7 @@ def options(parser: ArgumentParser) -> None:
 
 def main(chosen: Namespace) -> None:
     if chosen.empty:
-        # What Ray starts must find this module, too.
+        # Processes of Ray must find this module, too.
         os.environ["PYTHONPATH"] = os.pathsep.join(map(os.path.abspath, sys.path))
         driver(chosen.empty, Cluster(chosen.address) if chosen.engine == "ray" else Processes())
     grasp = ROOT / "scenes" / "franka_grasp.py"

@@ -23,8 +23,8 @@ class Executor(Protocol):
     def shares(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Generator[Shared, None, None]:
         """The numbers of some items with what the job gathers of them, in whatever order, each item once.
 
-        `limit` is the number of seconds that an item may take. What is under way when the generator is closed is given
-        up, and no process is left. NotStarted if the job cannot be done at all.
+        `limit` is the number of seconds that an item may take. Items that are under way when the generator is closed
+        are given up, and no process is left. NotStarted if the job cannot be done at all.
         """
         ...
 

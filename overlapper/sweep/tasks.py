@@ -52,7 +52,7 @@ def prepared(study: Study) -> Callable[[Task], dict[str, Any]]:
 
 
 def gathered(study: Study, found: Sequence[tuple[Task, Outcome]]) -> list[Piece]:
-    """What has become of some tasks: a piece for each part that any of them is of."""
+    """The pieces that some tasks make: one for each part that any of them is of."""
     heading = study.identity()
     pieces = []
     for number, group in groupby(sorted(found, key=lambda each: each[0].number), lambda each: each[0].part):

@@ -72,7 +72,7 @@ class StepTable:
     ) -> None:
         """Write the rows of a step at once; `opinions` are FCL's of the same contacts, if it was asked.
 
-        What is left out for the first time is metadata from then on.
+        A body or link that is left out for the first time is metadata from then on.
         """
         for each in bodies.skipped:
             if each not in self._left_out:

@@ -1,4 +1,4 @@
-"""What a model names and pybullet does not build, or takes for something else, is told or refused."""
+"""Shapes that pybullet does not build are told; models that it changes are refused."""
 
 import csv
 import json

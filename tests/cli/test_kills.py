@@ -51,7 +51,7 @@ EARLIER = b"earlier"
 
 
 def prepared(folder):
-    """What the commands read, in a folder."""
+    """A folder with the files that the commands read."""
     folder.mkdir()
     (folder / "scene.py").write_text(SCENE)
     (folder / "script.py").write_text(SCRIPT)

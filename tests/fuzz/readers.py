@@ -134,7 +134,7 @@ def check_refusal(said: str, path: Path) -> None:
 
 
 def answer(reader: Reader, data: bytes, folder: Path) -> str | None:
-    """What was found in an input, or the sentence of its refusal; None if no form has its letter."""
+    """The answer to an input, or the sentence of its refusal; None if no form has its letter."""
     ending, made = reader.forms.get(data[:1].decode("latin-1"), ("", bytes))
     if not ending:
         return None

@@ -1,4 +1,4 @@
-"""What is wrong with a scene is one sentence, whatever the scene does, and nothing is run that is no scene."""
+"""The fault of a broken scene is one sentence, whatever the scene does; a plain script is not run."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What pybullet's importer of MJCF takes for something else than MuJoCo does.
+"""Reasons for which pybullet's importer of MJCF makes another model of a file than MuJoCo does.
 
 The importer knows few defaults, takes degrees for radians in files without <compiler>, and drops what it does not know.
 A file is read truly if all of its joints, shapes and bodies come out as the format says.
@@ -23,7 +23,7 @@ TOLD = 3  # reasons in a sentence
 
 
 def misread(root: Element) -> str:
-    """What the importer would change of a file, for the end of a sentence; "" if nothing."""
+    """The changes that the importer would make, for the end of a sentence; "" if there are none."""
     reasons = list(dict.fromkeys(_Reader(root).reasons()))
     more = f"; and {len(reasons) - TOLD:,} more" if len(reasons) > TOLD else ""
     return "; ".join(reasons[:TOLD]) + more

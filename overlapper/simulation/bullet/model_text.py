@@ -38,7 +38,7 @@ LIBRARY = re.compile(rb"^mtllib[ \t]+([^\r\n]+)", re.MULTILINE)
 def root_of(path: Path) -> Element:
     """The root of a model. NotRead if it has none.
 
-    What comes behind the end of a URDF is not read, as pybullet does not.
+    Text behind the end of a URDF is not read, as pybullet does not read it.
     """
     text, end = path.read_bytes(), b"</robot>"
     urdf = path.suffix.lower() == ".urdf" and end in text
@@ -58,8 +58,10 @@ def _must_not_be_broken(text: bytes) -> None:
 
 
 def must_be_sound(path: Path, root: Element) -> None:
-    """NotRead if pybullet would break a line of a model, or the model names a pipe for a mesh, or is a URDF with joints
-    or shapes of what is no number."""
+    """NotRead if pybullet would break a line of a model, or if the model names a pipe for a mesh.
+
+    NotRead, too, if a URDF has joints or shapes whose numbers are not finite.
+    """
     _must_not_be_broken(path.read_bytes())
     for name in named_files(root):
         _must_be_a_file(path, name)
