@@ -33,6 +33,7 @@ from harness.timing import timed
 from overlapper.jobs.cluster import Cluster
 from overlapper.jobs.executor import Executor, Shared, outcomes
 from overlapper.jobs.hand import Job
+from overlapper.jobs.patience import Late
 from overlapper.jobs.processes import Processes
 from overlapper.scenes.run import run
 from overlapper.sweep import page, tasks
@@ -125,8 +126,10 @@ class OfNothing:
     engine: Executor
     workers: int = 1
 
-    def shares(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Generator[Shared, None, None]:
-        return self.engine.shares(replace(job, module=__name__, prepare=empty.__name__), items, limit)
+    def shares(
+        self, job: Job, items: Sequence[Any], limit: float | None = None, late: Late | None = None
+    ) -> Generator[Shared, None, None]:
+        return self.engine.shares(replace(job, module=__name__, prepare=empty.__name__), items, limit, late)
 
 
 def driver(count: int, engine: Executor) -> None:

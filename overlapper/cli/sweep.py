@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from overlapper.sweep.left_out import LeftOut
     from overlapper.sweep.points import Axis, Space
     from overlapper.sweep.store import Store
+    from overlapper.sweep.study import Task
     from overlapper.sweep.sweep import Progress as Reached
     from overlapper.sweep.sweep import Sweep
 
@@ -183,6 +184,7 @@ def _run(
     todo: Sweep, store: Store, engine: Executor, limit: float | None, memory: int | None, retry: bool
 ) -> tuple[Reached, bool]:
     """How far it came; False if it was interrupted."""
+    from overlapper.scenes.parameters import described
     from overlapper.sweep.sweep import Progress as Reached
 
     console = Console(stderr=True)
@@ -207,8 +209,15 @@ def _run(
             rate = f"{speed:,.3g}/s{failed}" if speed else ""
             progress.update(bar, completed=now.total - now.missing, rate=rate)
 
+        def late(task: Task, among: int, seconds: float) -> None:
+            which = described(task.parameters) or "the task"
+            which = f"one of {among:,} tasks from {which} on" if among > 1 else which
+            console.print(
+                f"{which} has run for {seconds / 60:.0f} min; --limit ends such tasks", markup=False, highlight=False
+            )
+
         try:
-            todo.run(store, engine, limit, retry, heard, memory)
+            todo.run(store, engine, limit, retry, heard, memory, None if limit else late)
         except KeyboardInterrupt:
             return reached, False
     return reached, True

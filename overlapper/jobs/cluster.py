@@ -20,6 +20,7 @@ from typing import Any
 from overlapper.install import hint
 from overlapper.jobs.executor import Shared
 from overlapper.jobs.hand import Done, Hand, Job, Outcome
+from overlapper.jobs.patience import Late, Patience
 from overlapper.jobs.processes import SHARE as SHARE_OF_A_HAND
 from overlapper.jobs.shares import Shares
 from overlapper.jobs.worker import NotStarted
@@ -66,7 +67,9 @@ class Cluster:
         most = median_low([each for each in cpus if each] or [1])
         return min(math.ceil(self.workers / CREWS), most)
 
-    def shares(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Generator[Shared, None, None]:
+    def shares(
+        self, job: Job, items: Sequence[Any], limit: float | None = None, late: Late | None = None
+    ) -> Generator[Shared, None, None]:
         """See Executor."""
         ray, crew = self._ray, self._crew()
         crews = max(self.workers // crew, 1)
@@ -74,6 +77,7 @@ class Cluster:
         remote = ray.remote(num_cpus=crew, max_retries=0)(_work)
         shares = Shares(len(items), crews, crew * max(SHARE, crews / RATE), crew)
         under_way: dict[Any, list[int]] = {}
+        patience = Patience(late)
         losses, done = 0, False
         sent = ray.put(job)
         try:
@@ -81,11 +85,15 @@ class Cluster:
                 # Twice the shares that can be done at a time, so that nobody waits for the next. The cluster may grow.
                 most = 2 * max(self.workers // crew, 1)
                 while len(under_way) < most and (share := shares.take()):
-                    under_way[remote.remote(sent, [items[number] for number in share], limit, crew)] = share
+                    reference = remote.remote(sent, [items[number] for number in share], limit, crew)
+                    under_way[reference] = share
+                    patience.begin(reference, share)
+                patience.look()
                 if not under_way:
                     return
                 for ready in ray.wait([*under_way], num_returns=min(len(under_way), RATE), timeout=0.1)[0]:
                     share = under_way.pop(ready)
+                    patience.end(ready)
                     try:
                         gathered, count, seconds = ray.get(ready)
                     except ray.exceptions.RayTaskError as error:

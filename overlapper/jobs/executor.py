@@ -7,6 +7,7 @@ from contextlib import closing
 from typing import Any, Protocol
 
 from overlapper.jobs.hand import Job, Outcome
+from overlapper.jobs.patience import Late
 
 # The numbers of some items, and what the job gathers of them.
 Shared = tuple[list[int], Any]
@@ -20,11 +21,14 @@ class Executor(Protocol):
         """How many at a time."""
         ...
 
-    def shares(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Generator[Shared, None, None]:
+    def shares(
+        self, job: Job, items: Sequence[Any], limit: float | None = None, late: Late | None = None
+    ) -> Generator[Shared, None, None]:
         """The numbers of some items with what the job gathers of them, in whatever order, each item once.
 
-        `limit` is the number of seconds that an item may take. Items that are under way when the generator is closed
-        are given up, and no process is left. NotStarted if the job cannot be done at all.
+        `limit` is the number of seconds that an item may take. `late` hears of items that take very long. Items that
+        are under way when the generator is closed are given up, and no process is left. NotStarted if the job cannot be
+        done at all.
         """
         ...
 

@@ -12,9 +12,11 @@ from typing import Any
 
 from overlapper.jobs.executor import Shared
 from overlapper.jobs.hand import Done, Hand, Job, Outcome
+from overlapper.jobs.patience import Late, Patience
 from overlapper.jobs.shares import Shares
 
 SHARE = 0.2  # s of work that are sent at once
+LOOK = 1.0  # s after which items that are under way are looked at, at the latest
 
 # Outcomes that may wait for whoever writes them down, so that memory is not what a slow disk fills.
 WAITING = 64
@@ -38,19 +40,26 @@ class Processes:
         """How many at a time."""
         return self._workers
 
-    def shares(self, job: Job, items: Sequence[Any], limit: float | None = None) -> Generator[Shared, None, None]:
+    def shares(
+        self, job: Job, items: Sequence[Any], limit: float | None = None, late: Late | None = None
+    ) -> Generator[Shared, None, None]:
         """See Executor."""
         hands = [Hand(job, limit) for _ in range(min(self.workers, len(items)))]
         reports: queue.Queue[Report] = queue.Queue(WAITING)
         shares = Shares(len(items), len(hands), SHARE)
-        rest = job, items, shares, reports
+        patience = Patience(late)
+        rest = job, items, shares, reports, patience
         threads = [threading.Thread(target=_serve, args=(hand, *rest), daemon=True) for hand in hands]
         try:
             for thread in threads:
                 thread.start()
             left = len(items)
             while left:
-                report = reports.get()
+                patience.look()
+                try:
+                    report = reports.get(timeout=LOOK)
+                except queue.Empty:
+                    continue
                 if isinstance(report, Exception):
                     raise report
                 left -= len(report[0])
@@ -63,24 +72,35 @@ class Processes:
                     reports.get(timeout=0.01)
 
 
-def _serve(hand: Hand, job: Job, items: Sequence[Any], shares: Shares, reports: queue.Queue[Report]) -> None:
+def _serve(
+    hand: Hand, job: Job, items: Sequence[Any], shares: Shares, reports: queue.Queue[Report], patience: Patience
+) -> None:
     try:
         while share := shares.take():
-            for found in _batches(hand, [(number, items[number]) for number in share], shares):
+            for found in _batches(hand, [(number, items[number]) for number in share], shares, patience):
                 reports.put(([number for number, _, _ in found], job.gathered([each[1:] for each in found])))
             if hand.closed:
                 return
     except Exception as error:  # whoever waits for reports must hear of it
         reports.put(error)
     finally:
+        patience.end(hand)
         hand.close()
 
 
-def _batches(hand: Hand, share: Sequence[tuple[int, Any]], shares: Shares) -> Iterator[list[tuple[int, Any, Outcome]]]:
+def _batches(
+    hand: Hand, share: Sequence[tuple[int, Any]], shares: Shares, patience: Patience
+) -> Iterator[list[tuple[int, Any, Outcome]]]:
     """A share done: numbers and items with their outcomes, as many at a time as have taken SHARE together."""
     batch: list[tuple[int, Any, Outcome]] = []
     due = time.monotonic() + SHARE
-    for (number, item), outcome in zip(share, hand.work([item for _, item in share])):
+    following = [*(number for number, _ in share[1:]), None]
+    patience.begin(hand, [share[0][0]])
+    for (number, item), outcome, after in zip(share, hand.work([item for _, item in share]), following):
+        if after is None:
+            patience.end(hand)
+        else:
+            patience.begin(hand, [after])
         if isinstance(outcome, Done):
             shares.learn(1, outcome.seconds)
         batch.append((number, item, outcome))

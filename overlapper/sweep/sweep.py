@@ -83,11 +83,14 @@ class Sweep:
         retry: bool = False,
         heard: Callable[[Progress], object] = lambda progress: None,
         megabytes: int | None = None,
+        late: Callable[[Task, int, float], object] | None = None,
     ) -> Progress:
         """Do what is missing in the store, and with `retry` what has failed; `heard` is told now and then.
 
         Tasks fail that raise, take longer than `limit` seconds, take more memory than `megabytes`, or end their
-        process. They stop no other. NotStarted if no task can be run, OSError if a part cannot be written.
+        process. They stop no other. `late` hears of a task that takes very long, and for how many seconds; it may be
+        one of so many from that task on that are done together. NotStarted if no task can be run, OSError if a part
+        cannot be written.
         """
         state, pieces = self._found(store)
         progress = Progress(len(self), before=int((state == DONE).sum()))
@@ -99,7 +102,12 @@ class Sweep:
             store.assemble(self, pieces.pop(part))
         gather = tasks.gathered.__name__
         job = Job(tasks.__name__, tasks.prepared.__name__, self.study, gather, megabytes=megabytes)
-        with closing(engine.shares(job, _Tasks(self, missing), limit)) as shares:
+
+        def tell(numbers: Sequence[int], seconds: float) -> None:
+            if late:
+                late(self.task(int(missing[numbers[0]])), len(numbers), seconds)
+
+        with closing(engine.shares(job, _Tasks(self, missing), limit, tell if late else None)) as shares:
             for piece in (piece for _, gathered in shares for piece in gathered):
                 left[piece.part] -= piece.done + piece.failed
                 if piece.part not in pieces and not left[piece.part]:

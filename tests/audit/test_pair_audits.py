@@ -107,7 +107,7 @@ def test_a_failed_block_is_reported(table, monkeypatch):
     class Broken:
         workers = 1
 
-        def shares(self, job, items, limit=None):
+        def shares(self, job, items, limit=None, late=None):
             yield [7], [Failed("died", "its process ended with signal SIGKILL", "words")]
 
     monkeypatch.setattr(auditing, "FEW", 0)

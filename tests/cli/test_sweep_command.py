@@ -112,6 +112,17 @@ def test_a_sweep_with_nothing_to_compare_is_refused_before_it_begins():
     assert not Path("runs").exists()
 
 
+def test_without_a_limit_a_task_that_takes_very_long_is_named():
+    start = "import sys\nfrom overlapper.jobs import patience\nfrom overlapper.cli import main\npatience.LATE = 2\n"
+    words = ["sweep", "balls.py", "--grid", "seconds=0,6", "--workers", "1", "--out"]
+    command = [sys.executable, "-c", f"{start}sys.argv[1:] = {words!r} + sys.argv[1:]\nmain()"]
+    done = subprocess.run([*command, "runs"], capture_output=True, text=True, timeout=120)
+    words = "apart=0.15, seed=0, fate=good, seconds=6.0 has run for 0 min; --limit ends such tasks"
+    assert (done.returncode, " ".join(done.stderr.split())) == (0, words)
+    limited = subprocess.run([*command, "limited", "--limit", "60"], capture_output=True, text=True, timeout=120)
+    assert (limited.returncode, limited.stderr) == (0, "")
+
+
 def test_ctrl_c_ends_a_sweep_that_goes_on_later():
     words = ["--seeds", "40", "--set", "seconds=0.1", "--out", "runs", "--workers", "2"]
     command = [sys.executable, "-m", "overlapper", "sweep", "balls.py", *words]

@@ -8,7 +8,7 @@ from contextlib import closing
 import psutil
 import pytest
 
-from overlapper.jobs import worker
+from overlapper.jobs import patience, processes, worker
 from overlapper.jobs.executor import outcomes
 from overlapper.jobs.hand import Done, Failed, Hand, Job
 from overlapper.jobs.processes import Processes, cores
@@ -114,6 +114,17 @@ def test_all_items_are_done_once_by_all_processes():
     assert len({outcome.value[2] for _, outcome in found if isinstance(outcome, Done)}) == 2
     assert Processes().workers == cores() >= 1
     assert [*outcomes(engine, job(), [])] == []
+
+
+def test_an_item_that_takes_very_long_is_told_once(monkeypatch):
+    monkeypatch.setattr(patience, "LATE", 0.5)
+    monkeypatch.setattr(processes, "LOOK", 0.05)
+    told = []
+    items = [("give", 0), ("give", 1), ("sleep", 1.5), ("give", 3)]
+    with closing(Processes(1).shares(job(), items, late=lambda *late: told.append(late))) as shares:
+        assert sorted(number for numbers, _ in shares for number in numbers) == [0, 1, 2, 3]
+    ((numbers, seconds),) = told
+    assert numbers == [2] and 0.5 < seconds < 1.5
 
 
 def test_stopping_early_leaves_no_process_behind():

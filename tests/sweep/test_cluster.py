@@ -12,6 +12,7 @@ import ray_nodes
 from sweeping import begun, parts
 
 from overlapper.jobs import cluster as cluster_module
+from overlapper.jobs import patience
 from overlapper.jobs.cluster import LOSSES, Cluster
 from overlapper.jobs.executor import outcomes
 from overlapper.jobs.hand import Done, Job
@@ -105,6 +106,22 @@ def ray(monkeypatch):
     module = Ray()
     monkeypatch.setitem(sys.modules, "ray", module)
     return module
+
+
+def test_a_share_that_takes_very_long_is_told_once(ray, monkeypatch):
+    monkeypatch.setattr(patience, "LATE", -1.0)
+    told = []
+    with (
+        closing(Cluster()) as cluster,
+        closing(
+            cluster.shares(
+                Job("jobs", "doing", "x"), [("give", k) for k in range(3)], late=lambda *late: told.append(late)
+            )
+        ) as shares,
+    ):
+        assert sorted(number for numbers, _ in shares for number in numbers) == [0, 1, 2]
+    assert sorted(number for numbers, _ in told for number in numbers) == [0, 1, 2]
+    assert all(seconds >= 0 for _, seconds in told)
 
 
 def test_shares_that_are_lost_are_sent_once_more(ray):
