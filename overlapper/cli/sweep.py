@@ -236,6 +236,8 @@ def _tell(
     as_json: bool,
 ) -> None:
     """Report the result of the sweep, and exit with its code."""
+    from overlapper.sweep.store import text_of
+
     if as_json:
         told = {
             "scene": todo.study.scene,
@@ -256,11 +258,11 @@ def _tell(
         if compared:
             told["check"] = {
                 "recorded": str(compared.folder),
-                "compared": len(compared.tasks),
+                "compared": len(compared.numbers),
                 "not_recorded": compared.added,
                 "gone": compared.gone,
-                "measures": compared.counted(),
-                "moved": [task.found["task"] for task in compared.moved],
+                "measures": compared.counts,
+                "moved": [text_of(name) for name in todo.names[compared.moved]],
             }
         print(json.dumps(told))
     else:
@@ -284,7 +286,7 @@ def _tell(
             say(f"Written: {path}")
     wrong = bool(failed or left_out)
     if compared:
-        wrong = bool(compared.moved or failed > len(compared.failures))
+        wrong = bool(compared.worst or failed > compared.same_failures)
     raise typer.Exit(130 if not finished else int(wrong))
 
 

@@ -1,12 +1,17 @@
-"""A sweep held against a recorded one: which tasks came to something else, and by how many times their budgets."""
+"""A sweep held against a recorded one: which tasks came to something else, and by how many times their budgets.
+
+Both are read part by part. Of each task a few numbers stay in memory.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
-from itertools import chain
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +22,13 @@ from overlapper.printable import first_line
 from overlapper.scenes.parameters import Parameter, described
 from overlapper.sweep.measures import LEFT_OUT
 from overlapper.sweep.part import FAILURES, OF, TASK, TASKS, arrow
-from overlapper.sweep.store import Store, names_of, rows_in
-from overlapper.sweep.sweep import Sweep
+from overlapper.sweep.store import Names, Store, content, names_of
+from overlapper.sweep.sweep import Numbers, Sweep
 from overlapper.tables.table_file import read_metadata
-from overlapper.verdicts.comparison import off_by
 from overlapper.verdicts.expected import FORCES, ROUNDING, Budget, budgets_in
 
-Row = Mapping[str, Any]
-Key = tuple[Parameter, ...]
+Values = NDArray[np.float64]
+Block = Mapping[str, NDArray[Any]]
 
 # The measures compared, each with the quantity whose budget holds for it.
 BUDGETED = {"largest_volume_m3": "volume", "mean_volume_m3": "volume", "largest_depth_m": "depth"}
@@ -32,6 +36,16 @@ BUDGETED |= {"largest_force_n": "force"}  # of volumetric contact alone
 FORCE, CONTACT, TASK_ITSELF = "mean_force_m2", "contact_time_s", "task"
 COUNTED = ("skipped", "diverged")  # any difference is one; earlier versions did not count
 COMPARED = (TASK_ITSELF, *COUNTED, *BUDGETED, FORCE, CONTACT)
+
+DRAWN = ("largest_volume_m3", "largest_depth_m")  # the measures whose differences are kept for each task
+PUSHED = tuple(f"mean_force_{axis}_m2" for axis in "xyz")  # empty in a task in which nothing overlapped
+NEEDED = ("largest_volume_m3", "mean_volume_m3", "largest_depth_m", *PUSHED, CONTACT, "time_s", "steps")
+OPTIONAL = (*COUNTED, "largest_force_n")
+
+WHAT, DONE = "what", "done"
+
+WORST = 10  # tasks whose worst change is kept
+BLOCK = 50_000  # tasks that are compared at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,60 +68,87 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
-    """A task of both sweeps: its row as recorded and as found, that of its failure if it failed, and its changes."""
-
-    recorded: Row
-    found: Row
-    changes: list[Change]
-
-    @property
-    def worst(self) -> Change:
-        """The change that takes most of its budget; there must be one."""
-        return max(self.changes, key=lambda change: change.part)
-
-    def difference(self, measure: str) -> float:
-        """How much more of a measure it is than recorded; not a number where the task failed."""
-        was, now = (row.get(measure, math.nan) for row in (self.recorded, self.found))
-        return float(now - was)
-
-
-@dataclass(frozen=True, slots=True)
 class Comparison:
-    """The tasks that both sweeps have; `added` and `gone` are numbers of tasks that only this or the other has."""
+    """The tasks that both sweeps have.
+
+    `numbers` are those of the tasks in the sweep, and `parts` how many times its budget the worst measure of each has
+    moved; above 1, the task has moved. `differences` say how much more of some measures each task has than recorded,
+    not a number where the task failed. `counts` says in how many tasks each measure has moved. `worst` has the worst
+    change of the worst tasks, `same_failures` counts the tasks that failed as they had when they were recorded, and
+    `added` and `gone` are numbers of tasks that only this or the other sweep has.
+    """
 
     folder: Path
-    tasks: list[Compared] = field(default_factory=list)
-    added: int = 0
-    gone: int = 0
+    numbers: Numbers
+    parts: Values
+    differences: Mapping[str, Values]
+    counts: Mapping[str, int]
+    worst: Sequence[Change]
+    same_failures: int
+    added: int
+    gone: int
 
     @property
-    def moved(self) -> list[Compared]:
-        """The tasks that have moved, the worst first."""
-        return sorted((task for task in self.tasks if task.changes), key=lambda task: -task.worst.part)
-
-    @property
-    def failures(self) -> set[str]:
-        """The tasks that have failed as they had when they were recorded, by name."""
-        return {task.found[TASK] for task in self.tasks if "what" in task.found and not task.changes}
-
-    def counted(self) -> dict[str, int]:
-        """In how many tasks each measure has moved, if it has in any."""
-        counts = Counter(change.measure for task in self.tasks for change in task.changes)
-        return {name: counts[name] for name in COMPARED if name in counts}
+    def moved(self) -> Numbers:
+        """The numbers of the tasks that have moved, the worst first."""
+        order = np.argsort(-self.parts, kind="stable")
+        return self.numbers[order][: int((self.parts > 1).sum())]
 
     def lines(self, limit: int) -> list[str]:
         """How many tasks have moved, and the `limit` worst ones, each with its worst measure."""
-        moved = self.moved
-        by_measure = ", ".join(f"{name} in {count:,}" for name, count in self.counted().items())
-        said = f"{len(moved):,} of {len(self.tasks):,} tasks have moved since {self.folder}: {by_measure}."
-        lines = [said if moved else f"{len(self.tasks):,} of {len(self.tasks):,} tasks are as in {self.folder}."]
-        lines += [f"    {task.worst}" for task in moved[:limit]]
-        if len(moved) > limit:
-            lines.append(f"    and {len(moved) - limit:,} more")
+        moved, compared = int((self.parts > 1).sum()), len(self.numbers)
+        by_measure = ", ".join(f"{name} in {count:,}" for name, count in self.counts.items())
+        said = f"{moved:,} of {compared:,} tasks have moved since {self.folder}: {by_measure}."
+        lines = [said if moved else f"{compared:,} of {compared:,} tasks are as in {self.folder}."]
+        lines += [f"    {change}" for change in self.worst[:limit]]
+        if moved > limit:
+            lines.append(f"    and {moved - limit:,} more")
         if self.added or self.gone:
             lines.append(f"Not compared: {self.added:,} that were not recorded, {self.gone:,} that are no more.")
         return lines
+
+
+@dataclass(frozen=True, slots=True)
+class _Side:
+    """The tasks of one of the two sweeps, by their numbers in the sweep that is compared.
+
+    `read` gives some columns of a file, and `numbers` the number of each of its rows, -1 for other tasks; it takes the
+    columns `told`. `place` (n,) says in which of `files` each task is, -1 for none.
+    """
+
+    files: Sequence[Path]
+    read: Callable[[Path, Sequence[str]], Any]
+    told: Sequence[str]
+    numbers: Callable[[Any], Numbers]
+    place: NDArray[np.int32]
+
+    def block(self, wanted: Numbers) -> Block:
+        """The columns of some tasks, whose numbers are in order; `what` is "done" or how the task failed.
+
+        All others are numbers, and not a number for a task that failed. Optional columns may not be there.
+        """
+        found: dict[str, NDArray[Any]] = {name: np.full(len(wanted), np.nan) for name in (*NEEDED, *OPTIONAL)}
+        found[WHAT] = np.full(len(wanted), DONE, object)
+        lacking = {*OPTIONAL}
+        for place in np.unique(self.place[wanted]).tolist():
+            rows = self.read(self.files[place], [*self.told, *found])
+            numbers = self.numbers(rows)
+            at = np.minimum(np.searchsorted(wanted, numbers), len(wanted) - 1)
+            ours = (wanted[at] == numbers) & (self.place[numbers] == place)
+            for name in found.keys() & set(rows.column_names):
+                column = rows.column(name)
+                values = column.to_pylist() if name == WHAT else column.fill_null(0).to_numpy()
+                found[name][at[ours]] = np.asarray(values, found[name].dtype)[ours]
+            lacking -= {*rows.column_names}
+        return {name: values for name, values in found.items() if name not in lacking}
+
+
+def _places(count: int, numbers: Iterable[Numbers]) -> NDArray[np.int32]:
+    """In which part each of so many tasks is, by the numbers in each part; of several parts, the last."""
+    place = np.full(count, -1, np.int32)
+    for part, found in enumerate(numbers):
+        place[found[found >= 0]] = part
+    return place
 
 
 class Recorded:
@@ -120,93 +161,190 @@ class Recorded:
 
     def __init__(self, folder: Path, expected: Path, sweep: Sweep) -> None:
         self._folder, self._sweep = folder, sweep
-        self._budgets = (
-            ROUNDING | FORCES | (budgets_in(read_metadata(expected), expected) if expected.is_file() else {})
-        )
-        rows = _rows(folder)
-        if not rows:
+        budgets = budgets_in(read_metadata(expected), expected) if expected.is_file() else {}
+        self._budgets: Mapping[str, Budget] = ROUNDING | FORCES | budgets
+        # Failures first: a task that is there both as failed and as done is done.
+        tables = [folder / f"{table}.parquet" for table in (FAILURES, TASKS)]
+        files = [path for table in tables for path in sorted(table.glob("*.parquet"))]
+        if not files:
             raise ValueError(f"--check {folder}: there is no sweep in it")
-        points = sweep.points
-        self._names = [name for name in points[0] if all(name in row for row in rows)]
-        self._rows = self._by_point(rows, "the sweep in it")
-        if not self._rows.keys() & self._by_point(points, "this sweep").keys():
+        columns = [self._columns(path) for path in files]
+        self._names = [name for name in sweep.points[0] if all(name in each for each in columns)]
+        keys = np.fromiter((_key(point[name] for name in self._names) for point in sweep.points), "S16", len(sweep))
+        self._order = np.argsort(keys)
+        self._keys = keys[self._order]
+        self._must_differ(self._keys, "this sweep")
+        told = [TASK, *self._names]
+        place = _places(len(sweep), (self._numbers(rows) for rows in self._counted(files, told)))
+        if not (place >= 0).any():
             raise ValueError(f"--check {folder}: it has none of the tasks of this sweep")
+        self._recorded = _Side(files, self._read, told, self._numbers, place)
 
-    def _by_point(self, rows: Collection[Row], whose: str) -> dict[Key, Row]:
-        found = {self._key(row): row for row in rows}
-        if len(found) < len(rows):
+    def _counted(self, files: Iterable[Path], told: Sequence[str]) -> Iterator[Any]:
+        """The rows of each part. At the end, the number of tasks is known. ValueError if two of them are the same."""
+        tasks, keys = [], []
+        for path in files:
+            yield (rows := self._read(path, told))
+            tasks.append(np.array(names_of(rows.column(TASK))))
+            keys.append(self._keys_of(rows))
+        names, first = np.unique(np.concatenate(tasks), return_index=True)
+        self._count = len(names)
+        self._must_differ(np.sort(np.concatenate(keys)[first]), "the sweep in it")
+
+    def _must_differ(self, keys: Names, whose: str) -> None:
+        """ValueError if two of some sorted keys are the same."""
+        if (keys[1:] == keys[:-1]).any():
             same = f"the same {', '.join(self._names)}" if self._names else "nothing to tell them apart"
             raise ValueError(f"--check {self._folder}: by the parameters of both, tasks of {whose} have {same}")
-        return found
 
-    def _key(self, row: Row) -> Key:
-        values = (row[name] for name in self._names)
-        # Another version of NumPy may have another last digit in a grid of equal factors.
-        return tuple(float(f"{value:.12g}") if isinstance(value, float) else value for value in values)
+    def _columns(self, path: Path) -> set[str]:
+        """The columns of a part. ValueError if one is missing that is compared."""
+        columns = {*self._opened(path).schema_arrow.names}
+        if missing := {TASK, *OF[path.parent.stem]} - LEFT_OUT.keys() - columns:
+            raise ValueError(f"--check {self._folder}: {path.parent.name} has no column {min(missing)!r}")
+        return columns
+
+    def _opened(self, path: Path) -> Any:
+        pyarrow = arrow()
+        try:
+            return pyarrow.parquet.ParquetFile(path, page_checksum_verification=True)
+        except (pyarrow.ArrowException, OSError) as error:
+            raise self._unreadable(path, error) from error
+
+    def _read(self, path: Path, columns: Sequence[str]) -> Any:
+        """Those columns of a part that are there."""
+        with self._opened(path) as file:
+            try:
+                return file.read(columns=[*columns])
+            except (arrow().ArrowException, OSError) as error:
+                raise self._unreadable(path, error) from error
+
+    def _unreadable(self, path: Path, error: Exception) -> ValueError:
+        return ValueError(f"--check {self._folder}: {path.parent.name} cannot be read: {first_line(error)}")
+
+    def _keys_of(self, rows: Any) -> Names:
+        points = zip(*(rows.column(name).to_pylist() for name in self._names)) if self._names else [()] * len(rows)
+        return np.fromiter((_key(point) for point in points), "S16", len(rows))
+
+    def _numbers(self, rows: Any) -> Numbers:
+        """The number in our sweep of each row of a part; -1 for tasks that it does not have."""
+        keys = self._keys_of(rows)
+        at = np.minimum(np.searchsorted(self._keys, keys), len(self._keys) - 1)
+        return np.where(self._keys[at] == keys, self._order[at], -1)
 
     def compare(self, store: Store) -> Comparison:
         """The comparison of the tasks that both sweeps have, as far as the sweep has come in its store."""
-        rows = []
-        for part in chain(store.rows(TASKS), store.rows(FAILURES)):
-            ours = self._sweep.numbers(names_of(part.column(TASK))) >= 0
-            rows += part.filter(arrow().array(ours)).to_pylist()
-        found = self._by_point(rows, "this sweep")
-        both = [key for key in found if key in self._rows]
-        tasks = [Compared(self._rows[key], found[key], self._changes(self._rows[key], found[key])) for key in both]
-        return Comparison(self._folder, tasks, len(found) - len(both), len(self._rows) - len(both))
+        sweep, recorded = self._sweep, self._recorded
 
-    def _changes(self, was: Row, now: Row) -> list[Change]:
-        parameters = {name: now[name] for name in self._sweep.points[0]}
-        before, after = (row.get("what", "done") for row in (was, now))
-        if before != after:
-            return [Change(parameters, TASK_ITSELF, before, after)]
-        measured = () if before != "done" else _measured(was, now, self._budgets)
-        return [
-            Change(parameters, measure, f"{a:.9g}", f"{b:.9g}", part) for measure, a, b, part in measured if part > 1
-        ]
+        def numbers(rows: Any) -> Numbers:
+            return sweep.numbers(names_of(rows.column(TASK)))
+
+        files = [path for table in (FAILURES, TASKS) for path in store.files(table)]
+        place = _places(len(sweep), (numbers(content(path, [TASK])) for path in files))
+        found = _Side(files, content, [TASK], numbers, place)
+        both = np.flatnonzero((place >= 0) & (recorded.place >= 0))
+        tally = _Tally(sweep.points)
+        for start in range(0, len(both), BLOCK):
+            wanted = both[start : start + BLOCK]
+            tally.add(wanted, recorded.block(wanted), found.block(wanted), self._budgets)
+        added = int((place >= 0).sum()) - len(both)
+        return tally.comparison(self._folder, both, added, self._count - len(both))
 
 
-def _measured(was: Row, now: Row, budgets: Mapping[str, Budget]) -> Iterator[tuple[str, float, float, float]]:
+class _Tally:
+    """The changes of some blocks of tasks."""
+
+    def __init__(self, points: Sequence[Mapping[str, Parameter]]) -> None:
+        self._points = points
+        self._parts, self._differences = [np.empty(0)], {name: [np.empty(0)] for name in DRAWN}
+        self._counts: Counter[str] = Counter()
+        self._worst: list[tuple[float, int, Change]] = []
+        self._same_failures = 0
+
+    def add(self, numbers: Numbers, was: Block, now: Block, budgets: Mapping[str, Budget]) -> None:
+        """Take in a block of tasks, as they were and as they are."""
+        changed = was[WHAT] != now[WHAT]
+        done = ~changed & (now[WHAT] == DONE)
+        self._same_failures += int((~changed & (now[WHAT] != DONE)).sum())
+        measured: dict[str, tuple[NDArray[Any], NDArray[Any], Values]]
+        measured = {TASK_ITSELF: (was[WHAT], now[WHAT], np.where(changed, np.inf, 0.0))}
+        with np.errstate(all="ignore"):
+            for measure, before, after, part in _measured(was, now, budgets):
+                measured[measure] = before, after, np.where(done, part, 0.0)
+        parts = np.array([part for _, _, part in measured.values()])
+        self._counts.update({name: int((part > 1).sum()) for name, (_, _, part) in measured.items()})
+        of_task = parts.max(axis=0)
+        self._parts.append(of_task)
+        for name, each in self._differences.items():
+            each.append(np.where(done, now[name] - was[name], np.nan))
+        for at in np.argsort(-of_task, kind="stable")[:WORST]:
+            if of_task[at] > 1:
+                measure = [*measured][int(parts[:, at].argmax())]
+                recorded, found = (_text(values[at]) for values in measured[measure][:2])
+                number = int(numbers[at])
+                change = Change(self._points[number], measure, recorded, found, float(of_task[at]))
+                self._worst.append((-change.part, number, change))
+        self._worst = sorted(self._worst, key=itemgetter(0, 1))[:WORST]
+
+    def comparison(self, folder: Path, numbers: Numbers, added: int, gone: int) -> Comparison:
+        """The comparison of all tasks that were taken in, which have these numbers."""
+        return Comparison(
+            folder,
+            numbers,
+            np.concatenate(self._parts),
+            {name: np.concatenate(each) for name, each in self._differences.items()},
+            {name: self._counts[name] for name in COMPARED if self._counts[name]},
+            [change for *_, change in self._worst],
+            self._same_failures,
+            added,
+            gone,
+        )
+
+
+def _measured(was: Block, now: Block, budgets: Mapping[str, Budget]) -> Iterator[tuple[str, Values, Values, Values]]:
     """Each measure with what it was and is, and the part of its budget that the difference takes."""
-    for count in COUNTED:
-        if count in was:
-            yield count, was[count], now[count], _part(Budget(0.0, 0.0), off_by(was[count], now[count]), was[count])
-    for measure, quantity in BUDGETED.items():
-        if measure not in was or measure not in now:
-            continue
-        a, b = float(was[measure]), float(now[measure])
-        yield measure, a, b, _part(budgets[quantity], off_by(a, b), a)
+    for measure in (*COUNTED, *BUDGETED):
+        if measure in was and measure in now:
+            budget = budgets[BUDGETED[measure]] if measure in BUDGETED else Budget(0.0, 0.0)
+            a, b = was[measure], now[measure]
+            yield measure, a, b, _part(_off_by(a, b), budget.absolute + budget.relative * abs(a))
     # Forces that cancel leave the rounding of all the surface that they are of, which is not less than this.
-    surface = float(was["largest_volume_m3"]) ** (2 / 3)
-    forces = mean_force(was), mean_force(now)
-    a, b = (float(np.linalg.norm(force)) for force in forces)
-    yield FORCE, a, b, _part(budgets["area"], float(np.linalg.norm(forces[1] - forces[0])), max(a, surface))
+    surface, area = was["largest_volume_m3"] ** (2 / 3), budgets["area"]
+    forces = [np.stack([block[name] for name in PUSHED]) for block in (was, now)]
+    a, b, change = (np.linalg.norm(each, axis=0) for each in (*forces, forces[1] - forces[0]))
+    yield FORCE, a, b, _part(change, area.absolute + area.relative * np.maximum(a, surface))
     # It is a number of steps, and times are sums: half of one is none.
-    a, b = float(was[CONTACT]), float(now[CONTACT])
-    yield CONTACT, a, b, _part(Budget(0.0, was["time_s"] / was["steps"] / 2), off_by(a, b), a)
+    a, b = was[CONTACT], now[CONTACT]
+    yield CONTACT, a, b, _part(_off_by(a, b), was["time_s"] / was["steps"] / 2)
 
 
-def _part(budget: Budget, difference: float, recorded: float) -> float:
-    """The part of a budget that a difference takes; infinite if it is not a number."""
-    part = budget.spent(difference, recorded)
-    return math.inf if math.isnan(part) else part
+def _off_by(was: NDArray[Any], now: NDArray[Any]) -> NDArray[Any]:
+    """The change of a measure. Not-a-number differs from every number, and not from itself."""
+    return np.where((was == now) | (np.isnan(was) & np.isnan(now)), 0.0, abs(now - was))
 
 
-def mean_force(row: Row) -> NDArray[np.float64]:
-    """(3,) m², of a task that is done; zeros of one in which nothing overlapped."""
-    return np.array([row[f"mean_force_{axis}_m2"] or 0.0 for axis in "xyz"])
+def _part(difference: NDArray[Any], allowed: NDArray[Any]) -> Values:
+    """The part of what is allowed that a difference takes; infinite if it is not a number."""
+    part = np.where(difference == 0, 0.0, difference / allowed)
+    return np.where(np.isnan(part), np.inf, part)
 
 
-def _rows(folder: Path) -> list[Row]:
-    """Those of all tasks that are done or have failed; of one that is both, that it is done."""
-    rows: dict[str, Row] = {}
-    for table in (FAILURES, TASKS):
-        try:
-            found = rows_in(folder, table)
-        except (OSError, ValueError, KeyError) as error:
-            lacking = f"it has no column {error}" if isinstance(error, KeyError) else first_line(error)
-            raise ValueError(f"--check {folder}: {table}.parquet cannot be read: {lacking}") from error
-        if found and (missing := OF[table].keys() - LEFT_OUT.keys() - found[0].keys()):
-            raise ValueError(f"--check {folder}: {table}.parquet has no column {min(missing)!r}")
-        rows |= {row[TASK]: row for row in found}
-    return [*rows.values()]
+def _key(values: Iterable[Parameter]) -> bytes:
+    """A digest of parameters, 16 bytes, by which tasks are told apart."""
+    return hashlib.sha256("\0".join(map(_to_12_digits, values)).encode()).digest()[:16]
+
+
+@lru_cache(maxsize=4096)
+def _to_12_digits(value: Parameter) -> str:
+    """A text of a parameter, the same for equal ones.
+
+    Another version of NumPy may have another last digit in a grid of equal factors.
+    """
+    if isinstance(value, str):
+        return repr(value)
+    rounded = float(f"{value:.12g}") if isinstance(value, float) else value
+    return repr(rounded) if isinstance(rounded, float) and not rounded.is_integer() else str(int(rounded))
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:.9g}"

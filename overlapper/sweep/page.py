@@ -20,6 +20,7 @@ from overlapper.sweep import charts
 from overlapper.sweep.comparison import Comparison
 from overlapper.sweep.left_out import LeftOut
 from overlapper.sweep.part import FAILURES, TASKS
+from overlapper.sweep.points import array_of
 from overlapper.sweep.store import Store
 from overlapper.sweep.sweep import Sweep
 from overlapper.tables.outputs import recorder
@@ -127,7 +128,7 @@ def command(sweep: Sweep, scene: str, row: Row, place: Path) -> str:
 
 
 def _worst(sweep: Sweep, store: Store, scene: str, worst: Sequence[Row]) -> str:
-    varied = _varied({name: _values(row[name] for row in worst) for name in sweep.points[0]})
+    varied = _varied({name: array_of([row[name] for row in worst]) for name in sweep.points[0]})
     heading = [*varied, "volume, cm³", "depth, mm", "pair", "step", "page"]
     cells = "".join(f"<th>{html.escape(name)}</th>" for name in heading)
     lines = [f"<tr>{cells}</tr>"]
@@ -154,22 +155,24 @@ def _moved(sweep: Sweep, comparison: Comparison) -> Iterable[str]:
     first, *more = comparison.lines(0)
     said = " ".join([first, *(line for line in more if not line.startswith(" "))])
     yield f"<h2>What has moved</h2><p>{html.escape(said)}</p>"
-    if not comparison.moved:
+    if not comparison.worst:
         return
-    varied = [*_varied({name: _values(task.found[name] for task in comparison.tasks) for name in sweep.points[0]})]
+    over = {name: sweep.points.values(name, comparison.numbers) for name in sweep.points[0]}
+    varied = [*_varied(over)]
     heading = [*varied, "measure", "recorded", "now", "times its budget"]
     lines = ["<tr>" + "".join(f"<th>{html.escape(name)}</th>" for name in heading) + "</tr>"]
-    for task in comparison.moved[:WORST]:
-        worst = task.worst
+    for worst in comparison.worst[:WORST]:
         part = f"{worst.part:.3g}" if math.isfinite(worst.part) else ""
-        cells = [*(_figure(task.found[name]) for name in varied), worst.measure, worst.recorded, worst.found, part]
+        cells = [_figure(worst.parameters[name]) for name in varied]
+        cells += [worst.measure, worst.recorded, worst.found, part]
         lines.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
     yield f'<div class="wide"><table>{"".join(lines)}</table></div>'
-    columns = [(MOVED, np.array([float(bool(task.changes)) for task in comparison.tasks]))]
-    for measure in charts.MEASURES[:2]:
-        change = replace(measure, label=f"change of {measure.label}")
-        columns.append((change, np.array([task.difference(measure.column) for task in comparison.tasks])))
-    axes = [charts.axis(name, [task.found[name] for task in comparison.tasks]) for name in varied[:DRAWN]]
+    columns = [(MOVED, (comparison.parts > 1).astype(float))]
+    for measure in charts.MEASURES:
+        if measure.column in comparison.differences:
+            change = replace(measure, label=f"change of {measure.label}")
+            columns.append((change, comparison.differences[measure.column]))
+    axes = [charts.axis(name, over[name]) for name in varied[:DRAWN]]
     if axes:
         means = (
             "The mean of all tasks with a value, and the band that holds them; nothing of measures where one failed."
@@ -219,12 +222,6 @@ def _charts(columns: Columns, varied: Iterable[str], measures: Sequence[charts.M
 def _measured(columns: Columns, measure: charts.Measure) -> NDArray[np.float64]:
     values = [columns[name] for name in _stored(measure)]
     return values[0] if len(values) == 1 else np.linalg.norm(values, axis=0)
-
-
-def _values(values: Iterable[Any]) -> NDArray[Any]:
-    """The values of a parameter; texts stay as they are."""
-    values = [*values]
-    return np.array(values, object if isinstance(values[0], str) else None)
 
 
 def _figure(value: Any) -> str:

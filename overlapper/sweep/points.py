@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from overlapper.install import hint
 from overlapper.scenes.parameters import Parameter, known, value_of
@@ -63,6 +64,19 @@ class Points(Sequence[Point]):
             number, at = divmod(number, len(axis))
             point.update(axis[at])
         return point
+
+    def values(self, name: str, numbers: NDArray[np.intp]) -> NDArray[Any]:
+        """A parameter of some points; texts stay as they are."""
+        for axis in reversed(self._axes):
+            numbers, at = np.divmod(numbers, len(axis))
+            if name in axis.columns:
+                return array_of(axis.columns[name])[at]
+        return array_of([self._start[name]]).repeat(len(numbers))
+
+
+def array_of(values: Sequence[Parameter]) -> NDArray[Any]:
+    """The values of a parameter as an array, in which texts stay as they are."""
+    return np.array(values, object if isinstance(values[0], str) else None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -335,12 +335,3 @@ def _locked(folder: Path) -> Any:
     except Timeout as error:
         raise ValueError(f"another sweep is at work in {folder}") from error
     return lock
-
-
-def rows_in(folder: Path, table: str) -> list[dict[str, Any]]:
-    """All rows of a table in the folder of a sweep, by the names of their tasks; none if there is no such table."""
-    place = folder / f"{table}.parquet"
-    if not place.is_dir():
-        return []
-    rows = arrow().parquet.read_table(place, page_checksum_verification=True).to_pylist()
-    return sorted(rows, key=lambda row: str(row["task"]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from overlapper.jobs.executor import Executor
 from overlapper.jobs.hand import Job
-from overlapper.scenes.parameters import Parameter
 from overlapper.sweep import tasks
 from overlapper.sweep.part import arrow
+from overlapper.sweep.points import Points
 from overlapper.sweep.store import Names, Store, text_of
 from overlapper.sweep.study import Study, Task
 
@@ -46,7 +46,7 @@ class Sweep:
     """The tasks of a study, one for each point. A task has the number of its point; tasks in a row make a part."""
 
     study: Study
-    points: Sequence[Mapping[str, Parameter]]
+    points: Points
     names: Names = field(init=False)
     size: int = field(init=False)
     _order: Numbers = field(init=False)

@@ -3,6 +3,7 @@
 import math
 import re
 import shutil
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,13 @@ import pyarrow.parquet
 import pytest
 from sweeping import BALLS, rows, sweep_of, swept
 
+from overlapper.jobs.hand import Done
+from overlapper.sweep import comparison as comparison_module
 from overlapper.sweep import page
 from overlapper.sweep.comparison import Recorded
+from overlapper.sweep.measures import Measures
 from overlapper.sweep.part import TASKS, digest, parts
+from overlapper.sweep.tasks import gathered
 
 GRIDS = ["apart=0.1:0.19:4", "seed=0,1"]
 NOWHERE = Path("expected/balls.csv")
@@ -65,7 +70,7 @@ def compared(check, runs, grids=GRIDS, expected=NOWHERE):
 def test_a_sweep_is_as_it_was_recorded(recorded):
     comparison = compared(recorded, recorded)
     assert comparison.lines(10) == [f"8 of 8 tasks are as in {recorded}."]
-    assert comparison.moved == [] and comparison.counted() == {}
+    assert not comparison.moved.size and comparison.counts == {}
 
 
 @pytest.mark.parametrize(
@@ -82,26 +87,88 @@ def test_a_sweep_is_as_it_was_recorded(recorded):
 def test_a_measure_moves_by_more_than_its_budget(recorded, other, measure, factor, moved):
     other(**{measure: lambda row: row[measure] * (factor if row["seed"] else 1.0)})
     comparison = compared("other", recorded)
-    assert comparison.counted() == ({measure: 4} if moved else {})
-    assert {task.found["seed"] for task in comparison.moved} == ({1} if moved else set())
+    assert comparison.counts == ({measure: 4} if moved else {})
+    assert {change.parameters["seed"] for change in comparison.worst} == ({1} if moved else set())
 
 
 def test_forces_are_compared_as_vectors_and_their_rounding_is_that_of_the_surface(recorded, other):
     row = max(rows(recorded), key=lambda row: row["largest_volume_m3"])
     surface = row["largest_volume_m3"] ** (2 / 3)
     other(mean_force_y_m2=lambda row: (row["mean_force_y_m2"] or 0.0) + 1e-12 * surface)
-    assert compared("other", recorded).counted() == {}
+    assert compared("other", recorded).counts == {}
     other(mean_force_y_m2=lambda row: 0.1 * surface)
-    assert compared("other", recorded).counted() == {"mean_force_m2": 8}
+    assert compared("other", recorded).counts == {"mean_force_m2": 8}
 
 
 def test_nan_differs_from_numbers_and_not_from_nan(recorded, other):
     other(largest_depth_m=lambda row: math.nan if row["seed"] else row["largest_depth_m"])
     comparison = compared("other", recorded)
-    assert comparison.counted() == {"largest_depth_m": 4}
+    assert comparison.counts == {"largest_depth_m": 4}
     assert comparison.lines(1)[1].endswith(", recorded as nan")
     shutil.copytree("other", "same")
-    assert compared("other", "same").moved == []
+    assert not compared("other", "same").moved.size
+
+
+def test_a_comparison_block_by_block_is_the_same(recorded, other, monkeypatch):
+    other(largest_depth_m=lambda row: row["largest_depth_m"] * (1 + row["apart"]), skipped=lambda row: row["seed"])
+    whole = compared("other", recorded)
+    assert whole.counts == {"skipped": 4, "largest_depth_m": 8} and whole.parts.shape == (8,)
+    monkeypatch.setattr(comparison_module, "BLOCK", 3)
+    blocks = compared("other", recorded)
+    assert blocks.lines(20) == whole.lines(20)
+    assert np.array_equal(blocks.parts, whole.parts) and np.array_equal(blocks.moved, whole.moved)
+    assert np.array_equal(blocks.differences["largest_depth_m"], whole.differences["largest_depth_m"])
+
+
+class AtOnce:
+    """An executor whose tasks need no scene and no process; `factor` changes what they come to."""
+
+    workers = 1
+
+    def __init__(self, factor=1.0):
+        self.factor = factor
+
+    def shares(self, job, items, limit=None, late=None):
+        row = Measures().row() | {"steps": 1, "time_s": 1 / 240}
+        for start in range(0, len(items), 500):
+            numbers = range(start, min(start + 500, len(items)))
+            rows = [row | {"largest_volume_m3": 1e-9 * self.factor * (items[number].number + 1)} for number in numbers]
+            yield [*numbers], gathered(job.setup, [(items[k], Done({TASKS: of}, 0.0)) for k, of in zip(numbers, rows)])
+
+
+def test_the_memory_of_a_comparison_hardly_grows_with_the_tasks(monkeypatch):
+    """A row as a dictionary takes some thousand bytes."""
+    monkeypatch.setattr(comparison_module, "BLOCK", 500)
+    peaks = []
+    for count in (4000, 16_000):
+        grids = [f"apart=0.1:0.2:{count // 4}", "seed=0,1,2,3"]
+        for folder, factor in (("before", 1.0), ("after", 1.001)):
+            swept(f"{folder}-{count}", grids, engine=AtOnce(factor))
+        sweep = sweep_of(grids)
+        with sweep.opened(Path(f"after-{count}")) as store:
+            tracemalloc.start()
+            comparison = Recorded(Path(f"before-{count}"), NOWHERE, sweep).compare(store)
+            peaks.append(tracemalloc.get_traced_memory()[1])
+            tracemalloc.stop()
+        assert len(comparison.numbers) == len(comparison.moved) == count
+        assert comparison.lines(0)[0] == f"{count:,} of {count:,} tasks have moved since before-{count}: " + (
+            f"largest_volume_m3 in {count:,}."
+        )
+    assert (peaks[1] - peaks[0]) / 12_000 < 300
+
+
+def test_parameters_are_equal_to_12_digits_whatever_their_type():
+    key = comparison_module._key
+    assert key([0.1, 1, "red"]) == key([0.1 + 1e-14, 1.0, "red"]) == key([0.1, True, "red"])
+    others = [
+        [0.1, 1, "redd"],
+        [0.1 + 1e-11, 1, "red"],
+        [0.1, 2, "red"],
+        [0.1, "1", "red"],
+        [10**17, 1],
+        [10**17 + 1, 1],
+    ]
+    assert len({key(each) for each in [[0.1, 1, "red"], *others]}) == 7
 
 
 def test_budgets_are_those_of_the_expected_file(recorded, other):
@@ -109,7 +176,7 @@ def test_budgets_are_those_of_the_expected_file(recorded, other):
     assert len(compared("other", recorded).moved) == 8
     NOWHERE.parent.mkdir()
     NOWHERE.write_text("# budget volume: relative 0.02 absolute 0.0\n")
-    assert compared("other", recorded).moved == []
+    assert not compared("other", recorded).moved.size
 
 
 def test_the_largest_change_is_reported_first_with_its_parameters(recorded, other):
@@ -129,13 +196,12 @@ def test_a_task_that_failed_on_one_side_has_moved(tmp_path):
     Path("balls.py").write_text(BALLS.replace('fate == "raises"', "apart == 0.12"))
     swept("after", grids)
     comparison = compared("before", "after", grids)
-    assert comparison.counted() == {"task": 2}
+    assert comparison.counts == {"task": 2}
     assert sorted(comparison.lines(10)[1:]) == [
         "    apart=0.1, seed=0, fate=raises, seconds=0.0: task is done, recorded as raised",
         "    apart=0.12, seed=0, fate=good, seconds=0.0: task is raised, recorded as done",
     ]
-    failed = {row["task"]: row["fate"] for row in rows("after", "failures")}
-    assert {failed[name] for name in comparison.failures} == {"raises"}
+    assert comparison.same_failures == 1
 
 
 def test_tasks_are_matched_by_the_parameters_that_both_have(recorded):
@@ -183,7 +249,7 @@ def without(column):
         (lambda: shutil.rmtree("other"), "there is no sweep in it"),
         (lambda: spoiled("tasks.parquet"), "tasks.parquet cannot be read: .*[Pp]arquet"),
         (lambda: spoiled("failures.parquet"), "failures.parquet cannot be read: .*[Pp]arquet"),
-        (lambda: without("task"), "tasks.parquet cannot be read: it has no column 'task'"),
+        (lambda: without("task"), "tasks.parquet has no column 'task'"),
         (lambda: without("largest_depth_m"), "tasks.parquet has no column 'largest_depth_m'"),
     ],
 )
@@ -217,5 +283,6 @@ def test_the_page_has_a_map_of_where_it_has_moved():
     # Lines over each of the three parameters, maps over each two.
     assert text.count("<svg") == plain.count("<svg") + 6 and "change of largest volume, cm³" in text
     assert "tasks that moved, %" in text
-    assert {np.sign(task.difference("largest_volume_m3")) for task in comparison.moved} == {-1}
-    assert sum(np.isnan(task.difference("largest_volume_m3")) for task in comparison.tasks) == 5
+    differences = comparison.differences["largest_volume_m3"]
+    assert {*np.sign(differences[comparison.parts > 1])} == {-1}
+    assert np.isnan(differences).sum() == 5
