@@ -206,6 +206,9 @@ def _not_watched(script: Path, watches: Watches, how: Mapping[str, Any], astray:
         told.append(f"nothing was measured: {script} {_steps(watches)}")
     if watches.stepped_elsewhere:
         told.append(f"{script} stepped simulations in other processes, which are not watched")
+    if number := watches.loaded_elsewhere:
+        processes = "another process that loads" if number == 1 else f"{number:,} other processes that load"
+        told.append(f"{script} started {processes} pybullet: what is stepped there is not watched")
     for body, name in how["names"].items() if watches.all else ():
         if all(body in watch.unnamed for watch in watches.all):
             told.append(f"--name {body}={name}: there is no body {body}")
@@ -217,7 +220,7 @@ def _not_watched(script: Path, watches: Watches, how: Mapping[str, Any], astray:
 def _steps(watches: Watches) -> str:
     if watches.steps:
         return f"made {watches.steps} steps, fewer than --every"
-    if watches.stepped_elsewhere:
+    if watches.stepped_elsewhere or watches.loaded_elsewhere:
         return "made no step in its own process"
     clock = ", and simulations in real time are not stepped by calls" if watches.in_real_time else ""
     return f"never called pybullet.stepSimulation in its own process{clock}"

@@ -14,10 +14,11 @@ from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from overlapper.reference import Fcl
+from overlapper.scenes.other_processes import OtherProcesses
 from overlapper.simulation.asked_pairs import Among
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.cautions import SkippedShapeWarning, UnknownBodyWarning
-from overlapper.simulation.engine import Happening
+from overlapper.simulation.engine import LIBRARIES, Happening
 from overlapper.simulation.engine import engine as engine_of
 from overlapper.simulation.settings import Asking, Concave, Method, Modelling, Surface, settings_of
 from overlapper.tables.frame import Frame
@@ -208,6 +209,7 @@ class Watches:
         self.in_real_time = False
         """Whether a simulation was let run by the clock."""
         self._elsewhere = mmap(-1, 1)  # which forked processes write to
+        self._others = OtherProcesses(LIBRARIES["bullet"])
         self._of: dict[Hashable, Watch] = {}
         self._process = os.getpid()
         self._unlisten = engine_of("bullet").listen(self._hear)
@@ -231,9 +233,15 @@ class Watches:
         return bool(self._elsewhere[0])
 
     @property
+    def loaded_elsewhere(self) -> int:
+        """How many processes were started that have loaded the simulator; what they may have stepped is not watched."""
+        return len(self._others.found)
+
+    @property
     def complete(self) -> bool:
         """Whether something was measured, and nothing was left out."""
-        left_out = self.failed or self.stepped_elsewhere or any(watch.summary.skipped for watch in self.all)
+        elsewhere = self.stepped_elsewhere or self.loaded_elsewhere
+        left_out = self.failed or elsewhere or any(watch.summary.skipped for watch in self.all)
         return bool(self.all and not left_out)
 
     def _number(self, watch: Watch) -> None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 
+import cubes
 import psutil
 import pytest
 import trimesh
@@ -17,16 +18,7 @@ from robots import turntable
 from overlapper.tables.table_file import read_table
 
 KILLS = int(os.environ.get("OVERLAPPER_KILLS", "2"))
-SCENE = """
-import pybullet as p
-STEPS = 60
-
-def build(client):
-    p.setGravity(0, 0, -9.8, physicsClientId=client)
-    cube = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
-    for x, z in ((0, 0), (0.02, 0.099), (0.1, 0.098)):
-        p.createMultiBody(z and 1, cube, basePosition=[x, 0, z], physicsClientId=client)
-"""
+SCENE = cubes.SCENE.replace("STEPS = 20", "STEPS = 60")
 SCRIPT = (
     SCENE
     + """

@@ -10,21 +10,9 @@ import textwrap
 from pathlib import Path
 
 import pytest
+from cubes import SCENE
 
 from overlapper.tables.table_file import read_metadata, read_table
-
-SCENE = '''
-"""Two cubes on a third."""
-import pybullet as p
-STEPS = 20
-
-
-def build(client):
-    p.setGravity(0, 0, -9.8, physicsClientId=client)
-    cube = p.createCollisionShape(p.GEOM_BOX, halfExtents=[0.05] * 3, physicsClientId=client)
-    for x, z in ((0, 0), (0.02, 0.099), (0.1, 0.098)):
-        p.createMultiBody(z and 1, cube, basePosition=[x, 0, z], physicsClientId=client)
-'''
 
 # The same scene, stepped by its own main.
 HEAD = (
@@ -272,6 +260,45 @@ def test_steps_of_a_forked_process_are_not_watched():
             "script.py stepped simulations in other processes, which are not watched",
         ]
     )
+
+
+CHILD = """
+import sys, time
+if "other" not in sys.argv:
+    import pybullet as p
+    p.connect(p.DIRECT)
+    p.stepSimulation()
+time.sleep(0.5)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what other processes have loaded")
+def test_processes_that_load_pybullet_are_told():
+    Path("child.py").write_text(CHILD)
+    script("import subprocess\nsteps(3)\nsubprocess.run([sys.executable, 'child.py', *sys.argv[1:]], check=True)")
+    done = watch("script.py")
+    words = "script.py started another process that loads pybullet: what is stepped there is not watched"
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (2, f"overlapper: {words}")
+    assert "Overlaps of script.py in 3 steps" in done.stderr
+    done = watch("script.py", "other")
+    assert done.returncode == 0 and "process" not in done.stderr
+    script(
+        """
+        import multiprocessing, time
+        def work():
+            steps(4)
+            time.sleep(0.5)
+        if __name__ == "__main__":
+            child = multiprocessing.get_context("spawn").Process(target=work)
+            child.start()
+            child.join()
+        """
+    )
+    done = watch("--json", "script.py")
+    assert done.returncode == 2 and json.loads(done.stderr.splitlines()[-1])["not_watched"] == [
+        "nothing was measured: script.py made no step in its own process",
+        words,
+    ]
 
 
 def test_shapes_and_bodies_that_are_left_out_end_a_watch_with_2():
