@@ -138,7 +138,6 @@ OF_THE_READER = {
     "audit assets": lambda folder: meshes(folder / "assets"),
     "arm.urdf": lambda folder: turntable(folder / "arm.urdf"),
     "panda/panda.urdf": lambda folder: shutil.copytree(model("franka_panda"), folder / "panda"),
-    "humanoid.xml": lambda folder: shutil.copy(model("mjcf/humanoid.xml"), folder),
     "clashes parts": parts,
     "gearbox.step": assembly,
     "sqlite:///parts.db": database,

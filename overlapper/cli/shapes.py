@@ -35,13 +35,14 @@ def shapes(
 ) -> None:
     """List what is modelled of a file that pybullet loads: shapes by link, sizes, who may collide, what is skipped.
 
-    The exit code is 0 if all of it is modelled, 1 if something is skipped, and 2 if pybullet cannot load it.
+    The exit code is 0 if all of it is modelled, 1 if something is skipped, and 2 if pybullet cannot load it, or would
+    take it for something else than it says.
 
     Examples:
 
     [bold]overlapper shapes robot.urdf[/bold]
 
-    [bold]overlapper shapes humanoid.xml --self-collision --json[/bold]
+    [bold]overlapper shapes robot.urdf --self-collision --json[/bold]
     """
     from overlapper.simulation.bullet.inventory import inventory
     from overlapper.simulation.bullet.model_file import NotRead

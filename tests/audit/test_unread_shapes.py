@@ -3,7 +3,11 @@
 import csv
 import json
 import os
+import subprocess
+import sys
+import warnings
 
+import pybullet
 import pytest
 from robots import joint, limit, link, mimic, turntable, urdf
 
@@ -13,6 +17,7 @@ from overlapper.audit.findings import findings, remarks
 from overlapper.audit.robot import not_modelled, read_robot
 from overlapper.audit.srdf import read_srdf, write_srdf
 from overlapper.audit.table import facts, write_table
+from overlapper.simulation import Bodies, Recorder, SkippedShapeWarning
 from overlapper.simulation.bullet.inventory import inventory
 from overlapper.simulation.bullet.mjcf import misread
 from overlapper.simulation.bullet.model_file import NotRead
@@ -97,6 +102,77 @@ def test_shapes_of_sdf_are_counted_too(tmp_path):
     (tmp_path / "m.sdf").write_text(f'<sdf version="1.4"><model name="m">{links}{tie}</model></sdf>')
     (reason,) = not_modelled(read_robot(tmp_path / "m.sdf")).values()
     assert reason == "pybullet has built 1 of the 2 shapes that the file names, and not wreck.stl"
+
+
+def bodies_of(path, recorded=True, flags=0, **arguments):
+    """The bodies of a client that has loaded a file."""
+    client = pybullet.connect(pybullet.DIRECT)
+    recorder = Recorder(client) if recorded else None
+    load = {".urdf": pybullet.loadURDF, ".sdf": pybullet.loadSDF}[path.suffix]
+    load(str(path), physicsClientId=client, **arguments, **({"flags": flags} if flags else {}))
+    try:
+        return Bodies(client, recorder=recorder)
+    finally:
+        if recorder:
+            recorder.close()
+        pybullet.disconnect(client)
+
+
+def test_bodies_know_of_lost_meshes_by_a_recorder_and_warn_once(wrecked, tmp_path):
+    with pytest.warns(SkippedShapeWarning) as warned:
+        bodies = bodies_of(wrecked)
+    ((id, link, name, reason),) = [(each.body, each.link, each.name, each.reason) for each in bodies.skipped]
+    assert (id, link, name) == (0, -1, "arm/hip")
+    assert reason == "pybullet has built 1 of the 2 shapes that the file names, and not wreck.obj"
+    assert len(warned) == 1 and str(warned[0].message).endswith(f"is left out: {reason}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert bodies_of(wrecked, recorded=False).skipped == []  # nothing tells it
+        for flags in (pybullet.URDF_MERGE_FIXED_LINKS, pybullet.URDF_IGNORE_COLLISION_SHAPES):
+            assert bodies_of(wrecked, flags=flags).skipped == []
+        (tmp_path / "good.obj").write_text(TETRAHEDRON)
+        assert bodies_of(arm(tmp_path / "good.urdf", "good.obj")).skipped == []
+    with pytest.warns(SkippedShapeWarning):
+        assert all("wreck" not in each.reason for each in bodies_of(wrecked, useMaximalCoordinates=True).skipped)
+
+
+def test_a_lost_mesh_and_a_flat_one_are_one_entry_of_their_link(tmp_path):
+    (tmp_path / "wreck.obj").write_bytes(WRECK)
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n")
+    with pytest.warns(SkippedShapeWarning):
+        (skipped,) = bodies_of(arm(tmp_path / "arm.urdf", "wreck.obj", "flat.obj")).skipped
+    assert "and not wreck.obj; " in skipped.reason and "flat" in skipped.reason
+
+
+def test_a_model_found_on_the_search_path_is_counted(wrecked, monkeypatch, tmp_path):
+    client = pybullet.connect(pybullet.DIRECT)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    with Recorder(client) as recorder:
+        pybullet.setAdditionalSearchPath(str(tmp_path), physicsClientId=client)
+        pybullet.loadURDF(wrecked.name, physicsClientId=client)
+        with pytest.warns(SkippedShapeWarning):
+            (skipped,) = Bodies(client, recorder=recorder).skipped
+    pybullet.disconnect(client)
+    assert "wreck.obj" in skipped.reason
+
+
+def test_a_scene_tells_of_a_lost_mesh(wrecked, tmp_path):
+    scene = tmp_path / "scene.py"
+    load = f"p.loadURDF({str(wrecked)!r}, physicsClientId=client)"
+    scene.write_text(f'"""An arm."""\nimport pybullet as p\nSTEPS = 2\n\n\ndef build(client):\n    {load}\n')
+    command = [sys.executable, "-m", "overlapper", "run", str(scene)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1 and "Not modelled: arm/hip, pybullet has built 1 of the 2 shapes" in done.stdout
+
+
+def test_sdf_that_includes_others_is_refused(tmp_path):
+    (tmp_path / "m.sdf").write_text(
+        '<sdf version="1.4"><world name="w"><include><uri>model://table</uri></include></world></sdf>'
+    )
+    assert refusal(tmp_path / "m.sdf") == "it has <include> of model://table, which pybullet drops"
+    with pytest.raises(NotRead, match=r"read: it has <include> of model://table, which pybullet drops$"):
+        inventory(tmp_path / "m.sdf")
 
 
 @NO_PIPES
@@ -203,6 +279,13 @@ def test_the_refusal_of_mjcf_has_three_reasons_and_counts_the_others(tmp_path):
         "pybullet's importer of MJCF would change what it says: the joint bend has no type, and is a"
     )
     assert said.endswith("; and 1 more") and said.count("; ") == 3
+
+
+def test_shapes_and_audits_refuse_mjcf_with_the_same_words(tmp_path):
+    path = mjcf(tmp_path / "robot.xml")
+    with pytest.raises(NotRead) as refused:
+        inventory(path)
+    assert str(refused.value) == f"{path} cannot be read: {refusal(path)}"
 
 
 def test_joints_of_one_body_in_different_places_are_refused(tmp_path):

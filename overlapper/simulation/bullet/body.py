@@ -107,8 +107,7 @@ def _name(client: int, id: int, own: str, loaded: Loaded | None, leaves: Mapping
         seen = pybullet.getVisualShapeData(id, physicsClientId=client)
         meshes = [each[4].decode(errors="replace") for each in seen if each[4] != b"unknown_file"]
     kind = only[0].kind.removeprefix("concave ") if len(only) == 1 else None
-    file, alone = loaded or (None, True)
-    return body_name(own, file, alone, meshes, kind)
+    return body_name(own, loaded.file if loaded else None, loaded is None or loaded.alone, meshes, kind)
 
 
 def _colors(client: int, id: int, links: Mapping[int, str]) -> dict[int, Color]:

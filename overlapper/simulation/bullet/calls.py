@@ -26,6 +26,7 @@ CALLS: dict[str, tuple[str, ...]] = {
         *("fixedTimeStep", "numSolverIterations", "useSplitImpulse", "splitImpulsePenetrationThreshold"),
         *("numSubSteps", "collisionFilterMode"),
     ),
+    "setAdditionalSearchPath": ("path", "physicsClientId"),
     "loadURDF": (
         *("fileName", "basePosition", "baseOrientation", "useMaximalCoordinates", "useFixedBase", "flags"),
         *("globalScaling", "physicsClientId"),

@@ -94,7 +94,6 @@ def _read(path: Path, self_collision: bool, modelling: Modelling) -> Generator[s
     import pybullet
 
     from overlapper.simulation import Bodies, Recorder
-    from overlapper.simulation.bullet.lost_shapes import lost_shapes
 
     root = root_of(path)
     must_be_sound(path, root)
@@ -111,9 +110,6 @@ def _read(path: Path, self_collision: bool, modelling: Modelling) -> Generator[s
     report, names = bodies.report(), bodies.names
     if not report.bodies:
         raise NotRead("it has no body")
-    lost, absent = lost_shapes(path, root, client, range(report.bodies))
-    skipped = [(names.get(key, path.name), reason) for key, reason in lost.items()]
-    skipped += [(name, "pybullet has not built its shapes") for name in absent]
     meets = {key: len(others) for key, others in bodies.partners().items()}
     return Inventory(
         report.bodies,
@@ -121,7 +117,7 @@ def _read(path: Path, self_collision: bool, modelling: Modelling) -> Generator[s
         report.shapes_read,
         report.pairs_possible,
         _links(listed, names, meets),
-        tuple(skipped + [(each.name, each.reason) for each in bodies.skipped]),
+        tuple((each.name, each.reason) for each in bodies.skipped),
         tuple((each.name, len(each.shapes)) for each in bodies.decomposed),
     )
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from overlapper.printable import printable
 from overlapper.quaternion import composed, rotated
-from overlapper.simulation.bullet.mjcf import misread
 from overlapper.simulation.bullet.model_file import LOADED, NotRead, load
 from overlapper.simulation.bullet.model_text import must_be_sound
 from overlapper.simulation.kinematic_tree import Joint, Kind, KinematicTree, LinkShape, TreeLink
@@ -42,14 +41,12 @@ def kinematic_tree(path: Path, root: Element, modelling: Modelling) -> Generator
     import pybullet
 
     from overlapper.simulation.bullet.known_bodies import KnownBodies
-    from overlapper.simulation.bullet.lost_shapes import lost_shapes
+    from overlapper.simulation.bullet.lost_shapes import NOT_BUILT
     from overlapper.simulation.bullet.recorder import Recorder
 
     if (count := len(root.findall("link"))) > MOST_LINKS:
         raise NotRead(f"it has {count:,} links, and pybullet tells the poses of {MOST_LINKS} at most")
     must_be_sound(path, root)
-    if path.suffix.lower() == ".xml" and (changed := misread(root)):
-        raise NotRead(f"pybullet's importer of MJCF would change what it says: {changed}")
     client = pybullet.connect(pybullet.DIRECT)
     with Recorder(client) as recorder:
         # Visual shapes take most of the time of loading a URDF.
@@ -59,24 +56,22 @@ def kinematic_tree(path: Path, root: Element, modelling: Modelling) -> Generator
         known.refresh()
     if not known.by_id:
         raise NotRead("it has no body")
-    lost, absent = lost_shapes(path, root, client, sorted(known.by_id))
-    if absent:
+    skipped = [each for body in known.by_id.values() for each in body.skipped]
+    if absent := [each.name.partition("/")[2] for each in skipped if each.reason == NOT_BUILT]:
         raise NotRead(f"pybullet has not built the shapes of {', '.join(absent)}")
     names = labels(known.by_id)
     links: list[TreeLink] = []
     shapes: list[LinkShape] = []
     for number, (id, body) in enumerate(known.by_id.items()):
         base = len(links)
-        skipped = {link: [reason] for (of_body, link), reason in lost.items() if of_body == id}
-        for left_out in body.skipped:
-            skipped.setdefault(left_out.link, []).append(left_out.reason)
+        reasons = {each.link: each.reason for each in body.skipped}
         concave = {link: [each for each in body.decomposed if each.link == link] for link in body.link_names}
         joints = _joints(client, id, names[id])
         for link, joint in enumerate(joints, BASE):
             parent = base + 1 + body.parents[link] if link > BASE else -1
             gains = [each.volume / each.mesh_volume - 1 for each in concave[link] if each.mesh_volume]
             parts_of_it = sum(len(each.shapes) for each in concave[link])
-            about = "; ".join(skipped.get(link, ())), parts_of_it, max(gains, default=None)
+            about = reasons.get(link, ""), parts_of_it, max(gains, default=None)
             links.append(TreeLink(number, body.link_names[link], parent, joint, *about))
         for each in sorted(body.shapes, key=lambda each: (each.link, each.index)):
             shapes.append(LinkShape(base + 1 + each.link, each.shape, each.position, each.orientation))

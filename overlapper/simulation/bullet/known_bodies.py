@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 import pybullet
 
+from overlapper.printable import printable
 from overlapper.simulation.bullet.body import read_body
 from overlapper.simulation.bullet.body_marks import BodyMarks
 from overlapper.simulation.bullet.bullet_file import BulletFile
+from overlapper.simulation.bullet.lost_shapes import NOT_BUILT, lost_of
 from overlapper.simulation.bullet.recorder import Recorder
 from overlapper.simulation.bullet.saved_scene import body_ids, saved_bodies
 from overlapper.simulation.model import BASE, ModelledBody, Skipped
@@ -123,10 +126,24 @@ class KnownBodies:
             )
             self._margins[id] = _margin(client, id)
             self._marks.put(id)
+        if fresh:
+            self._add_lost(fresh, known, file, rows)
         self.by_id = dict(sorted(known.items()))
         grown, self.unidentified = unidentified > self.unidentified, unidentified
         skipped = [each for id in fresh for each in self.by_id[id].skipped]
         return skipped + (self.skipped if grown else [])
+
+    def _add_lost(
+        self, fresh: Collection[int], known: dict[int, ModelledBody], file: BulletFile, rows: Mapping[int, int]
+    ) -> None:
+        """Let bodies know of shapes that their files name, and that pybullet has not built."""
+        loads = self._recorder.loaded if self._recorder else {}
+        for loaded in dict.fromkeys(loads[id] for id in fresh if id in loads):
+            lost, absent = lost_of(loaded, self._client, file, rows)
+            told = [(id, link, known[id].link_names[link], reason) for (id, link), reason in lost.items()]
+            told += [(loaded.bodies[0], BASE, printable(name), NOT_BUILT) for name in absent]
+            for id, link, name, reason in told:
+                known[id] = with_lost(known[id], Skipped(id, link, f"{known[id].name}/{name}", reason))
 
     def _still_known(self) -> tuple[list[int], dict[int, ModelledBody]]:
         """The ids of all bodies, sorted, and of those that have been read what they are."""
@@ -139,6 +156,14 @@ class KnownBodies:
             for id, row in rows.items()
             for link, collider in file.bodies[row].colliders.items()
         }
+
+
+def with_lost(body: ModelledBody, lost: Skipped) -> ModelledBody:
+    """A body that knows of lost shapes of a link, in one entry with others of that link that are left out."""
+    same = [each for each in body.skipped if each.name == lost.name]
+    others = tuple(each for each in body.skipped if each.name != lost.name)
+    reason = "; ".join([lost.reason, *(each.reason for each in same)])
+    return replace(body, skipped=(*others, replace(lost, reason=reason)))
 
 
 def _margin(client: int, id: int) -> float:

@@ -2,25 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import pybullet
 
 from overlapper.printable import printable
-from overlapper.simulation.bullet.model_text import named_shapes
-from overlapper.simulation.bullet.saved_scene import saved_bodies
+from overlapper.simulation.bullet.bullet_file import BulletFile
+from overlapper.simulation.bullet.mjcf import misread
+from overlapper.simulation.bullet.model_file import NotRead
+from overlapper.simulation.bullet.model_text import named_shapes, root_of
+from overlapper.simulation.bullet.recorder import Loaded
+from overlapper.simulation.bullet.saved_scene import MULTIBODY, body_type
 from overlapper.simulation.model import BASE, LinkKey
 
+NOT_BUILT = "pybullet has not built its shapes"
 
-def lost_shapes(path: Path, root: Element, client: int, ids: Sequence[int]) -> tuple[dict[LinkKey, str], list[str]]:
+# With these, pybullet makes other links of a file than it names, or none of its shapes.
+OTHERWISE = pybullet.URDF_MERGE_FIXED_LINKS | pybullet.URDF_IGNORE_COLLISION_SHAPES
+
+
+def lost_of(
+    loaded: Loaded, client: int, file: BulletFile, rows: Mapping[int, int]
+) -> tuple[dict[LinkKey, str], list[str]]:
+    """The shapes that are lost of the bodies that were loaded together, as `lost_shapes` has them.
+
+    None where the file cannot be known: it is not where it was, it is no XML, or pybullet makes other links of it.
+    """
+    path, there = loaded.place, {id: rows[id] for id in loaded.bodies if id in rows}
+    if path is None or loaded.flags & OTHERWISE or len(there) < len(loaded.bodies):
+        return {}, []
+    if any(body_type(client, id) != MULTIBODY for id in there):
+        return {}, []
+    try:
+        root = root_of(path)
+    except (NotRead, OSError):
+        return {}, []
+    if path.suffix.lower() == ".xml" and misread(root):
+        return {}, []
+    return lost_shapes(path, root, client, file, there)
+
+
+def lost_shapes(
+    path: Path, root: Element, client: int, file: BulletFile, rows: Mapping[int, int]
+) -> tuple[dict[LinkKey, str], list[str]]:
     """Why links have fewer shapes than the model names, by body and link; and the names of links that are not there.
 
-    `root` is the root of the model, and `ids` are the bodies that pybullet has made of it.
+    `root` is the root of the model, and `rows` are the places in `file` of the bodies that pybullet has made of it.
     """
     named = named_shapes(path, root)
-    file, rows, _ = saved_bodies(client, sorted(ids))
     lost: dict[LinkKey, str] = {}
     others = 0  # shapes of links that have no name in the file
     for id, row in sorted(rows.items()):

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from overlapper.simulation.bullet.attributes import numbers
+
 Attributes = Mapping[str, str]
 
 # Ways of MuJoCo to turn a body or a geom beside `quat`, which the importer passes over.
@@ -85,7 +87,7 @@ class _Reader:
         if turn := _turn(body.attrib):
             yield f"the body {name} is turned by {turn}"
         joints = [each for each in body.findall("joint") if each.get("type") != "free"]
-        places = [_vector(self._effective(each, of_body).get("pos", "0 0 0")) for each in joints]
+        places = [numbers(self._effective(each, of_body).get("pos", "0 0 0")) for each in joints]
         if any(place != places[0] for place in places):
             yield f"the joints of the body {name} are in different places"
         for joint in joints:
@@ -103,11 +105,11 @@ class _Reader:
             yield f"has no type, and is a {kind}, which is dropped"
         elif kind not in ("hinge", "slide"):
             yield f"is a {kind}, which is dropped"
-        if _vector(meant.get("axis", "0 0 1")) != _vector(joint.get("axis", "1 0 0")):
+        if numbers(meant.get("axis", "0 0 1")) != numbers(joint.get("axis", "1 0 0")):
             yield "has its axis by default, which is another here"
-        if _vector(meant.get("pos", "0 0 0")) != _vector(joint.get("pos", "0 0 0")):
+        if numbers(meant.get("pos", "0 0 0")) != numbers(joint.get("pos", "0 0 0")):
             yield "has its place by default"
-        if any(_vector(meant.get("ref", "0"))):
+        if any(numbers(meant.get("ref", "0"))):
             yield "has a ref, which is dropped"
         yield from self._of_limits(joint, meant, kind)
 
@@ -149,7 +151,7 @@ class _Reader:
         meant = self._effective(mesh, "main")
         if mesh.get("name") is None or mesh.get("file") is None:
             yield f"is of the mesh {name!r}, which has no name or no file"
-        if any(value != 1.0 for value in _vector(meant.get("scale", "1 1 1"))):
+        if any(value != 1.0 for value in numbers(meant.get("scale", "1 1 1"))):
             yield f"is of the mesh {name!r}, which is scaled"
         if "refpos" in meant or "refquat" in meant:
             yield f"is of the mesh {name!r}, which has a frame of its own"
@@ -160,16 +162,4 @@ class _Reader:
 
 def _turn(attributes: Attributes) -> str:
     """How a body or geom is turned that the importer does not turn."""
-    return next((name for name in TURNS if name in attributes and any(_vector(attributes[name])[:3])), "")
-
-
-def _vector(text: str) -> list[float | str]:
-    """The numbers of an attribute; a word that is no number stays one."""
-    return [_number(word) for word in text.split()]
-
-
-def _number(word: str) -> float | str:
-    try:
-        return float(word)
-    except ValueError:
-        return word
+    return next((name for name in TURNS if name in attributes and any(numbers(attributes[name])[:3])), "")

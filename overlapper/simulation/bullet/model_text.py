@@ -12,7 +12,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from overlapper.printable import first_line
+from overlapper.printable import first_line, printable
+from overlapper.simulation.bullet.attributes import numbers
+from overlapper.simulation.bullet.mjcf import misread
 from overlapper.simulation.bullet.model_file import NotRead
 
 # Attributes of a URDF joint and of collision shapes that are numbers, by their elements.
@@ -58,14 +60,21 @@ def _must_not_be_broken(text: bytes) -> None:
 
 
 def must_be_sound(path: Path, root: Element) -> None:
-    """NotRead if pybullet would break a line of a model, or if the model names a pipe for a mesh.
+    """NotRead if pybullet would take a model for something else than it says, or if the model names a pipe for a mesh.
 
-    NotRead, too, if a URDF has joints or shapes whose numbers are not finite.
+    Lines of any may be broken, URDFs may have joints or shapes whose numbers are not finite, SDFs may include others,
+    and MJCF may have whatever the importer changes.
     """
     _must_not_be_broken(path.read_bytes())
     for name in named_files(root):
         _must_be_a_file(path, name)
-    if path.suffix.lower() == ".urdf":
+    ending = path.suffix.lower()
+    if ending == ".xml" and (changed := misread(root)):
+        raise NotRead(f"pybullet's importer of MJCF would change what it says: {changed}")
+    if ending == ".sdf" and (included := root.find(".//include")) is not None:
+        what = (included.findtext("uri") or "another file").strip()
+        raise NotRead(f"it has <include> of {printable(what)}, which pybullet drops")
+    if ending == ".urdf":
         for joint in root.findall("joint"):
             _must_have_numbers(f"the joint {joint.get('name')!r}", joint, _checked(joint))
         for link in root.findall("link"):
@@ -128,18 +137,11 @@ def _must_have_numbers(owner: str, element: Element, tags: set[str]) -> None:
             text = part.get(name)
             if text is None:
                 continue
-            values = [_number(word) for word in text.split()]
-            if not all(map(math.isfinite, values)):
+            values = numbers(text)
+            if not all(isinstance(value, float) and math.isfinite(value) for value in values):
                 raise NotRead(f"{owner} has <{part.tag} {name}={text!r}>, which is no number")
             if part.tag == "axis" and not any(values):
                 raise NotRead(f"{owner} has the axis {text!r}, which has no direction")
-
-
-def _number(word: str) -> float:
-    try:
-        return float(word)
-    except ValueError:
-        return math.nan
 
 
 def named_shapes(path: Path, root: Element) -> dict[str, list[list[str]]]:

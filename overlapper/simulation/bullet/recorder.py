@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pybullet
+import pybullet_data
 from numpy.typing import ArrayLike
 
 from overlapper.simulation.bullet.calls import Arguments, listen, unlisten
@@ -19,7 +21,7 @@ UNNOTED = frozenset(
     {
         *("connect", "stepSimulation", "setRealTimeSimulation", "changeConstraint", "applyExternalForce"),
         *("applyExternalTorque", "setJointMotorControl2", "setJointMotorControlArray", "setJointMotorControlMultiDof"),
-        *("setJointMotorControlMultiDofArray", "restoreState"),
+        *("setJointMotorControlMultiDofArray", "restoreState", "setAdditionalSearchPath"),
     }
 )
 
@@ -28,10 +30,17 @@ FILE_NAMES = ("fileName", "sdfFileName", "mjcfFileName")
 
 
 class Loaded(NamedTuple):
-    """The file that a body was loaded from, `alone` or with others."""
+    """The file that bodies were loaded from; `place` is where it is, as far as that is known."""
 
     file: str
-    alone: bool
+    place: Path | None
+    bodies: tuple[int, ...]
+    flags: int
+
+    @property
+    def alone(self) -> bool:
+        """Whether one body was loaded from it."""
+        return len(self.bodies) == 1
 
 
 class Recorder:
@@ -71,6 +80,7 @@ class Recorder:
         """The flags, by body, that a body with URDF_USE_SELF_COLLISION was loaded with."""
         self.loaded: dict[int, Loaded] = {}
         """Where bodies come from that loadURDF, loadSDF or loadMJCF made."""
+        self._search_path = ""
         self._fields: dict[int, HeightField] = {}  # by shape
         self._shapes: dict[int, int] = {}  # by body that is a height field
 
@@ -90,7 +100,11 @@ class Recorder:
 
     def _hear(self, name: str, arguments: Arguments, result: Any) -> None:
         self.commands.hear(name, arguments, result)
-        if arguments.get("physicsClientId", 0) == self.physicsClientId and name not in UNNOTED:
+        if arguments.get("physicsClientId", 0) != self.physicsClientId:
+            return
+        if name == "setAdditionalSearchPath":
+            self._search_path = os.fspath(arguments["path"])
+        if name not in UNNOTED:
             self._note(name, arguments, result)
 
     def _note(self, name: str, arguments: Arguments, result: Any) -> None:
@@ -108,10 +122,12 @@ class Recorder:
             case "loadURDF" | "loadSDF" | "loadMJCF" | "createMultiBody":
                 flags = arguments.get("flags", 0)
                 made = result if isinstance(result, tuple) else (result,)
+                file = next((os.fspath(arguments[each]) for each in FILE_NAMES if each in arguments), None)
+                loaded = Loaded(file, self._found(file), made, flags) if file else None
                 for body in made:
                     self._drop(body)
-                    if file := next((arguments[each] for each in FILE_NAMES if each in arguments), None):
-                        self.loaded[body] = Loaded(os.fspath(file), len(made) == 1)
+                    if loaded:
+                        self.loaded[body] = loaded
                     if arguments.get("baseCollisionShapeIndex", -1) in self._fields:
                         self._shapes[body] = arguments["baseCollisionShapeIndex"]
                     if flags & pybullet.URDF_USE_SELF_COLLISION:
@@ -129,6 +145,11 @@ class Recorder:
             case "resetSimulation" | "disconnect":
                 self.scenes_loaded += 1
                 self._forget()
+
+    def _found(self, file: str) -> Path | None:
+        """Where pybullet has found a file, by the folders that it looks in first."""
+        places = (Path(folder, file) for folder in ("", self._search_path, pybullet_data.getDataPath()))
+        return next((place.absolute() for place in places if place.is_file()), None)
 
     def _note_field(self, arguments: Arguments, shape: int) -> None:
         replaced = self._fields.get(arguments.get("replaceHeightfieldIndex", -1))
