@@ -1,7 +1,7 @@
 """The cost of a sweep beside the runs themselves, and how much faster two cores are than one.
 
     python benchmarks sweep [ROUNDS]
-    python benchmarks sweep 0 --empty 1000000 [--engine ray]
+    python benchmarks sweep 0 --empty 1000000 [--engine ray [--nodes 3]]
 
 Overhead, by the processor's time, which is much the same when others are at work on the machine: in a worker, runs of a
 scene of one ball and one step alternate with the same as tasks, and the median of their differences is told; in the
@@ -9,24 +9,28 @@ parent, all that it does for a task of a sweep; and by the clock, an item that n
 Scaling: tasks of the grasp scene by one worker and by two, in turns, by the clock from the first tasks done on. Medians
 of the rounds, the least and the largest.
 
-With --empty, so many tasks that need no work are swept and summed up, and once more, when nothing is left to do: the
-processor's time of the parent for each, and its largest memory.
+With --empty, so many tasks that need no work are swept and summed up, once more, when nothing is left to do, and once
+more, compared with themselves: the processor's time of the parent for each, and its largest memory. --nodes begins a
+Ray cluster of so many nodes of one CPU each on this machine.
 """
 
 from __future__ import annotations
 
 import os
 import resource
+import subprocess
 import sys
 import tempfile
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
+
+import ray_nodes
 
 from harness.command import ROOT
 from harness.timing import timed
@@ -37,6 +41,7 @@ from overlapper.jobs.patience import Late
 from overlapper.jobs.processes import Processes
 from overlapper.scenes.run import run
 from overlapper.sweep import page, tasks
+from overlapper.sweep.comparison import Recorded
 from overlapper.sweep.measures import Measures
 from overlapper.sweep.points import Space
 from overlapper.sweep.study import Study, Task
@@ -138,14 +143,16 @@ def driver(count: int, engine: Executor) -> None:
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder, "empty.py")
         scene.write_text(EMPTY, encoding="utf-8")
-        for words in ("swept", "nothing left to do"):
+        for words in ("swept", "nothing left to do", "compared with themselves"):
             before, clock = time.process_time(), time.perf_counter()
             study = Study.of(scene, 1)
             space = Space(study.scene, study.loaded().parameters)
             sweep = Sweep(study, space.crossed([space.grid(f"mass=0.1:10:{side}"), space.seeds(count // side)]))
-            with sweep.opened(Path(folder, "runs")) as store:
+            runs = Path(folder, "runs")
+            recorded = Recorded(runs, Path(folder, "none"), sweep) if words.startswith("compared") else None
+            with sweep.opened(runs) as store:
                 reached = sweep.run(store, OfNothing(engine))
-                page.write(sweep, store, "empty.py")
+                page.write(sweep, store, "empty.py", comparison=recorded.compare(store) if recorded else None)
             spent, passed = time.process_time() - before, time.perf_counter() - clock
             there = reached.before + reached.done
             print(
@@ -153,6 +160,16 @@ def driver(count: int, engine: Executor) -> None:
                 end=" ",
             )
             print(f"{passed:.0f} s in all, at most {most_memory():.0f} MB", flush=True)
+
+
+@contextmanager
+def nodes(count: int) -> Iterator[str]:
+    """The address of a Ray cluster on this machine, which ends with the block."""
+    command = [sys.executable, ray_nodes.__file__, str(count)]
+    with subprocess.Popen(command, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as cluster:
+        assert cluster.stdin and cluster.stdout
+        yield cluster.stdout.readline().strip()
+        cluster.stdin.close()
 
 
 def most_memory() -> float:
@@ -174,13 +191,15 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument("--empty", type=int, default=0, help="tasks that need no work")
     parser.add_argument("--engine", choices=("processes", "ray"), default="processes", help="of the empty tasks")
     parser.add_argument("--address", help="of the Ray cluster")
+    parser.add_argument("--nodes", type=int, default=0, help="of a Ray cluster that is begun here")
 
 
 def main(chosen: Namespace) -> None:
     if chosen.empty:
         # Processes of Ray must find this module, too.
         os.environ["PYTHONPATH"] = os.pathsep.join(map(os.path.abspath, sys.path))
-        driver(chosen.empty, Cluster(chosen.address) if chosen.engine == "ray" else Processes())
+        with nodes(chosen.nodes) if chosen.nodes else nullcontext(chosen.address) as address:
+            driver(chosen.empty, Cluster(address) if chosen.engine == "ray" else Processes())
     grasp = ROOT / "scenes" / "franka_grasp.py"
     with tempfile.TemporaryDirectory() as folder:
         empty = Path(folder, "empty.py")

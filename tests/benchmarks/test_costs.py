@@ -40,9 +40,16 @@ def test_a_watched_script_is_timed_beside_itself(capsys):
 
 def test_a_long_script_tells_of_its_memory(capsys):
     lines = said(capsys, "watch", "--long=20", "--way=every step, --out .csv").splitlines()
-    assert re.match(r"every step, --out \.csv: 20 steps, a file of [\d.]+ MB", lines[0])
+    assert re.match(r"every step, --out \.csv: 20 steps, [\d,]+ rows, a file of [\d.]+ MB", lines[0])
     figures = [[*map(float, line.split())] for line in lines[1:]]
     assert len(figures) == 10 and all(taken > 0 and memory > 10 for taken, memory in figures)
+
+
+def test_logs_of_each_format_tell_of_time_and_memory(capsys):
+    lines = said(capsys, "watch", "--log=200").splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["csv", "parquet", "sqlite"]
+    words = r"\w+: \d+ rows, \d+ a step, [\d.]+ µs each in the loop, [\d.]+ s at the end; the process has grown by "
+    assert all(re.match(words + r"-?[\d.]+ MB in the loop, and by -?[\d.]+ MB at most$", line) for line in lines)
 
 
 def test_a_robot_is_a_row_of_the_table_of_audits():

@@ -8,6 +8,11 @@ import time
 from pathlib import Path
 
 
+def breaking(setup, found):
+    """Gathers nothing, as an installation that ends the processes of the cluster."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 def doing(setup):
     """Items are pairs of a word and a value; `setup` is given back with the value, and where that was done."""
     if setup == "never":

@@ -1,6 +1,7 @@
 """The engine of a Ray cluster: the same bits as on one machine, also if a node is killed."""
 
 import json
+import os
 import subprocess
 import sys
 import types
@@ -48,6 +49,26 @@ def test_a_cluster_finds_the_same_bits_while_a_node_is_killed(undisturbed):
         }
         cluster.stdin.close()
     assert not psutil.wait_procs(hands, timeout=20)[1]
+
+
+def test_three_nodes_do_thousands_of_items_by_few_references_and_a_broken_installation_is_refused(monkeypatch):
+    ray = pytest.importorskip("ray")
+    monkeypatch.setattr(cluster_module, "LOSSES", 3)
+    most = []
+    wait = ray.wait
+    monkeypatch.setattr(ray, "wait", lambda references, **how: most.append(len(references)) or wait(references, **how))
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    environment = {**os.environ, "PYTHONPATH": os.path.dirname(ray_nodes.__file__)}  # of what the nodes start
+    nodes = [sys.executable, ray_nodes.__file__, "3"]
+    with subprocess.Popen(nodes, text=True, env=environment, **pipes) as started:
+        with closing(Cluster(started.stdout.readline().strip())) as cluster:
+            found = [*outcomes(cluster, Job("jobs", "doing", "x"), [("give", k) for k in range(9000)])]
+            assert sorted(number for number, _ in found) == [*range(9000)]
+            assert len({outcome.value[2] for _, outcome in found}) == 3 and max(most) <= 6
+            broken = Job("jobs", "doing", "x", gather="breaking")
+            with pytest.raises(NotStarted, match=r"^the cluster loses what it is given: "):
+                [*cluster.shares(broken, [("give", k) for k in range(9000)])]
+        started.stdin.close()
 
 
 class Ray(types.ModuleType):
