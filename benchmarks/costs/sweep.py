@@ -139,27 +139,29 @@ class OfNothing:
 
 def driver(count: int, engine: Executor) -> None:
     """Tell what so many empty tasks cost the parent."""
-    side = max(round(count**0.5), 1)
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder, "empty.py")
         scene.write_text(EMPTY, encoding="utf-8")
         for words in ("swept", "nothing left to do", "compared with themselves"):
             before, clock = time.process_time(), time.perf_counter()
-            study = Study.of(scene, 1)
-            space = Space(study.scene, study.loaded().parameters)
-            sweep = Sweep(study, space.crossed([space.grid(f"mass=0.1:10:{side}"), space.seeds(count // side)]))
-            runs = Path(folder, "runs")
-            recorded = Recorded(runs, Path(folder, "none"), sweep) if words.startswith("compared") else None
-            with sweep.opened(runs) as store:
-                reached = sweep.run(store, OfNothing(engine))
-                page.write(sweep, store, "empty.py", comparison=recorded.compare(store) if recorded else None)
+            there, asked = swept_empty(scene, count, OfNothing(engine), words.startswith("compared"))
             spent, passed = time.process_time() - before, time.perf_counter() - clock
-            there = reached.before + reached.done
-            print(
-                f"{words}: {there:,} of {len(sweep):,} tasks, {1e6 * spent / len(sweep):.0f} µs each in the parent,",
-                end=" ",
-            )
+            print(f"{words}: {there:,} of {asked:,} tasks, {1e6 * spent / asked:.0f} µs each in the parent,", end=" ")
             print(f"{passed:.0f} s in all, at most {most_memory():.0f} MB", flush=True)
+
+
+def swept_empty(scene: Path, count: int, engine: Executor, compared: bool) -> tuple[int, int]:
+    """How many tasks are done, and how many were asked for. What it needs is free again afterwards."""
+    side = max(round(count**0.5), 1)
+    runs = scene.parent / "runs"
+    study = Study.of(scene, 1)
+    space = Space(study.scene, study.loaded().parameters)
+    sweep = Sweep(study, space.crossed([space.grid(f"mass=0.1:10:{side}"), space.seeds(count // side)]))
+    recorded = Recorded(runs, scene.parent / "none", sweep) if compared else None
+    with sweep.opened(runs) as store:
+        reached = sweep.run(store, engine)
+        page.write(sweep, store, "empty.py", comparison=recorded.compare(store) if recorded else None)
+    return reached.before + reached.done, len(sweep)
 
 
 @contextmanager
