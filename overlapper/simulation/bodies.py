@@ -80,7 +80,7 @@ class AnyBodies:
         self._found = layout.batch.overlaps(
             layout.positions, layout.orientations, candidates, tolerance, threads, method, separated=False
         )
-        contacts = Contacts(layout.key_rows, self._found, self._names)
+        contacts = Contacts(layout.key_rows, self._found, self._names, self._source.contact)
         self._last = contacts, layout, partial(self._pairs.chosen, among=among, rules=self._rules)
         return contacts
 
@@ -242,8 +242,8 @@ class AnyBodies:
     def _who(self, named: Who | str) -> Who:
         if not isinstance(named, str):
             return named
-        known: dict[str, Who] = {label: id for id, label in self._labels.items()}
-        known |= {name: link for link, name in self._names.items()}
+        known: dict[str, Who] = {name: link for link, name in self._names.items()}
+        known |= {label: id for id, label in self._labels.items()}
         if named not in known:
             alike = get_close_matches(named, known, 1)
             hint = f"; {alike[0]!r} is" if alike else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +35,18 @@ class Colliders:
         return cls(rows, np.array([body for body, _ in rows], dtype=int), group, mask)
 
 
-class Rules:
-    """Which colliders may collide; a collider is a row of `Layout.collider_rows`.
+class Rules(Protocol):
+    """Which colliders may collide; a collider is a row of `Layout.collider_rows`."""
+
+    def allow(self, first: Indices, second: Indices) -> Mask:
+        """Whether the colliders in these rows may collide, pair by pair; first < second."""
+
+    def count(self, weights: NDArray[np.int64]) -> int:
+        """How many pairs of shapes may collide, if `weights` (n,) says how many each collider has."""
+
+
+class MaskRules(Rules):
+    """The rules of groups, masks and exceptions.
 
     Pair filters come before masks; within a body, pairs that are listed, as well as either.
     """

@@ -33,24 +33,34 @@ class Contact:
     shapeB: int
     overlap: Overlap
 
+    @property
+    def solids(self) -> tuple[int, int, int, int]:
+        """(bodyA, linkA, bodyB, linkB): what moves as one with either shape."""
+        return self.bodyA, self.linkA, self.bodyB, self.linkB
+
 
 class Contacts(Tabular, Sequence[Contact]):
     """Contacts sorted by (bodyA, linkA, shapeA, bodyB, linkB, shapeB); each is made when it is looked at, and kept.
 
     `overlaps` has volumes, centroids, normals, depths, gradients and more as arrays, a row per contact, which cost
     nothing more. A slice, a mask or an array of indices picks contacts: `contacts[contacts.overlaps.depth > 1e-3]`.
-    `names` are those of the links, by (body, link). As a table, by `to_pandas()` and its like, contacts have the
-    columns of `overlapper run` but for its steps and poses.
+    `names` are those of the links, by (body, link), and `kind` is the class of each contact. As a table, by
+    `to_pandas()` and its like, contacts have the columns of `overlapper run` but for its steps and poses.
     """
 
-    __slots__ = ("_keys", "_made", "names", "overlaps")
+    __slots__ = ("_keys", "_made", "kind", "names", "overlaps")
 
     def __init__(
-        self, keys: NDArray[np.int64], overlaps: Overlaps, names: Mapping[tuple[int, int], str] | None = None
+        self,
+        keys: NDArray[np.int64],
+        overlaps: Overlaps,
+        names: Mapping[tuple[int, int], str] | None = None,
+        kind: type[Contact] = Contact,
     ) -> None:
         """`keys` (k, 3) are body, link and shape of what the pairs of `overlaps` index."""
         self.overlaps = overlaps
         self.names = names or {}
+        self.kind = kind
         self._keys = keys
         self._made: list[Contact | None] = [None] * len(overlaps)
 
@@ -68,12 +78,12 @@ class Contacts(Tabular, Sequence[Contact]):
     def __getitem__(self, which: slice | Sequence[int] | NDArray[Any]) -> Contacts: ...
     def __getitem__(self, which: Any) -> Contact | Contacts:
         if not isinstance(which, SupportsIndex) or isinstance(which, np.ndarray):
-            return Contacts(self._keys, self.overlaps[which], self.names)
+            return Contacts(self._keys, self.overlaps[which], self.names, self.kind)
         row = range(len(self))[which]
         made = self._made[row]
         if made is None:
             (bodyA, linkA, shapeA), (bodyB, linkB, shapeB) = self._keys[self.overlaps.pairs[row]].tolist()
-            made = Contact(bodyA, linkA, shapeA, bodyB, linkB, shapeB, self.overlaps[row])
+            made = self.kind(bodyA, linkA, shapeA, bodyB, linkB, shapeB, self.overlaps[row])
             self._made[row] = made
         return made
 
@@ -86,7 +96,7 @@ class Contacts(Tabular, Sequence[Contact]):
     __hash__ = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Contacts, (self._keys, self.overlaps, dict(self.names))
+        return Contacts, (self._keys, self.overlaps, dict(self.names), self.kind)
 
     def columns(self) -> Columns:
         """The columns of the table by name, each an array or a list with a value for each row."""

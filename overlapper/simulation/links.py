@@ -117,23 +117,26 @@ def link_contacts(contacts: Iterable[Contact]) -> LinkContacts:
     """The contacts that `Bodies.overlaps` found, per pair of links, sorted by (bodyA, linkA, bodyB, linkB)."""
     if not isinstance(contacts, Iterable):
         raise TypeError(f"contacts must be what Bodies.overlaps() returns, not {contacts!r}")
-    ordered = sorted(contacts, key=lambda each: (*_links(each), each.shapeA, each.shapeB))
-    pairs = [LinkContact(*links, (each := tuple(group)), _union(each)) for links, group in groupby(ordered, _links)]
+    ordered = sorted(contacts, key=lambda each: (_solids(each), _shapes(each)))
+    pairs = [LinkContact(*solids, (each := tuple(group)), _union(each)) for solids, group in groupby(ordered, _solids)]
     return LinkContacts(pairs, contacts.names if isinstance(contacts, Contacts) else None)
 
 
-def _links(contact: Contact) -> tuple[int, int, int, int]:
-    return contact.bodyA, contact.linkA, contact.bodyB, contact.linkB
+def _solids(contact: Contact) -> tuple[int, int, int, int]:
+    return contact.solids
+
+
+def _shapes(contact: Contact) -> tuple[tuple[int, int], tuple[int, int]]:
+    return (contact.linkA, contact.shapeA), (contact.linkB, contact.shapeB)
 
 
 def _union(contacts: tuple[Contact, ...]) -> UnionOverlap:
     if len(contacts) == 1:
         return of_pair(contacts[0].overlap)
-    sides: tuple[dict[int, Placed], dict[int, Placed]] = ({}, {})
+    sides: tuple[dict[tuple[int, int], Placed], dict[tuple[int, int], Placed]] = ({}, {})
     for contact in contacts:
-        a, b = contact.overlap.shapes
-        sides[0].setdefault(contact.shapeA, a)
-        sides[1].setdefault(contact.shapeB, b)
+        for side, shape, placed in zip(sides, _shapes(contact), contact.overlap.shapes):
+            side.setdefault(shape, placed)
     rows = [{shape: row for row, shape in enumerate(side)} for side in sides]
-    pairs = {(rows[0][each.shapeA], rows[1][each.shapeB]): each.overlap for each in contacts}
+    pairs = {(rows[0][a], rows[1][b]): each.overlap for each in contacts for a, b in [_shapes(each)]}
     return of_pairs([*sides[0].values()], [*sides[1].values()], pairs)

@@ -76,7 +76,7 @@ def labels(bodies: Mapping[int, ModelledBody]) -> dict[int, str]:
 def link_names(bodies: Mapping[int, ModelledBody]) -> dict[LinkKey, str]:
     """Label and name of each link; those that several links would share end in "#" and the number of the link."""
     return {
-        (id, link): f"{label}/{name}"
+        (id, link): f"{label}/{name}" if name else label
         for id, label in labels(bodies).items()
         for link, name in _distinct(bodies[id].link_names).items()
     }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from overlapper.simulation.collision_rules import Mask, Rules
-from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.contacts import Contact, Contacts
 from overlapper.simulation.layout import Layout, Poses
 from overlapper.simulation.mechanics import Mechanics
 from overlapper.simulation.model import ModelledBody, Skipped
@@ -24,6 +24,9 @@ class Source(Protocol):
 
     engine: str = ""
     """The name in ENGINES of the engine that simulates; empty if it is none of these."""
+
+    contact: type[Contact] = Contact
+    """The class of two shapes that overlap or touch."""
 
     bodies: dict[int, ModelledBody]
     """The bodies by number, sorted. `AnyBodies` replaces those of height fields as it models more of the ground."""

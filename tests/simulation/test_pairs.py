@@ -12,7 +12,7 @@ from pybullet_utils.bullet_client import BulletClient
 from simulated import jointed
 
 from overlapper.simulation import Bodies, Recorder, SelfCollisionWarning
-from overlapper.simulation.collision_rules import Colliders, Rules
+from overlapper.simulation.collision_rules import Colliders, MaskRules
 
 SELF = p.URDF_USE_SELF_COLLISION
 LINK = (
@@ -424,7 +424,7 @@ def test_rules_count_the_pairs_that_they_allow(seed):
     both = bool(seed % 2)
     filters = {tuple(sorted(pair)): bool(random.integers(2)) for pair in drawn} | {((77, -1), (88, -1)): True}
     within = [(a, b) for a, b in combinations(links, 2) if a[0] == b[0] in (1, 4)]
-    rules = Rules(Colliders(rows, owners, group, mask), both, filters, within)
+    rules = MaskRules(Colliders(rows, owners, group, mask), both, filters, within)
     weights, expected = random.integers(1, 4, len(links)), 0
     first, second = np.triu_indices(len(links), 1)
     for i, j, allowed in zip(first, second, rules.allow(first, second)):

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from overlapper.simulation.bodies import AnyBodies
-from overlapper.simulation.collision_rules import Colliders, Rules
+from overlapper.simulation.collision_rules import Colliders, MaskRules
 from overlapper.simulation.model import BASE, ModelledBody, ModelledShape
 from overlapper.simulation.source import Source
 
@@ -52,7 +52,7 @@ class World(Source):
 
     @lru_cache(maxsize=1)  # noqa: B019  # a world lives as long as a test
     def rules(self, layout):
-        return Rules(Colliders.of(layout.collider_rows, {}))
+        return MaskRules(Colliders.of(layout.collider_rows, {}))
 
 
 class Scripted:

@@ -125,7 +125,7 @@ def _read(path: Path, self_collision: bool, modelling: Modelling) -> Generator[s
 def _of_bullet_file(path: Path, modelling: Modelling) -> Inventory:
     """The inventory of a file that saveBullet wrote, and loadBullet would not load whole. Its bodies have no names."""
     from overlapper.simulation.bullet.bullet_file import BulletFile
-    from overlapper.simulation.collision_rules import Colliders, Rules, partners
+    from overlapper.simulation.collision_rules import Colliders, MaskRules, partners
     from overlapper.simulation.modelling import in_one_sentence, modelled
 
     file = BulletFile(path)
@@ -148,7 +148,7 @@ def _of_bullet_file(path: Path, modelling: Modelling) -> Inventory:
         decomposed += [(names[key], len(mesh.parts)) for _, mesh in meshes]
     rows = {key: row for row, key in enumerate(colliders)}
     filters = {key: (each.group, each.mask) for key, each in colliders.items()}
-    rules = Rules(Colliders.of(rows, filters))
+    rules = MaskRules(Colliders.of(rows, filters))
     read = np.array([len(listed.get(key, ())) for key in colliders])
     meets = {key: len(others) for key, others in partners(rules, [*rows], np.flatnonzero(read)).items()}
     shapes = sum(len(file.leaves(each.shape)) for each in colliders.values())

@@ -11,7 +11,7 @@ import pybullet
 from overlapper.simulation.bullet.collider_poses import ColliderPoses
 from overlapper.simulation.bullet.known_bodies import KnownBodies
 from overlapper.simulation.bullet.recorder import Recorder
-from overlapper.simulation.collision_rules import Colliders, Rules
+from overlapper.simulation.collision_rules import Colliders, MaskRules, Rules
 from overlapper.simulation.layout import Layout
 from overlapper.simulation.model import LinkKey
 
@@ -28,7 +28,7 @@ class RulesInForce:
         self._bodies: list[int] = []
         self._static: list[bool] = []
         self._noted = (0, 0)  # changes and masks set, as the recorder counts them
-        self.rules = Rules(Colliders.of({}, {}))
+        self.rules: Rules = MaskRules(Colliders.of({}, {}))
 
     def follow(self, known: KnownBodies, layout: Layout, fresh: bool) -> None:
         """Take over what has changed since the last step. Filters that are `fresh` have just been read."""
@@ -52,14 +52,14 @@ class RulesInForce:
         colliders = Colliders.of(layout.collider_rows, known.filters)
         recorder = self._recorder
         if recorder is None:
-            return Rules(colliders)
+            return MaskRules(colliders)
         within = [
             pair
             for id, flags in recorder.self_collision.items()
             if id in known.by_id
             for pair in _within(id, flags, known.by_id[id].parents, layout.collider_rows)
         ]
-        return Rules(colliders, recorder.both_masks_must_agree, recorder.pair_filters, within)
+        return MaskRules(colliders, recorder.both_masks_must_agree, recorder.pair_filters, within)
 
 
 def _within(
