@@ -126,4 +126,5 @@ def import_engine(scene: str | Path) -> None:
     What goes to stderr is lost meanwhile: pybullet says on import when it was built.
     """
     with suppress(SceneError, OSError, ValueError), open(os.devnull, "wb") as nowhere, diverted(2, nowhere):
-        engine(engine_in(find_scene(scene).read_bytes()))
+        path = find_scene(scene)
+        engine(engine_in(path, path.read_bytes()))

@@ -8,6 +8,8 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,7 +34,8 @@ if TYPE_CHECKING:
 @with_options(files=files, asked=asking, modelled=modelling)
 def watch(
     script: Annotated[
-        Path, typer.Argument(help="A Python script that steps pybullet.", show_default=False, metavar="SCRIPT.py")
+        Path,
+        typer.Argument(help="A Python script that steps pybullet or MuJoCo.", show_default=False, metavar="SCRIPT.py"),
     ],
     context: typer.Context,
     arguments: Annotated[
@@ -52,13 +55,13 @@ def watch(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Say one JSON object instead of the table.")] = False,
 ) -> Callable[[], int]:
-    """Run a pybullet script as it is, and measure what its bodies have in common whenever it steps a simulation.
+    """Run a script of pybullet or MuJoCo as it is, and measure what its bodies share whenever it makes a step.
 
     Options of the watch stand before the script, those of the script behind it. Its output, its arguments, its exit
-    code and Ctrl-C are as without the watch, whose own words go to stderr when the script has ended. Each client that
-    the script steps is a simulation with a table of its own: the second is in FILE-2. The exit code is 2 where the
-    script's would be 0 and something was not measured or written: nothing at all, shapes that are not modelled, bodies
-    that have diverged, or steps in other processes.
+    code and Ctrl-C are as without the watch, whose own words go to stderr when the script has ended. Each pybullet
+    client and each MjData that the script steps has a table of its own: the second is in FILE-2. The exit code is 2
+    where the script's would be 0 and something was not measured or written: nothing at all, shapes that are not
+    modelled, bodies that have diverged, or steps in other processes.
 
     Examples:
 
@@ -78,10 +81,11 @@ def watch(
     try:
         from overlapper.reference import Fcl
         from overlapper.scenes.watching import Watches
-        from overlapper.simulation.engine import engine
+        from overlapper.simulation.engine import LIBRARIES, engine
+        from overlapper.simulation.imports import when_imported
 
-        engine("bullet")  # says what to install
-        from overlapper.simulation.bullet.windows import open_no_window, tell_of_windows
+        if not any(map(find_spec, LIBRARIES.values())):
+            engine("bullet")  # says what to install
         from overlapper.tables.outputs import can_be_written
 
         if files.check:
@@ -91,15 +95,22 @@ def watch(
         raise Refused(str(error)) from error
     except OSError as error:
         raise Refused(f"cannot write {error.filename}: {error.strerror}") from error
-    if direct:
-        open_no_window()
-    else:
-        sentence = f"{script} asks pybullet for a window, and there is no screen to show it on, so pybullet ends it"
-        tell_of_windows(lambda: say(f"overlapper: {sentence}: --direct runs it without one", sys.stderr))
+    when_imported("pybullet", partial(_look_for_windows, script, direct))
     # An exception that ends the script must not be mistaken for one of ours.
     astray = _astray(context, arguments or [])
     watches = Watches(script.name, files.out, files.html, how)
     return lambda: _run(script, arguments or [], astray, watches, how, as_json)
+
+
+def _look_for_windows(script: Path, direct: bool) -> None:
+    """Give the script no window if `direct`, else say why it ends if there is no screen for one."""
+    from overlapper.simulation.bullet.windows import open_no_window, tell_of_windows
+
+    if direct:
+        open_no_window()
+        return
+    sentence = f"{script} asks pybullet for a window, and there is no screen to show it on, so pybullet ends it"
+    tell_of_windows(lambda: say(f"overlapper: {sentence}: --direct runs it without one", sys.stderr))
 
 
 def _named(given: Sequence[str]) -> dict[int, str]:
@@ -223,4 +234,4 @@ def _steps(watches: Watches) -> str:
     if watches.stepped_elsewhere or watches.loaded_elsewhere:
         return "made no step in its own process"
     clock = ", and simulations in real time are not stepped by calls" if watches.in_real_time else ""
-    return f"never called pybullet.stepSimulation in its own process{clock}"
+    return f"never called pybullet.stepSimulation or mujoco.mj_step in its own process{clock}"

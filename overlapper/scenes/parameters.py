@@ -42,10 +42,13 @@ READERS: dict[type, tuple[str, Callable[[str], Parameter]]] = {
 HEADING = "set "
 
 
-def parameters_of(build: Callable[..., Any]) -> dict[str, Parameter]:
-    """The defaults of what `build` takes behind the client, by name; of none but numbers, texts, True and False."""
+def parameters_of(build: Callable[..., Any], filled: bool = True) -> dict[str, Parameter]:
+    """The defaults of what `build` takes, by name; of none but numbers, texts, True and False.
+
+    With `filled`, the first argument is what it fills, and no parameter.
+    """
     try:
-        taken = [*inspect.signature(build).parameters.values()][1:]
+        taken = [*inspect.signature(build).parameters.values()][int(filled) :]
     except (TypeError, ValueError):  # which C functions may raise
         return {}
     named = [each for each in taken if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Container, Generator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import get_args
 
 from overlapper.printable import first_line
 from overlapper.scenes.scene import ContactModel, Scene, SceneError, Step, broken
@@ -30,13 +29,13 @@ def run(
     """Build the scene in a simulation of its own and step it, `scene.steps` times by default.
 
     Every step is a frame, and the first frame has number 1. With `only`, the steps in it alone are frames. `contact` is
-    what pushes bodies apart: "bullet", contact points, or "volumetric", a `VolumetricContact` of the pairs that the
-    simulator lets collide. By default the scene says which, and which pairs are asked for. SceneError if the scene
+    what pushes bodies apart: the scene's engine by its name, or "volumetric", a `VolumetricContact` of the pairs that
+    the simulator lets collide. By default the scene says which, and which pairs are asked for. SceneError if the scene
     fails or cannot be measured, ValueError if `contact` is invalid.
     """
     model = scene.contact if contact is None else contact
-    if model not in get_args(ContactModel):
-        raise ValueError(f"contact must be 'bullet' or 'volumetric', not {model!r}")
+    if model not in (scene.engine, "volumetric"):
+        raise ValueError(f"contact must be {scene.engine!r} or 'volumetric', not {model!r}")
     simulation = engine(scene.engine).begin()
     asked = settings_of(asking if asking.pairs is not None else replace(asking, pairs=scene.pairs))
     stack = ExitStack()

@@ -4,10 +4,11 @@ A scene is a Python file with a docstring that says what is hard about it, `STEP
 the pybullet client and may return `step(i)`, which is called before every stepSimulation. What `build` takes beside the
 client, `build(client, *, mass=1.0, seed=0)`, are the scene's parameters. `PAIRS`, if it is there, says which pairs are
 looked at, as `simulation.Bodies.pairs` takes it: "all" where a filter keeps bodies that overlap from being pushed
-apart. `CONTACT`, if it is there, says what pushes them: "bullet", as by default, or "volumetric", for
+apart. `CONTACT`, if it is there, says what pushes them: the name of the engine, as by default, or "volumetric", for
 `simulation.VolumetricContact`. It may be a dictionary of the arguments of that, too, as {"stiffness": 1e8}. `NAMES`, a
 dictionary that `build` fills, has names of bodies by their numbers, as `simulation.Bodies` takes them. `ENGINE`, if it
-is there, names the simulator, "bullet" by default; `build` is called with what that engine fills.
+is there, names the simulator, "bullet" by default. With "mujoco", `build(*, mass=1.0)` returns (model, data) or
+(model, data, step). An MJCF file, .xml, is a scene as it is: a second of its model.
 """
 
 from __future__ import annotations
@@ -19,17 +20,18 @@ import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from overlapper.printable import LONGEST, first_line
 from overlapper.scenes.parameters import Parameter, described, parameters_of, values_of
-from overlapper.simulation.engine import ENGINES
+from overlapper.simulation.engine import ENGINES, FILES, RETURNED
 
 Step = Callable[[int], object]
-ContactModel = Literal["bullet", "volumetric"]
-"""The forces that push bodies apart."""
+ContactModel = Literal["bullet", "mujoco", "volumetric"]
+"""The forces that push bodies apart: those of the scene's own engine, or of the volumes that they share."""
 
 # The arguments that a scene may give simulation.VolumetricContact.
 TOLD = frozenset({"stiffness", "dissipation", "friction", "substeps"})
@@ -131,6 +133,8 @@ def load_scene(name_or_path: str | Path, given: Mapping[str, str] | None = None)
 
 def scene_of(path: Path, source: bytes) -> Scene:
     """The scene that the text of a file is. SceneError says what is wrong with it."""
+    if path.suffix in FILES:
+        return _scene_of_model(path)
     if not re.search(rb"\bSTEPS\b|\bimport \*", source):  # not run: a script may do anything, for ever
         raise SceneError(f"{path} is no scene, as it has no STEPS: overlapper watch {path} runs a script as it is")
     module = _imported(path, source)
@@ -142,25 +146,40 @@ def scene_of(path: Path, source: bytes) -> Scene:
     pairs = getattr(module, "PAIRS", "simulated")
     if isinstance(pairs, str) and pairs not in ("simulated", "all"):
         raise SceneError(f"{path} has PAIRS = {pairs!r}, which must be 'simulated', 'all' or a list of pairs")
-    contact: Any = getattr(module, "CONTACT", "bullet")
-    if contact not in get_args(ContactModel) and not (isinstance(contact, dict) and contact.keys() <= TOLD):
-        told = f"'bullet', 'volumetric' or a dictionary of {', '.join(sorted(TOLD))}"
+    named = getattr(module, "ENGINE", "bullet")
+    if named not in ENGINES:
+        known = ", ".join(map(repr, ENGINES))
+        raise SceneError(f"{path} has ENGINE = {named!r}, which must be one of {known}")
+    contact: Any = getattr(module, "CONTACT", named)
+    if contact not in (named, "volumetric") and not (isinstance(contact, dict) and contact.keys() <= TOLD):
+        told = f"{named!r}, 'volumetric' or a dictionary of {', '.join(sorted(TOLD))}"
         raise SceneError(f"{path} has CONTACT = {contact!r}, which must be {told}")
     volumetric: dict[str, Any] = contact if isinstance(contact, dict) else {}
     model: ContactModel = "volumetric" if isinstance(contact, dict) else contact
     names = getattr(module, "NAMES", {})
     if not isinstance(names, dict):
         raise SceneError(f"{path} has NAMES = {names!r}, which must be a dictionary of names by the numbers of bodies")
-    if (named := getattr(module, "ENGINE", "bullet")) not in ENGINES:
-        known = ", ".join(map(repr, ENGINES))
-        raise SceneError(f"{path} has ENGINE = {named!r}, which must be one of {known}")
     difficulty = (module.__doc__ or "").strip()
-    parameters = parameters_of(build)
+    parameters = parameters_of(build, named not in RETURNED)
     return Scene(path.stem, path, difficulty, steps, build, pairs, names, parameters, model, volumetric, named)
 
 
-def engine_in(source: bytes) -> str:
-    """The ENGINE that the text of a scene file names; the text is read, not run."""
+def _scene_of_model(path: Path) -> Scene:
+    """The scene that a file of a model is: a second of it. SceneError if it does not compile or nobody can read it."""
+    named: Any = FILES[path.suffix]
+    try:
+        reader: Any = import_module(ENGINES[named])
+        build, time_step = reader.build_of(path)
+    except (ImportError, ValueError) as error:
+        raise SceneError(f"{path} cannot be loaded: {first_line(error)}") from error
+    steps = max(1, round(1 / time_step))
+    return Scene(path.stem, path, f"{path.name} as it is", steps, build, contact=named, engine=named)
+
+
+def engine_in(path: Path, source: bytes) -> str:
+    """The engine of a scene file, by its ending or by the ENGINE that its text names; the text is not run."""
+    if path.suffix in FILES:
+        return FILES[path.suffix]
     found = re.search(rb"^ENGINE\s*=\s*[\"'](\w+)[\"']", source, re.MULTILINE)
     return found[1].decode() if found else "bullet"
 
@@ -168,7 +187,7 @@ def engine_in(source: bytes) -> str:
 def find_scene(name_or_path: str | Path) -> Path:
     """The file of the scene of that name, or that file. SceneError if there is none."""
     path = Path(name_or_path)
-    if path.suffix == ".py":
+    if path.suffix in (".py", *FILES):
         if not path.is_file():
             raise SceneError(f"there is no scene file {path}")
         return path

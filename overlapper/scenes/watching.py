@@ -8,6 +8,7 @@ import threading
 import warnings
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from mmap import mmap
 from pathlib import Path
 from types import FrameType, TracebackType
@@ -18,8 +19,9 @@ from overlapper.scenes.other_processes import OtherProcesses
 from overlapper.simulation.asked_pairs import Among
 from overlapper.simulation.bodies import AnyBodies
 from overlapper.simulation.cautions import SkippedShapeWarning, UnknownBodyWarning
-from overlapper.simulation.engine import LIBRARIES, Happening
+from overlapper.simulation.engine import LIBRARIES, Happening, engine_that_has
 from overlapper.simulation.engine import engine as engine_of
+from overlapper.simulation.imports import when_imported
 from overlapper.simulation.settings import Asking, Concave, Method, Modelling, Surface, settings_of
 from overlapper.tables.frame import Frame
 from overlapper.tables.outputs import Per, can_be_written, outputs
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class Watch:
-    """Measures a pybullet client whenever it has been stepped, by whomever, as `overlapper run` does with scenes.
+    """Measures a simulation whenever it has been stepped, by whomever, as `overlapper run` does with scenes.
 
         with overlapper.watch(client, "run.parquet", "run.html") as watch:
             ...  # any code that calls pybullet.stepSimulation()
@@ -43,12 +45,14 @@ class Watch:
     `per` what the rows of the table are of, and check="fcl" asks FCL, too. `surface`, `concave`, `concave_threshold`
     and `names` are those of `simulation.Bodies`, and `pairs`, `tolerance` and `method` those of `Bodies.overlaps`. What
     pybullet cannot be asked for (pair filters, the filter mode, self-collision, height fields, files) is known if it
-    was said after the watch began, or to `recorder`. `engine` names the simulator, as ENGINE of a scene does; with
-    another one than pybullet, `physicsClientId` is what that engine calls a simulation.
+    was said after the watch began, or to `recorder`.
 
-    Steps are noticed of `pybullet.stepSimulation`, not of a name that was imported `from pybullet` before, and not in
-    other processes; a simulation in real time is not stepped by calls. What cannot be measured or written raises in the
-    call that made the step, and the watch is over.
+    `physicsClientId` is the number of a pybullet client or a `mujoco.MjData`. `engine` names the simulator, as ENGINE
+    of a scene does, where the kind of simulation does not tell.
+
+    Steps are noticed of `pybullet.stepSimulation` and `mujoco.mj_step`, not of a name that was imported from these
+    before, and not in other processes; a simulation in real time is not stepped by calls. What cannot be measured or
+    written raises in the call that made the step, and the watch is over.
 
     ValueError for a client that is not connected or an invalid option, OSError if a file cannot be written,
     ImportError without the library that does it.
@@ -56,7 +60,7 @@ class Watch:
 
     def __init__(
         self,
-        physicsClientId: int = 0,
+        physicsClientId: int | Any = 0,
         out: str | Path | None = None,
         html: str | Path | None = None,
         *,
@@ -72,9 +76,9 @@ class Watch:
         recorder: Recorder | None = None,
         names: Mapping[int, str] | None = None,
         name: str = "the simulation",
-        engine: str = "bullet",
+        engine: str | None = None,
     ) -> None:
-        of_engine = engine_of(engine)
+        of_engine = engine_of(engine or engine_that_has(physicsClientId))
         if every < 1:
             raise ValueError(f"every must be a number of steps from 1, not {every}")
         if check not in (None, "fcl"):
@@ -193,10 +197,10 @@ class Watch:
 
 
 class Watches:
-    """Watches all clients of this process from their connection on; each that is measured has files of its own.
+    """Watches all simulations of this process from their beginning on; each that is measured has files of its own.
 
     The first has `out` and `html`, the second `out-2` and so on. What cannot be measured or written ends the watch of
-    that client, and goes to `failed`, not to the code that makes steps.
+    that simulation, and goes to `failed`, not to the code that makes steps.
     """
 
     def __init__(self, name: str, out: Path | None, html: Path | None, how: Mapping[str, Any]) -> None:
@@ -205,14 +209,19 @@ class Watches:
         """Those that have measured something, in the order in which they began to."""
         self.failed: list[tuple[Watch, Exception]] = []
         self.steps = 0
-        """The steps of all clients, measured or not."""
+        """The steps of all simulations, measured or not."""
         self.in_real_time = False
         """Whether a simulation was let run by the clock."""
         self._elsewhere = mmap(-1, 1)  # which forked processes write to
         self._others = OtherProcesses(LIBRARIES["bullet"])
         self._of: dict[Hashable, Watch] = {}
         self._process = os.getpid()
-        self._unlisten = engine_of("bullet").listen(self._hear)
+        self._unlisten: list[Callable[[], None]] = []
+        for name, library in LIBRARIES.items():
+            when_imported(library, partial(self._listen, name))
+
+    def _listen(self, engine: str) -> None:
+        self._unlisten.append(engine_of(engine).listen(self._hear))
 
     def _hear(self, happening: Happening, which: Hashable) -> None:
         if os.getpid() != self._process:
@@ -259,7 +268,8 @@ class Watches:
         """End all watches; their files stay beside their places if what was watched has `failed`."""
         if os.getpid() != self._process:
             return
-        self._unlisten()
+        for unlisten in self._unlisten:
+            unlisten()
         for watch in self._of.values():
             if watch.open:
                 watch.leave() if failed else watch.close()

@@ -9,11 +9,17 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 if TYPE_CHECKING:
     from overlapper.simulation.bodies import AnyBodies
 
-ENGINES = {"bullet": "overlapper.simulation.bullet.engine"}
+ENGINES = {"bullet": "overlapper.simulation.bullet.engine", "mujoco": "overlapper.simulation.mujoco.engine"}
 """The module of each engine by the name that a scene's ENGINE has."""
 
-LIBRARIES = {"bullet": "pybullet"}
+LIBRARIES = {"bullet": "pybullet", "mujoco": "mujoco"}
 """The package whose version the headings of tables have, by the name of its engine."""
+
+RETURNED = frozenset({"mujoco"})
+"""The engines whose scenes return what is simulated. `build` of the others is called with what it fills."""
+
+FILES = {".xml": "mujoco"}
+"""The engine that simulates a file of that ending as it is."""
 
 Happening = Literal["began", "stepped", "ended", "run by the clock"]
 Listener = Callable[[Happening, Hashable], None]
@@ -32,7 +38,10 @@ class Simulation(Protocol):
         """s that a step takes."""
 
     def build(self, build: Callable[..., Any], parameters: Mapping[str, Any]) -> Any:
-        """Call the `build` of a scene with what it fills, and with the scene's parameters; returns its answer."""
+        """Call the `build` of a scene with what it fills, if anything, and with the scene's parameters.
+
+        Returns the function to be called before each step, if `build` has returned one.
+        """
 
     def step(self) -> None:
         """Go on by a time step."""
@@ -55,6 +64,12 @@ class Engine(Protocol):
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Tell a listener what happens to all simulations, until the function that is returned is called."""
+
+
+def engine_that_has(simulation: object) -> str:
+    """The name of the engine of a simulation: of MuJoCo for its MjData, of pybullet for the number of a client."""
+    home = type(simulation).__module__.partition(".")[0]
+    return next((name for name, library in LIBRARIES.items() if library == home), "bullet")
 
 
 def engine(name: str) -> Engine:

@@ -41,15 +41,15 @@ class Study:
         cls,
         path: Path,
         steps: int,
-        contact: ContactModel = "bullet",
+        contact: ContactModel | None = None,
         asking: Asking = Asking(),  # noqa: B008
         modelling: Modelling = Modelling(),  # noqa: B008
         kept: int = 0,
     ) -> Study:
         """The study of the file as it is now."""
         source = path.read_bytes()
-        versions = origin(engine_in(source))
-        return cls(path.stem, str(path), source, steps, contact, asking, modelling, kept, versions)
+        engine: Any = engine_in(path, source)
+        return cls(path.stem, str(path), source, steps, contact or engine, asking, modelling, kept, origin(engine))
 
     @property
     def settings(self) -> dict[str, Any]:

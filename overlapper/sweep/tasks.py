@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 from overlapper.jobs.hand import Done, Outcome
@@ -32,7 +33,7 @@ def prepared(study: Study) -> Callable[[Task], dict[str, Any]]:
 
     It returns the row of the task, and, if steps are kept, the table of their rows.
     """
-    here = origin(engine_in(study.source))
+    here = origin(engine_in(Path(study.path), study.source))
     if here != dict(study.versions):
         raise ValueError(f"the sweep is of {_said(study.versions)}, but here is {_said(here)}")
     heading = study.identity()

@@ -150,7 +150,7 @@ def test_an_unknown_engine_is_named():
 def test_a_command_refuses_an_unknown_engine_in_one_sentence(options):
     Path("sinking.py").write_text(SCENE.replace("scripted", "newton"))
     done = subprocess.run([sys.executable, "-m", "overlapper", *options, "sinking.py"], capture_output=True, text=True)
-    told = "overlapper: sinking.py has ENGINE = 'newton', which must be one of 'bullet'\n"
+    told = "overlapper: sinking.py has ENGINE = 'newton', which must be one of 'bullet', 'mujoco'\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", told)
 
 

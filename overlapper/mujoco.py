@@ -1,0 +1,20 @@
+"""The geoms of a MuJoCo simulation, and their overlaps.
+
+    import mujoco
+    from overlapper.mujoco import Bodies
+
+    bodies = Bodies(model, data)
+    mujoco.mj_step(model, data)
+    bodies.update()
+    for contact in bodies.overlaps():
+        print(contact.geomA, contact.geomB, contact.overlap.volume)
+
+Shapes and pair rules are read once, poses at every step. pybullet is not needed.
+"""
+
+from overlapper.simulation.contacts import Contacts
+from overlapper.simulation.links import LinkContact, LinkContacts, link_contacts
+from overlapper.simulation.mujoco.bodies import Bodies
+from overlapper.simulation.mujoco.contact import GeomContact
+
+__all__ = ["Bodies", "Contacts", "GeomContact", "LinkContact", "LinkContacts", "link_contacts"]

@@ -1,0 +1,81 @@
+"""The bodies of a MuJoCo model."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import mujoco
+
+from overlapper.simulation.bodies import AnyBodies
+from overlapper.simulation.cautions import UnknownBodyWarning
+from overlapper.simulation.mujoco.source import MujocoSource
+from overlapper.simulation.naming import named
+from overlapper.simulation.settings import Concave, Modelling, Surface
+
+
+class Bodies(AnyBodies):
+    """The geoms of one MuJoCo simulation as convex shapes placed in the world.
+
+        bodies = Bodies(model, data)
+        while ...:
+            mujoco.mj_step(model, data)
+            bodies.update()
+            for contact in bodies.overlaps():
+                ...
+
+    Planes (infinite, as MuJoCo collides them), spheres, capsules, ellipsoids, cylinders, boxes and meshes are modelled;
+    a mesh is the convex hull that MuJoCo collides. Height fields, SDF plugins and flexes are in `skipped`, with one
+    SkippedShapeWarning each. Surfaces are nominal: MuJoCo's `contact.dist` is the distance of nominal surfaces, too.
+
+    Keys are (body, geom, 0) in MuJoCo's numbers, names are MuJoCo's: "torso" is a body, "torso/foot1" a geom.
+
+    `update()` reads the poses of `data`. After mj_step these are the poses before its integration, as `data.contact`
+    has them; mj_kinematics brings them up to date. Sizes, types and meshes of geoms that are edited are noticed.
+
+    Pairs are those that mj_collision looks at, by masks, welds, parents, excludes, explicit pairs and flags at the last
+    update. `pairs` and `overlaps` take other choices.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    data : mujoco.MjData
+        Of this model, with poses: after mj_forward, mj_step or mj_kinematics.
+    names : mapping of int to str, optional
+        Names of bodies by MuJoCo's number, in place of those of the model.
+    surface : {"nominal"}
+    concave, concave_threshold : optional
+        As for pybullet's Bodies, so that one loop serves both. They change nothing: MuJoCo collides hulls.
+
+    Raises
+    ------
+    TypeError
+        If an argument is of another class.
+    ValueError
+        If `data` is of another model or has no poses yet, or if a name or the surface is invalid.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        *,
+        names: Mapping[int, str] | None = None,
+        surface: Surface = "nominal",
+        concave: Concave = "decompose",
+        concave_threshold: float = 0.05,
+    ) -> None:
+        for argument, value, kind in (("model", model, mujoco.MjModel), ("data", data, mujoco.MjData)):
+            if not isinstance(value, kind):
+                raise TypeError(f"{argument} must be a mujoco.{kind.__name__}, not {value!r}")
+        if data.model is not model:
+            raise ValueError("data is of another model: make it with mujoco.MjData(model)")
+        if surface != "nominal":
+            raise ValueError(f"surface must be 'nominal', not {surface!r}: MuJoCo collides no others")
+        Modelling(concave, concave_threshold, surface)  # which refuses what is invalid
+        self.model, self.data = model, data
+        given = named(names)
+        super().__init__(MujocoSource(model, data, given))
+        if strange := sorted(given.keys() - self._source.bodies.keys()):
+            told = ", ".join(f"{body}: {given[body]!r}" for body in strange)
+            warnings.warn(f"names has bodies that are not in the simulation: {told}", UnknownBodyWarning, stacklevel=2)

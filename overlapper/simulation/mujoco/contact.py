@@ -1,0 +1,34 @@
+"""Two geoms that overlap or touch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from overlapper.simulation.contacts import Contact
+from overlapper.simulation.model import BASE
+
+
+@dataclass(frozen=True, slots=True)
+class GeomContact(Contact):
+    """Two geoms that overlap or touch; `overlap.status` says which.
+
+    Bodies (`bodyA`, `bodyB`) and geoms (`geomA`, `geomB`) have MuJoCo's numbers. In tables, a geom has the column of a
+    link: `linkA` and `linkB` are the geoms, `shapeA` and `shapeB` are 0. A is the lesser of the two by (body, geom).
+    `overlap.normal` points from B to A. MuJoCo's `contact.frame[:3]` points from `contact.geom[0]` to
+    `contact.geom[1]`.
+    """
+
+    @property
+    def geomA(self) -> int:
+        """MuJoCo's number of the first geom."""
+        return self.linkA
+
+    @property
+    def geomB(self) -> int:
+        """MuJoCo's number of the second geom."""
+        return self.linkB
+
+    @property
+    def solids(self) -> tuple[int, int, int, int]:
+        """A body is rigid with all of its geoms, so these are the bodies as wholes."""
+        return self.bodyA, BASE, self.bodyB, BASE

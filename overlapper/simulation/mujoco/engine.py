@@ -1,0 +1,134 @@
+"""The engine of MuJoCo: scenes return a model and its data, and steps are noticed by calls of mj_step."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+from weakref import WeakSet
+
+import mujoco
+
+from overlapper.simulation.engine import Happening, Listener
+from overlapper.simulation.mujoco.bodies import Bodies
+
+__stands_in__ = "mujoco"  # so that tracebacks of scripts end before the frames of this module
+
+STEPS = ("mj_step", "mj_step2")
+"""The functions that end a step."""
+
+_originals: dict[str, Callable[..., Any]] = {}
+_listeners: list[Listener] = []
+_begun: WeakSet[mujoco.MjData] = WeakSet()
+_steps_of_call = 1  # of the call that listeners are hearing of
+
+
+class Simulated:
+    """See `Simulation`: a model and its data, which a scene returns or somebody else steps."""
+
+    def __init__(self, data: mujoco.MjData | None = None) -> None:
+        self._data = data
+
+    @property
+    def bodies(self) -> Callable[..., Bodies]:
+        # A partial is no frame of its own: warnings name the line that calls it.
+        return partial(Bodies, self._known.model, self._known)
+
+    @property
+    def time_step(self) -> float:
+        return float(self._known.model.opt.timestep) * _steps_of_call
+
+    def build(self, build: Callable[..., Any], parameters: Mapping[str, Any]) -> Any:
+        model, data, *step = _parts(build(**parameters))
+        mujoco.mj_forward(model, data)
+        self._data = data
+        return step[0] if step else None
+
+    def step(self) -> None:
+        mujoco.mj_step(self._known.model, self._known)
+
+    def leave(self) -> None:
+        return
+
+    end = leave
+
+    @property
+    def _known(self) -> mujoco.MjData:
+        if self._data is None:
+            raise ValueError("there is no simulation before a scene is built")
+        return self._data
+
+
+def _parts(built: Any) -> tuple[Any, ...]:
+    """The model, the data and perhaps a function, of what `build` returned."""
+    parts = built if isinstance(built, tuple) else (built,)
+    if len(parts) == 1 and isinstance(parts[0], mujoco.MjModel):
+        parts = parts[0], mujoco.MjData(parts[0])
+    kinds = mujoco.MjModel, mujoco.MjData
+    if len(parts) not in (2, 3) or not all(map(isinstance, parts, kinds)):
+        raise ValueError(f"build() must return (model, data) or (model, data, step), not {built!r}")
+    return parts
+
+
+def begin() -> Simulated:
+    return Simulated()
+
+
+def running(which: mujoco.MjData, recorder: Any = None) -> Simulated:
+    if not isinstance(which, mujoco.MjData):
+        raise ValueError(f"a simulation of MuJoCo is a mujoco.MjData, not {which!r}")
+    return Simulated(which)
+
+
+def build_of(path: Path) -> tuple[Callable[[], Any], float]:
+    """A `build` that compiles an MJCF file, and the time step of its model. ValueError if it does not compile."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    return lambda: mujoco.MjModel.from_xml_path(str(path)), float(model.opt.timestep)
+
+
+def listen(listener: Listener) -> Callable[[], None]:
+    """Steps are noticed of `mujoco.mj_step` and `mujoco.mj_step2`, not of a name imported from mujoco before.
+
+    The simulation that a listener is told of is its MjData. It begins with the first step that anybody hears of.
+    """
+    if not _listeners:
+        for name in STEPS:
+            _originals[name] = getattr(mujoco, name)
+            setattr(mujoco, name, _heard(_originals[name]))
+    _listeners.append(listener)
+
+    def unlisten() -> None:
+        if listener in _listeners:
+            _listeners.remove(listener)
+            if not _listeners:
+                _begun.clear()
+                for name, original in _originals.items():
+                    setattr(mujoco, name, original)
+
+    return unlisten
+
+
+def _heard(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function, with listeners told of each call."""
+
+    @functools.wraps(function)
+    def step(m: mujoco.MjModel, d: mujoco.MjData, *args: Any, **kwargs: Any) -> None:
+        global _steps_of_call
+        function(m, d, *args, **kwargs)
+        _steps_of_call = int(args[0] if args else kwargs.get("nstep", 1))
+        try:
+            if d not in _begun:
+                _begun.add(d)
+                _tell("began", d)
+            _tell("stepped", d)
+        finally:
+            _steps_of_call = 1
+
+    return step
+
+
+def _tell(happening: Happening, data: mujoco.MjData) -> None:
+    for listener in tuple(_listeners):
+        listener(happening, data)

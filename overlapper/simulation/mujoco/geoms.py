@@ -1,0 +1,125 @@
+"""The geoms of a MuJoCo model as shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Shape, Sphere
+from overlapper.printable import printable
+from overlapper.simulation.model import BASE, Color, ModelledBody, ModelledShape, Skipped
+
+Numbers = NDArray[np.int64]
+
+TYPES = {
+    int(getattr(mujoco.mjtGeom, name)): name[len("mjGEOM_") :].lower()
+    for name in dir(mujoco.mjtGeom)
+    if name.startswith("mjGEOM_")
+}
+"""The names of the types of geoms, as MJCF has them, by number."""
+
+NOT_MODELLED = {
+    "hfield": "height fields are not modelled",
+    "sdf": "an SDF plugin computes its surface, which Python cannot read",
+}
+ORIGIN, UNTURNED = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def collidable(model: Any) -> Numbers:
+    """The geoms that may be in a contact: those with a mask, and those of explicit pairs."""
+    on = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    on[model.pair_geom1] = on[model.pair_geom2] = True
+    return np.flatnonzero(on)
+
+
+def drawn_from(model: Any) -> bytes:
+    """All numbers of the model that shapes are made of; they may be edited at any time."""
+    return b"".join(each.tobytes() for each in (model.geom_size, model.geom_type, model.geom_dataid))
+
+
+def modelled_bodies(model: Any, geoms: Numbers, names: dict[int, str]) -> dict[int, ModelledBody]:
+    """The bodies of these geoms by number, each geom with one shape or a reason why it has none.
+
+    `names` are given for bodies by number; the others have MuJoCo's.
+    """
+    owner = model.geom_bodyid
+    return {
+        int(body): _modelled_body(model, int(body), geoms[owner[geoms] == body].tolist(), names.get(int(body)))
+        for body in np.unique(owner[geoms])
+    }
+
+
+def _modelled_body(model: Any, body: int, geoms: Iterable[int], given: str | None) -> ModelledBody:
+    name = given or printable(model.body(body).name) or f"body {body}"
+    geom_names = {geom: printable(model.geom(geom).name) or f"geom {geom}" for geom in geoms}
+    shapes: list[ModelledShape] = []
+    skipped: list[Skipped] = []
+    for geom in geoms:
+        try:
+            shapes.append(ModelledShape(geom, 0, shape_of(model, geom), ORIGIN, UNTURNED))
+        except ValueError as error:
+            skipped.append(Skipped(body, geom, f"{name}/{geom_names[geom]}", str(error)))
+    colors = {geom: color_of(model, geom) for geom in geoms}
+    return ModelledBody(name, {BASE: "", **geom_names}, colors, {}, len(geom_names), tuple(shapes), tuple(skipped))
+
+
+def color_of(model: Any, geom: int) -> Color:
+    """Its material's colour, else its own."""
+    material = int(model.geom_matid[geom])
+    red, green, blue, alpha = (model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]).tolist()
+    return red, green, blue, alpha
+
+
+def shape_of(model: Any, geom: int) -> Shape:
+    """The shape that MuJoCo collides, in the geom's own frame. ValueError says why there is none."""
+    kind = TYPES.get(int(model.geom_type[geom]), "unknown")
+    size = model.geom_size[geom].astype(float)
+    match kind:
+        case "plane":
+            return _plane()  # infinite, whatever its size
+        case "sphere":
+            return Sphere(size[0])
+        case "capsule":
+            return Capsule(size[0], 2 * size[1])
+        case "ellipsoid":
+            return Ellipsoid(size)
+        case "cylinder":
+            return Cylinder(size[0], 2 * size[1])
+        case "box":
+            return Box(size)
+        case "mesh":
+            return _hull(hull_points(model, int(model.geom_dataid[geom])).tobytes())
+        case _:
+            raise ValueError(NOT_MODELLED.get(kind, f"geoms of type {kind} are not modelled"))
+
+
+def hull_points(model: Any, mesh: int) -> NDArray[np.float64]:
+    """(n, 3) the vertices of the hull that MuJoCo collides.
+
+    `mesh_graph` has the numbers of its vertices. `maxhullvert` makes it coarser than the hull of the mesh. Meshes that
+    nothing collided with when the model was compiled have no graph, and collide as the hull of all vertices.
+    """
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    vertices = np.asarray(model.mesh_vert[first : first + count], dtype=np.float64)
+    graph = int(model.mesh_graphadr[mesh])
+    if graph < 0:
+        return vertices
+    of_hull = int(model.mesh_graph[graph])
+    begin = graph + 2 + of_hull  # behind both counts and the addresses of edges
+    return np.asarray(vertices[model.mesh_graph[begin : begin + of_hull]])
+
+
+@lru_cache(maxsize=1)
+def _plane() -> HalfSpace:
+    return HalfSpace([0, 0, 1], 0)
+
+
+@lru_cache(maxsize=1024)
+def _hull(points: bytes) -> Hull:
+    """The hull of these points; that of geoms with the same mesh is one object."""
+    return Hull(np.frombuffer(points).reshape(-1, 3))

@@ -1,0 +1,88 @@
+"""MuJoCo's rule of which geoms may collide, evaluated for any pairs of geoms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper.simulation.collision_rules import Indices, Mask
+
+PLANE, HFIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
+NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+ROWS = 1 << 20  # pairs counted at a time
+
+
+def in_force(model: Any) -> bytes:
+    """All numbers of the model that the rule depends on; they may be edited at any time."""
+    arrays = (
+        model.geom_contype,
+        model.geom_conaffinity,
+        model.geom_type,
+        model.pair_geom1,
+        model.pair_geom2,
+        model.exclude_signature,
+        np.array([model.opt.disableflags]),
+    )
+    return b"".join(each.tobytes() for each in arrays)
+
+
+class PairRule:
+    """Which of these geoms may collide with which, by place in `geoms`.
+
+    A pair may collide if a mask of either admits the other, if they are not welded together or both fixed, if neither
+    is the other's parent, and if their bodies are not excluded. An explicit pair may collide whatever else is said.
+    Nothing collides while contacts or constraints are disabled. See mj_collision in engine_collision_driver.c.
+    """
+
+    def __init__(self, model: Any, geoms: NDArray[np.int64]) -> None:
+        body = model.geom_bodyid[geoms].astype(np.int64)
+        weld = model.body_weldid[body].astype(np.int64)
+        self._body, self._weld = body, weld
+        self._parent = model.body_weldid[model.body_parentid[weld]].astype(np.int64)
+        self._fixed = model.body_dofnum[weld] == 0
+        self._group, self._mask = model.geom_contype[geoms].copy(), model.geom_conaffinity[geoms].copy()
+        self._surface = np.isin(model.geom_type[geoms], (PLANE, HFIELD))
+        self._by_parent = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+        self._none = bool(model.opt.disableflags & NO_CONTACTS)
+        self._excluded = np.unique(model.exclude_signature.astype(np.int64))
+        place = np.full(model.ngeom, -1)
+        place[geoms] = np.arange(len(geoms))
+        first, second = place[model.pair_geom1], place[model.pair_geom2]
+        known = (first >= 0) & (second >= 0)
+        self._explicit = np.unique(self._code(np.minimum(first, second)[known], np.maximum(first, second)[known]))
+
+    def allow(self, first: Indices, second: Indices) -> Mask:
+        """Whether the geoms at these places may collide, pair by pair."""
+        if self._none:
+            return np.zeros(len(first), dtype=bool)
+        group, mask, weld, parent = self._group, self._mask, self._weld, self._parent
+        allowed = ((group[first] & mask[second]) | (group[second] & mask[first])) != 0
+        allowed &= (weld[first] != weld[second]) & ~(self._fixed[first] & self._fixed[second])
+        if self._by_parent:  # the world is nobody's parent
+            related = (weld[first] == parent[second]) | (weld[second] == parent[first])
+            allowed &= ~(related & (weld[first] != 0) & (weld[second] != 0))
+        if len(self._excluded):
+            a, b = self._body[first], self._body[second]
+            allowed &= ~np.isin((np.minimum(a, b) << 16) + np.maximum(a, b), self._excluded)
+        if len(self._explicit):
+            allowed |= np.isin(self._code(np.minimum(first, second), np.maximum(first, second)), self._explicit)
+        # Two planes, two height fields, or one of each have no contacts.
+        return np.asarray(allowed & ~(self._surface[first] & self._surface[second]))
+
+    def count(self, weights: NDArray[np.int64]) -> int:
+        """How many pairs of shapes may collide, if `weights` (n,) says how many shapes each geom has."""
+        places = np.flatnonzero(weights)
+        total = 0
+        at_once = max(1, ROWS // max(len(places), 1))
+        for begin in range(0, len(places), at_once):
+            first, second = np.meshgrid(places[begin : begin + at_once], places, indexing="ij")
+            each = first < second
+            a, b = first[each], second[each]
+            total += int((weights[a] * weights[b])[self.allow(a, b)].sum())
+        return total
+
+    def _code(self, first: Indices, second: Indices) -> Indices:
+        return np.asarray(first * np.int64(len(self._body)) + second)
