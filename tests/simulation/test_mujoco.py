@@ -104,6 +104,12 @@ def pairs_of_mujoco(data, touching):
     return {tuple(sorted(each.geom.tolist())) for each in data.contact if touching(each)}
 
 
+@pytest.fixture(autouse=True)
+def away(monkeypatch, tmp_path):
+    """MuJoCo logs its warnings in the working folder."""
+    monkeypatch.chdir(tmp_path)
+
+
 # ------------------------------------------------------------------------------------------------------------- shapes
 
 
@@ -345,8 +351,7 @@ def test_mujoco_is_needed_by_name_and_pybullet_is_not():
 
 
 @pytest.fixture
-def here(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
+def here(away):
     Path("robot.xml").write_text(ROBOT)
     Path("dropped.py").write_text(
         '"""A robot is dropped."""\nimport mujoco\nENGINE, STEPS = "mujoco", 40\n'
