@@ -37,7 +37,7 @@ Overlaps::Row row_of(Overlap overlap) {
   row.measures.way = overlap.way();
   if (overlap.status() == Status::kSeparated) return row;
   if (overlap.status() == Status::kOverlapping) row.measures = overlap.measures();
-  row.measures.volume_error = overlap.volume_error();
+  row.measures.area = overlap.area(), row.measures.volume_error = overlap.volume_error();
   row.measures.facets_touched = overlap.facets_touched();
   row.depth = overlap.contact().depth;
   row.normal = overlap.contact().normal;

@@ -87,9 +87,11 @@ void check_region(const Region& region, bool simple) {
   for (double t : region.inner) require(t >= 0 && t <= 1, "vertices are pulled inwards");
 }
 
-void check_measures(const Measures& m, const Mat3& inertia) {
-  require(m.volume > 0 && m.area > 0 && std::isfinite(m.area), "an overlap has a volume and a surface");
-  require(finite(m.centroid), "the centroid is finite");
+void check_measures(const Overlap& overlap) {
+  const double area = overlap.area();
+  const Mat3 inertia = overlap.inertia();
+  require(overlap.volume() > 0 && area > 0 && std::isfinite(area), "an overlap has a volume and a surface");
+  require(finite(overlap.centroid()), "the centroid is finite");
   for (Vec3 row : {inertia.row0, inertia.row1, inertia.row2}) require(finite(row), "the inertia is finite");
 }
 
@@ -144,8 +146,7 @@ void check_gradient(const Overlap& overlap) {
     for (double slope : row) require(std::isfinite(slope), "the gradient is finite");
     sum += {row[0], row[1], row[2]};
   }
-  if (overlap.method() == Method::kAuto)
-    require(norm(sum) <= 0x1p-40 * overlap.measures().area, "the area vectors sum to zero");
+  if (overlap.method() == Method::kAuto) require(norm(sum) <= 0x1p-40 * overlap.area(), "the area vectors sum to zero");
 }
 
 void check_errors(const Overlap& overlap) {
@@ -162,7 +163,7 @@ void check(const Overlap& overlap) {
   if (any_bounded(overlap.bodies())) check_errors(overlap);
   if (overlap.status() == Status::kOverlapping) {
     check_region(overlap.region(), overlap.method() == Method::kAuto);
-    check_measures(overlap.measures(), overlap.inertia());
+    check_measures(overlap);
     check_gradient(overlap);
     check_boundary(overlap.boundary(), static_cast<int>(overlap.bodies().size()), overlap.method());
   }

@@ -201,6 +201,21 @@ bool cores_reach(const Placed& a, const Placed& b, const Distance& d, double rea
   return core_radius(a.shape) + core_radius(b.shape) > 0 && norm2(d.normal) > 0 && -d.distance > doubt(reach);
 }
 
+/// True if the bodies certainly overlap because an ellipsoid holds a point of the flat body, with interior points of
+/// that body nearby. The witness points of bodies without a gap are points of both, but for rounding.
+bool ellipsoid_reaches(const Placed& a, const Placed& b, const Distance& d, double reach) {
+  constexpr double kInside = 1e-9;  // relative to the half axes; what is shallower has other proofs
+  const bool first = stretched(a.shape) != nullptr;
+  const Placed &ellipsoid = first ? a : b, &flat = first ? b : a;
+  const Ellipsoid* own = stretched(ellipsoid.shape);
+  if (!own || smooth(flat.shape)) return false;
+  const Vec3 h = own->half_axes, point = first ? d.witness_b : d.witness_a;
+  const Vec3 local = apply_transposed(ellipsoid.pose.rotation, point - ellipsoid.pose.translation);
+  const double inside = 1 - norm(Vec3{local.x / h.x, local.y / h.y, local.z / h.z});
+  const double way = bounded(flat.shape) ? inside * std::min({h.x, h.y, h.z}) : -d.distance;
+  return (inside > kInside || !bounded(flat.shape)) && way > doubt(reach) && way > kInside * max_component(h);
+}
+
 /// A point inside both bodies, about in the middle of what both radii reach between the nearest points of the cores. No
 /// value if one body is its own core.
 std::optional<Vec3> point_between(const Placed& a, const Placed& b, const Distance& d) {
@@ -237,6 +252,10 @@ Search search(const Arrangement& at) {
     if (cores_reach(bodies[0], bodies[1], d, search.reach)) {
       search.status = Status::kOverlapping, search.way = Way::kDual;
       search.between = point_between(bodies[0], bodies[1], d);
+      return search;
+    }
+    if (ellipsoid_reaches(bodies[0], bodies[1], d, search.reach)) {
+      search.status = Status::kOverlapping, search.way = Way::kDual;
       return search;
     }
   }

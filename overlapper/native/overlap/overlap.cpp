@@ -226,7 +226,11 @@ Errors Overlap::errors_of_paper() const {
 
 bool Overlap::converged() const { return status_ != Status::kOverlapping || volume_error() <= tolerance_ * volume(); }
 
-double Overlap::area() const { return status_ == Status::kOverlapping ? measures().area : 0; }
+double Overlap::area() const {
+  if (status_ != Status::kOverlapping) return 0;
+  if (measures().area_known) return measures().area;
+  return sliced() ? sliced()->measures.area : measure(region(), bodies()).measures.area;
+}
 
 Vec3 Overlap::centroid() const { return measures().centroid; }
 

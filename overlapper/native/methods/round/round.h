@@ -60,7 +60,7 @@ inline constexpr std::array<RoundChoice, 11> kRoundChoices{{
      pieces::measure_pieces},
     {"an ellipsoid, and a box, a hull or a half-space",
      [](const RoundTraits& t) { return t.stretched == 1 && t.flat == 1; },
-     {closed_forms::ellipsoid_cut_by_one_plane},
+     {closed_forms::ellipsoid_in_flat},
      pieces::measure_stretched},
     {"a rounded hull, and no ellipsoid",
      [](const RoundTraits& t) { return t.rounded_hulls > 0 && t.stretched == 0; },

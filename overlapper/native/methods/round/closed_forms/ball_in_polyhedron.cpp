@@ -2,35 +2,11 @@
 #include <limits>
 
 #include "methods/round/closed_forms/closed_forms.h"
+#include "methods/round/closed_forms/own_polyhedron.h"
 #include "methods/round/quadric/shallow_ball.h"
-#include "shapes/solid.h"
 
 namespace overlapper::closed_forms {
 namespace {
-
-/// The corners, planes and edges of a box or a hull, in coordinates of its own.
-class OwnPolyhedron {
- public:
-  explicit OwnPolyhedron(const Shape& shape) {
-    if (edges(shape).empty()) return;
-    if (const HullData* hull = polytope_of(shape)) {
-      polyhedron_ = {hull->vertices, hull->planes, edges(shape), hull->planes.size()};
-      return;
-    }
-    ask_flat(shape, [&](const auto& s) {
-      for (int i = 0; i < s.vertex_count(); ++i) corners_.push_back(s.vertex(i));
-      for (int f = 0; f < s.facet_count(); ++f) planes_.push_back(s.facet(f));
-    });
-    polyhedron_ = {corners_, planes_, edges(shape), planes_.size()};
-  }
-  /// Without edges if there is none.
-  const quadric::Polyhedron& operator*() const { return polyhedron_; }
-
- private:
-  std::vector<Vec3> corners_;
-  std::vector<Plane> planes_;
-  quadric::Polyhedron polyhedron_;
-};
 
 /// Measures of part of a ball, whose curved surface is the round body's and whose faces are the polyhedron's. `moments`
 /// are the second moments of the part about any point. Planes may be off by `rounding`.
@@ -47,12 +23,34 @@ MeasuresAndInertia measures_of(const quadric::BallPart& part, const Moments& mom
   return {std::move(q), rotation * moments.inertia_about_centroid() * transposed(rotation)};
 }
 
+/// A polyhedron whose own numbers are exact, about a centre in its own coordinates.
+class ExactAbout final : public quadric::WidePlaces {
+ public:
+  ExactAbout(const quadric::Polyhedron& polyhedron, const Shape& shape, const WideVector& centre)
+      : polyhedron_(polyhedron), shape_(shape), centre_(centre) {}
+
+  WideVector corner(int i) const override { return wide(polyhedron_.corners[i]) - centre_; }
+  WideVector between(int from, int to) const override {
+    return wide_difference(polyhedron_.corners[to], polyhedron_.corners[from]);
+  }
+  std::optional<quadric::PlaneAbout> plane(int f) const override {
+    const auto own = unit_facet(shape_, f);
+    if (!own) return std::nullopt;
+    return quadric::PlaneAbout{own->normal, -signed_distance(*own, centre_)};
+  }
+
+ private:
+  const quadric::Polyhedron& polyhedron_;
+  const Shape& shape_;
+  const WideVector& centre_;
+};
+
 /// The common part of a polyhedron and a ball in a shallow contact. The ball's centre is in the polyhedron's own
 /// coordinates.
 std::optional<quadric::ShallowPart> shallow_part(const OwnPolyhedron& polyhedron, const Placed& other,
                                                  const WideVector& centre, double radius) {
-  const auto plane = [&](int f) { return unit_facet(other.shape, f); };
-  auto part = quadric::measure_shallow_ball(*polyhedron, plane, centre, radius);
+  auto part =
+      quadric::measure_shallow_ball(*polyhedron, ExactAbout(*polyhedron, other.shape, centre), rounded(centre), radius);
   if (part && !(part->volume > 0)) part.reset();
   return part;
 }

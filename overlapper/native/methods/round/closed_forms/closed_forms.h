@@ -22,8 +22,8 @@ std::optional<MeasuresAndInertia> sides(const RoundPair& pair);
 /// A ball, a capsule or a cylinder where at most one plane of the flat body cuts off anything that the others leave.
 std::optional<MeasuresAndInertia> cut_by_one_plane(const RoundPair& pair);
 
-/// The same of an ellipsoid.
-std::optional<MeasuresAndInertia> ellipsoid_cut_by_one_plane(const RoundPair& pair);
+/// An ellipsoid cut by the planes of the flat body: the part of a ball, stretched. The area is not measured.
+std::optional<MeasuresAndInertia> ellipsoid_in_flat(const RoundPair& pair);
 
 /// A ball in a shallow contact with edges and corners of a box or a hull.
 std::optional<MeasuresAndInertia> shallow_ball_in_polyhedron(const RoundPair& pair);

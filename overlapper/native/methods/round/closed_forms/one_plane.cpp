@@ -3,8 +3,8 @@
 #include <span>
 
 #include "methods/round/closed_forms/closed_forms.h"
+#include "methods/round/closed_forms/only_cut.h"
 #include "methods/round/closed_forms/revolved_part.h"
-#include "methods/round/quadric/stretch.h"
 
 namespace overlapper::closed_forms {
 namespace {
@@ -35,34 +35,6 @@ double reach_below(const Revolved& body, Vec3 normal, double offset, Vec3 direct
   return std::min({bound(0), at_left, at_right});
 }
 
-/// The only plane that cuts off anything that the other planes leave of a body.
-struct OnlyCut {
-  const Plane* plane = nullptr;
-  double layers = 0;  ///< how many layers of rounding the others may cut off
-};
-
-/// Nothing if there are two such planes.
-std::optional<OnlyCut> only_cut(const Revolved& body, std::span<const Plane> planes, double rounding) {
-  const Plane* deepest = nullptr;
-  double most = -kInfinity;
-  std::vector<const Plane*> cutting;
-  for (const Plane& plane : planes) {
-    const double beyond = body.reach(plane.normal) + signed_distance(plane, body.centre);
-    if (beyond > most) most = beyond, deepest = &plane;
-    if (beyond > 0) cutting.push_back(&plane);
-  }
-  double layers = 0;
-  for (const Plane* plane : cutting) {
-    if (plane == deepest) continue;
-    const double offset = -signed_distance(*plane, body.centre);
-    const double deepest_offset = -signed_distance(*deepest, body.centre);
-    const double reach = reach_below(body, deepest->normal, deepest_offset, plane->normal, rounding, offset);
-    if (reach > offset + 2 * rounding) return std::nullopt;
-    if (reach > offset) layers += 4;  // The plane may cut off a layer of rounding.
-  }
-  return OnlyCut{deepest, layers};
-}
-
 /// The part of the round body below a plane that may be off by `rounding`.
 std::optional<MeasuresAndInertia> measure_below(const RoundPair& pair, const PlaneCut& cut, Vec3 normal,
                                                 double rounding) {
@@ -85,6 +57,27 @@ std::optional<MeasuresAndInertia> measure_below(const RoundPair& pair, const Pla
 
 }  // namespace
 
+std::optional<OnlyCut> only_cut(const Revolved& body, std::span<const Plane> planes, double rounding) {
+  const Plane* deepest = nullptr;
+  double most = -kInfinity;
+  std::vector<const Plane*> cutting;
+  for (const Plane& plane : planes) {
+    const double beyond = body.reach(plane.normal) + signed_distance(plane, body.centre);
+    if (beyond > most) most = beyond, deepest = &plane;
+    if (beyond > 0) cutting.push_back(&plane);
+  }
+  double layers = 0;
+  for (const Plane* plane : cutting) {
+    if (plane == deepest) continue;
+    const double offset = -signed_distance(*plane, body.centre);
+    const double deepest_offset = -signed_distance(*deepest, body.centre);
+    const double reach = reach_below(body, deepest->normal, deepest_offset, plane->normal, rounding, offset);
+    if (reach > offset + 2 * rounding) return std::nullopt;
+    if (reach > offset) layers += 4;  // The plane may cut off a layer of rounding.
+  }
+  return OnlyCut{deepest, layers};
+}
+
 std::optional<MeasuresAndInertia> cut_by_one_plane(const RoundPair& pair) {
   const Revolved& body = *pair.revolved[pair.self];
   const auto found = only_cut(body, pair.planes, pair.rounding);
@@ -96,40 +89,6 @@ std::optional<MeasuresAndInertia> cut_by_one_plane(const RoundPair& pair) {
   const WideAxis at{wide(body.centre), wide(body.axis)};
   const PlaneCut cut = cut_of(body, at, {wide(normal), {found->plane->offset}});
   return measure_below(pair, cut, normal, (1 + found->layers) * pair.rounding);
-}
-
-/// A cap of the unit ball, stretched to the ellipsoid.
-std::optional<MeasuresAndInertia> ellipsoid_cut_by_one_plane(const RoundPair& pair) {
-  const Placed& body = pair.round_body();
-  const quadric::Stretch stretch(stretched(body.shape)->half_axes);
-  const Vec3 half_axes = stretch.half_axes, centre = body.pose.translation;
-  const Mat3& turn = body.pose.rotation;
-  std::vector<Plane> seen;
-  for (const Plane& plane : pair.planes) {
-    const Vec3 normal = scaled(half_axes, apply_transposed(turn, plane.normal));
-    const double length = norm(normal);
-    seen.push_back({normal / length, -signed_distance(plane, centre) / length});
-  }
-  const Revolved ball{{}, {0, 0, 1}, 1, 0, true};
-  const double shortest = std::min({half_axes.x, half_axes.y, half_axes.z});
-  const auto cut = only_cut(ball, seen, pair.rounding / shortest);
-  if (!cut) return std::nullopt;
-  const auto& [normal, offset] = *cut->plane;
-  const double height = std::min(2.0, 1 + offset);
-  if (!(height > 0)) return std::nullopt;
-  const RevolvedPart part = cap(1, height, normal);
-  const bool whole = height == 2;
-  const quadric::Stretch::Cap curved = stretch.cap(normal, height);
-  const Vec3 on_other = whole ? Vec3{} : stretch.normal(part.flat_area * normal);
-  Measures q = measures_in_closed_form();
-  q.facets_touched = whole ? 0 : 1;
-  q.volume = stretch.volume * part.volume;
-  q.area = curved.area + norm(on_other);
-  q.area_error = curved.error + stretch.open() * q.area;
-  q.centroid = pair.reference + (centre + turn * scaled(half_axes, part.moment / part.volume));
-  q.volume_error = (1 + cut->layers) * pair.rounding * q.area + 2 * kSummation * q.volume;
-  if (!whole) q.pulls = pulls_of_flat(pair, turn * on_other, centre + turn * scaled(half_axes, offset * normal));
-  return MeasuresAndInertia{q, {}};
 }
 
 }  // namespace overlapper::closed_forms

@@ -18,22 +18,18 @@ double reach_of_cap(double r, Vec3 normal, double offset, Vec3 direction, double
   return t * along + disc * norm(direction - along * normal) + 2 * rounding;
 }
 
-namespace {
-
-WideMatrix rotation_of(const Placed& body) {
+WideMatrix wide_turn(const Placed& body) {
   if (unturned(body.orientation)) return {{{1}, {}, {}}, {{}, {1}, {}}, {{}, {}, {1}}};
   return wide_rotation(body.orientation);
 }
 
-}  // namespace
-
 WideVector axis_of(const Placed& body) {
-  const WideMatrix turn = rotation_of(body);
+  const WideMatrix turn = wide_turn(body);
   return {turn.row0.z, turn.row1.z, turn.row2.z};
 }
 
 WideAxis seen_from(const Placed& other, const Revolved& body) {
-  const WideMatrix turn = rotation_of(other);
+  const WideMatrix turn = wide_turn(other);
   WideAxis seen{apply_transposed(turn, wide_difference(body.placed->position, other.position)), {}};
   if (const HullData* hull = polytope_of(other.shape)) seen.centre = seen.centre - wide(hull->origin);
   if (body.half_length > 0) seen.axis = apply_transposed(turn, axis_of(*body.placed));

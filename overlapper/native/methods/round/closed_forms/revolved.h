@@ -30,6 +30,9 @@ std::optional<Revolved> revolved(const Placed& body);
 /// may be off by `rounding`, the answer is no less than that maximum. `offset` is between -r and r.
 double reach_of_cap(double r, Vec3 normal, double offset, Vec3 direction, double rounding);
 
+/// The turn of a body's axes into the world.
+WideMatrix wide_turn(const Placed& body);
+
 /// The direction of a body's z axis in the world.
 WideVector axis_of(const Placed& body);
 

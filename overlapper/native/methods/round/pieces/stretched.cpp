@@ -89,13 +89,6 @@ double inertia_error(const Totals& totals, const quadric::Stretch& stretch) {
          (dot(scaled(h, h), squares) + dot(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, products));
 }
 
-Moments stretched_moments(const Totals& totals, const quadric::Stretch& stretch) {
-  const Vec3 h = stretch.half_axes;
-  return {stretch.volume * totals.volume, stretch.volume * scaled(h, totals.first),
-          stretch.volume * scaled(scaled(h, h), totals.squares),
-          stretch.volume * scaled(Vec3{h.y * h.z, h.z * h.x, h.x * h.y}, totals.products)};
-}
-
 }  // namespace
 
 /// Volumes grow by the determinant, and area vectors are images by the matrix of cofactors.
@@ -119,7 +112,7 @@ std::optional<RoundMeasures> measure_stretched(const SlicedPair& pair) {
   const double volume = totals.volume;
   if (!(volume > 0 && best.error <= kMostError * volume)) return std::nullopt;
   if (pair.patch) *pair.patch = *best.sums.patch;
-  const Moments whole = stretched_moments(totals, stretch);
+  const Moments whole = stretch.moments(totals);
   RoundMeasures result;
   result.volume = whole.volume;
   result.area = totals.area;

@@ -240,15 +240,12 @@ std::optional<NearestPoint> nearest_point(const Polyhedron& polyhedron, Vec3 cen
 /// A polyhedron about the centre of a ball, in double-doubles.
 struct WidePolyhedron {
   const Polyhedron& polyhedron;
-  const std::function<std::optional<WidePlane>(int)>& plane;
-  const WideVector& centre;
+  const WidePlaces& places;
   Vec3 c;  ///< the centre in doubles
   double radius;
 
-  WideVector corner(int i) const { return wide(polyhedron.corners[i]) - centre; }
-  WideVector along(const Edge& edge) const {
-    return unit(wide_difference(polyhedron.corners[edge.to], polyhedron.corners[edge.from]));
-  }
+  WideVector corner(int i) const { return places.corner(i); }
+  WideVector along(const Edge& edge) const { return unit(places.between(edge.from, edge.to)); }
   bool inside(int i) const {
     const double r2 = radius * radius, distance2 = norm2(polyhedron.corners[i] - c);
     if (std::abs(distance2 - r2) <= kNear * r2) return norm(corner(i)) < DoubleDouble{radius};
@@ -262,8 +259,8 @@ WideVector foot_on(const WideVector& from, const WideVector& along) { return fro
 /// The apex, from the centre of the ball. Nothing where corners miss the plane of the highest face.
 std::optional<WideVector> apex_of(const WidePolyhedron& at, const NearestPoint& nearest, int highest) {
   if (nearest.above) {
-    const auto top = at.plane(highest);
-    return top ? std::optional(-signed_distance(*top, at.centre) * top->normal) : std::nullopt;
+    const auto top = at.places.plane(highest);
+    return top ? std::optional(top->offset * top->normal) : std::nullopt;
   }
   if (nearest.corner >= 0) return at.corner(nearest.corner);
   const Edge& edge = at.polyhedron.edges[nearest.edge];
@@ -402,11 +399,11 @@ bool is_whole(const Plane& face, Vec3 centre, double radius, Vec3 up, double ape
 /// Adds a face that edges part. False where that leaves a decision open.
 bool add_face(int f, const WidePolyhedron& at, const WideVector& apex, const ApexAxes& axes,
               std::span<const ShallowChord> chords, std::span<const SeenChord> seen, ShallowBall& ball,
-              ShallowPart& part) {
+              ShallowPart& part, Section& section) {
   thread_local std::vector<ArcEnd> leaves, enters;
-  const auto of_face = at.plane(f);
+  const auto of_face = at.places.plane(f);
   if (!of_face) return false;
-  const DoubleDouble wide_radius{at.radius}, of_centre = -signed_distance(*of_face, at.centre);
+  const DoubleDouble wide_radius{at.radius}, of_centre = of_face->offset;
   const DoubleDouble square = (wide_radius - of_centre) * (wide_radius + of_centre);
   if (!(square.head > 0)) return false;
   const Vec3 n = axes.seen(of_face->normal);
@@ -418,6 +415,9 @@ bool add_face(int f, const WidePolyhedron& at, const WideVector& apex, const Ape
   ++part.faces;
   part.area += area;
   part.flat += area * rounded(of_face->normal);
+  const Vec3 first = ball.face_first();
+  section.area = area;
+  section.first = first.x * rounded(axes.ahead) + first.y * rounded(axes.aside) + first.z * rounded(axes.up);
   return true;
 }
 
@@ -426,6 +426,8 @@ std::optional<ShallowPart> measure_from(const WideVector& apex, const WidePolyhe
                                         std::span<const int> reached) {
   thread_local std::vector<ShallowChord> chords;
   thread_local std::vector<SeenChord> seen;
+  thread_local std::vector<Section> sections;
+  sections.assign(at.polyhedron.planes.size(), {});
   const DoubleDouble from_centre = norm(apex);
   const double depth = rounded(DoubleDouble{at.radius} - from_centre);
   if (!(depth > 0)) return std::nullopt;
@@ -442,7 +444,7 @@ std::optional<ShallowPart> measure_from(const WideVector& apex, const WidePolyhe
   for (int f = 0; f < static_cast<int>(at.polyhedron.planes.size()); ++f) {
     const auto parts = [&](const ShallowChord& chord) { return chord.left == f || chord.right == f; };
     if (std::ranges::any_of(chords, parts)) {
-      if (!add_face(f, at, apex, *axes, chords, seen, ball, part)) return std::nullopt;
+      if (!add_face(f, at, apex, *axes, chords, seen, ball, part, sections[f])) return std::nullopt;
     } else if (is_whole(at.polyhedron.planes[f], at.c, at.radius, up, rounded(from_centre))) {
       return std::nullopt;
     }
@@ -451,16 +453,16 @@ std::optional<ShallowPart> measure_from(const WideVector& apex, const WidePolyhe
   part.volume = ball.volume(), part.error = ball.error();
   part.about_apex = ball.moments().along({rounded(axes->ahead), rounded(axes->aside), up});
   part.first = part.about_apex.first + part.volume * part.apex;
+  part.sections = sections;
   return part;
 }
 
 }  // namespace
 
-std::optional<ShallowPart> measure_shallow_ball(const Polyhedron& polyhedron,
-                                                const std::function<std::optional<WidePlane>(int)>& plane,
-                                                const WideVector& centre, double radius) {
+std::optional<ShallowPart> measure_shallow_ball(const Polyhedron& polyhedron, const WidePlaces& places, Vec3 centre,
+                                                double radius) {
   thread_local std::vector<int> reached;
-  const WidePolyhedron at{polyhedron, plane, centre, rounded(centre), radius};
+  const WidePolyhedron at{polyhedron, places, centre, radius};
   const auto highest = highest_face(polyhedron, at.c, radius);
   if (!highest) return std::nullopt;
   const auto nearest = nearest_point(polyhedron, at.c, radius, highest->face, reached);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <optional>
 
 #include "methods/round/quadric/ball.h"
@@ -62,12 +61,27 @@ struct ShallowPart : BallPart {
   Moments about_apex;  ///< about the apex, where second moments keep their digits
 };
 
+/// A plane, as a ball sees it.
+struct PlaneAbout {
+  WideVector normal;    ///< unit
+  DoubleDouble offset;  ///< from the ball's centre along the normal
+};
+
+/// Where the corners and planes of a polyhedron are in double-double, about the centre of a ball.
+class WidePlaces {
+ public:
+  virtual ~WidePlaces() = default;
+  virtual WideVector corner(int i) const = 0;
+  virtual WideVector between(int from, int to) const = 0;  ///< from one corner to another
+  /// No value if the corners of a face miss its plane.
+  virtual std::optional<PlaneAbout> plane(int f) const = 0;
+};
+
 /// Like measure_ball(), for a shallow contact: the error is rounding relative to the common part, however small it is.
-/// Takes the polyhedron's corners, the planes by `plane` and the centre as exact. Second moments are about the apex
-/// only. No value if the contact is not shallow, if no edge reaches the ball, or if doubles leave the direction of an
-/// arc uncertain.
-std::optional<ShallowPart> measure_shallow_ball(const Polyhedron& polyhedron,
-                                                const std::function<std::optional<WidePlane>(int)>& plane,
-                                                const WideVector& centre, double radius);
+/// Takes `places` as exact; the polyhedron and the centre need only be near. Second moments and the sections are about
+/// the apex. No value if the contact is not shallow, if no edge reaches the ball, or if doubles leave the direction of
+/// an arc uncertain.
+std::optional<ShallowPart> measure_shallow_ball(const Polyhedron& polyhedron, const WidePlaces& places, Vec3 centre,
+                                                double radius);
 
 }  // namespace overlapper::quadric

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "geometry/vec.h"
+#include "geometry/moments.h"
 
 namespace overlapper::quadric {
 
@@ -39,6 +39,13 @@ struct Stretch {
   /// The surface between two parallel planes, per height of the strip, along the arc level + cos φ across + sin φ along
   /// of the unit ball, |φ| <= half_angle.
   double arc(Vec3 level, Vec3 across, Vec3 along, double half_angle) const;
+
+  /// The image of the moments of a part of the ball.
+  Moments moments(const Moments& of_ball) const {
+    const Vec3 h = half_axes;
+    return {volume * of_ball.volume, volume * scaled(h, of_ball.first), volume * scaled(scaled(h, h), of_ball.squares),
+            volume * scaled(cofactors, of_ball.products)};
+  }
 
   struct Cap {
     double area, error;
