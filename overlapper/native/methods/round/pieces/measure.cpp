@@ -17,6 +17,10 @@ namespace {
 /// Largest fraction of a volume between planes that count as one; the second if nothing else closes the surface.
 constexpr double kLayer = 1e-12, kWideLayer = 1e-9;
 
+/// Of bodies with more planes, only those near the common set are looked at: the time of slices grows with the cube of
+/// their number.
+constexpr int kManyPlanes = 8;
+
 double least_radius(const Pieces& pieces) {
   double least = std::numeric_limits<double>::infinity();
   for (const Round& r : pieces.rounds) least = std::min(least, r.radius);
@@ -113,6 +117,7 @@ using Numbers = std::array<int, 2>;  ///< of a piece of a and one of b
 
 struct FewPieces {
   BothPieces both;
+  EnclosingPolytope around;  ///< the common set, if one body has many planes
   std::vector<Round> rounds;
   std::vector<Wall> walls;
 
@@ -199,11 +204,27 @@ struct ManyPieces {
   std::vector<SlicedPart> parts_;
 };
 
+/// A polytope around the common set that is thin if the contact is shallow: it ends at the smooth body's plane nearest
+/// to the inner point.
+void enclose_closely(const SlicedPair& pair, EnclosingPolytope& around) {
+  const Vec3 inside = rounded(pair.inside);
+  enclose(pair.a, pair.b, inside, around);
+  const double margin =
+      1e-12 * (norm(inside) + norm(pair.a.pose.translation) + norm(pair.b.pose.translation) + around.extent());
+  for (const Placed* body : {&pair.a, &pair.b}) {
+    if (!smooth(body->shape)) continue;
+    const Plane plane = body->tightest(inside);
+    around.cut({plane.normal, margin - signed_distance(plane, inside), kNoWall});
+  }
+}
+
 }  // namespace
 
 std::optional<RoundMeasures> measure_pieces(const SlicedPair& pair) {
   const Scratch<FewPieces> pieces;
-  if (!pieces->both.become(pair, nullptr)) return std::nullopt;
+  const bool many = facets(pair.a.shape) + facets(pair.b.shape) > kManyPlanes;
+  if (many) enclose_closely(pair, pieces->around);
+  if (!pieces->both.become(pair, many ? &pieces->around : nullptr)) return std::nullopt;
   return measure_both(pair, setting_of(pair), pieces->both,
                       [&](const PieceSetting& setting, Sums& sums) { return pieces->add_all(setting, sums); });
 }

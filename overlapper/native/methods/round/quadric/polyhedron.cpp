@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace overlapper::quadric {
 namespace {
@@ -27,14 +28,15 @@ bool Rings::become(const Shape& shape, const Pose& pose) {
 
 /// The corner where a cut edge passes the height: the same for both of its faces.
 int Rings::between(int above, int below, double height) {
-  const auto [at_edge, is_new] = crossed_.try_emplace({above, below}, static_cast<int>(corners_.size()));
-  if (is_new) {
-    const Vec3 p = corners_[above], q = corners_[below];
-    Vec3 at = p + (p.z - height) / (p.z - q.z) * (q - p);
-    at.z = height;
-    corners_.push_back(at);
-  }
-  return at_edge->second;
+  // Faces beside each other mostly follow each other.
+  for (size_t k = crossed_.size(); k-- > 0;)
+    if (crossed_[k][0] == above && crossed_[k][1] == below) return crossed_[k][2];
+  crossed_.push_back({above, below, static_cast<int>(corners_.size())});
+  const Vec3 p = corners_[above], q = corners_[below];
+  Vec3 at = p + (p.z - height) / (p.z - q.z) * (q - p);
+  at.z = height;
+  corners_.push_back(at);
+  return crossed_.back()[2];
 }
 
 /// Adds the rest of a face without the corners that are `outside`. False if rounding has made the face not convex.

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <map>
+#include <array>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "shapes/shape.h"
@@ -67,7 +66,7 @@ class Rings {
   // Work space.
   std::vector<Plane> kept_;
   std::vector<int> kept_ring_, kept_start_, after_, number_;
-  std::map<std::pair<int, int>, int> crossed_;  ///< corners, by the upper and the lower end of each cut edge
+  std::vector<std::array<int, 3>> crossed_;  ///< the upper and the lower end of each cut edge, and the corner there
 };
 
 }  // namespace overlapper::quadric
