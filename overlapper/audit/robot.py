@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 from xml.etree import ElementTree
@@ -14,22 +15,15 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from overlapper.jobs.confined import MEGABYTES, SECONDS, Confined, Unanswered
+from overlapper.printable import first_line
 from overlapper.simulation.bullet.joints import ENDINGS, kinematic_tree
 from overlapper.simulation.bullet.model_file import NotRead, read_apart
 from overlapper.simulation.bullet.model_text import root_of
-from overlapper.simulation.kinematic_tree import KinematicTree
+from overlapper.simulation.kinematic_tree import KinematicTree, Mimic
 from overlapper.simulation.settings import Modelling
 
 TURN = ("x", "y", "z", "w")  # of a spherical joint
-
-
-@dataclass(frozen=True, slots=True)
-class Mimic:
-    """A joint that stands at multiplier * q + offset where q, in rad or m, is that of the joint called `leader`."""
-
-    leader: str
-    multiplier: float
-    offset: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,11 +135,37 @@ def not_modelled(robot: Robot) -> dict[str, str]:
 def read_robot(path: Path, modelling: Modelling = Modelling()) -> Robot:  # noqa: B008
     """The robot of a URDF, SDF or MJCF file.
 
-    pybullet passes over mimic joints: those of a URDF are read from its text. NotRead if pybullet cannot read it or
-    takes it for something else than it says, or if a joint mimics one that is not there or, in the end, itself.
+    MuJoCo's own compiler reads MJCF if it is installed, else pybullet. pybullet passes over mimic joints: those of a
+    URDF are read from its text. NotRead if the reader refuses the file, or pybullet takes it for something else than it
+    says, or if a joint mimics one that is not there or, in the end, itself.
     """
+    if path.suffix.lower() == ".xml" and find_spec("mujoco"):
+        return _compiled(path, modelling)
     found: Robot = read_apart(path, _answers, (path, modelling), ENDINGS)
     return found
+
+
+def _compiled(path: Path, modelling: Modelling) -> Robot:
+    """The robot of an MJCF file by MuJoCo's compiler, in a process of its own."""
+    from overlapper.simulation.mujoco.tree import read_mechanism
+
+    if not path.is_file():
+        raise NotRead(f"there is no file {path}")
+    if modelling.surface != "nominal":
+        raise NotRead(f"{path} is read by MuJoCo, which has no surface but 'nominal'")
+    try:
+        found = _reading(read_mechanism, path)
+    except Unanswered as error:
+        raise NotRead(f"{path} cannot be read: MuJoCo {error}") from None
+    except ValueError as error:
+        raise NotRead(f"{path} cannot be read: MuJoCo says {first_line(error)!r}") from None
+    if not found.tree.shapes and len(found.tree.links) == 1:
+        raise NotRead(f"{path} cannot be read: it has no body")
+    mimics = {name: _followed(name, found.mimics) for name in found.mimics}
+    return Robot(found.name, found.tree, mimics, found.notes)
+
+
+_reading = Confined(SECONDS, MEGABYTES)
 
 
 def _answers(request: tuple[Path, Modelling]) -> Generator[Robot | str, None, None]:

@@ -1,7 +1,8 @@
-"""SRDF: the pairs of links that a planner need not ask about, as MoveIt reads and writes them."""
+"""The pairs of links that a planner need not ask about: as SRDF, for MoveIt, or as MJCF, for MuJoCo."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -27,12 +28,30 @@ def write_srdf(audit: Audit, path: Path) -> None:
 
     A pair of a link that is not modelled whole is not said never to overlap.
     """
-    partial = not_modelled(audit.robot).keys()
     root = ElementTree.Element("robot", name=audit.robot.name)
+    for (first, second), why in _disabled(audit):
+        ElementTree.SubElement(root, "disable_collisions", link1=first, link2=second, reason=why)
+    _write(root, path)
+
+
+def write_excludes(audit: Audit, path: Path) -> None:
+    """Write the same pairs as an MJCF file with an <exclude> for each, which a model may <include>."""
+    root = ElementTree.Element("mujoco")
+    contact = ElementTree.SubElement(root, "contact")
+    for (first, second), _ in _disabled(audit):
+        ElementTree.SubElement(contact, "exclude", body1=first, body2=second)
+    _write(root, path)
+
+
+def _disabled(audit: Audit) -> Iterator[tuple[tuple[str, str], str]]:
+    """The pairs that need not be asked about, by name, and why."""
+    partial = not_modelled(audit.robot).keys()
     for audited in audit.pairs:
         if why := reason(audited, partial.isdisjoint(audited.names)):
-            first, second = audited.names
-            ElementTree.SubElement(root, "disable_collisions", link1=first, link2=second, reason=why)
+            yield audited.names, why
+
+
+def _write(root: ElementTree.Element, path: Path) -> None:
     ElementTree.indent(root)
     with beside(path) as file:
         ElementTree.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)

@@ -58,6 +58,9 @@ def audit(
         Path | None, typer.Option(help="An SRDF file, of which the pairs that it disables are checked.")
     ] = None,
     srdf: Annotated[Path | None, typer.Option(help="SRDF file to write, for a planner.")] = None,
+    exclude: Annotated[
+        Path | None, typer.Option(help="MJCF file to write, .xml, with the same pairs as <exclude>, for MuJoCo.")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Table of all pairs of links, or assets: .csv, .parquet, .sqlite.")
     ] = None,
@@ -104,7 +107,7 @@ def audit(
         **settings_of(modelled),
     }
     if robot.is_dir():
-        asked = {"--expect": expect, "--against": against, "--srdf": srdf, "--html": html}
+        asked = {"--expect": expect, "--against": against, "--srdf": srdf, "--exclude": exclude, "--html": html}
         if of_robots := [name for name, value in asked.items() if value]:
             raise Refused(f"{of_robots[0]} is for a robot, and {robot} is a folder")
         audit_folder(robot, units, least_depth, modelled, out, as_json)
@@ -115,12 +118,12 @@ def audit(
         from overlapper.audit.findings import findings, remarks
         from overlapper.audit.page import addresses, write_page
         from overlapper.audit.robot import not_modelled, read_robot
-        from overlapper.audit.srdf import read_srdf, write_srdf
+        from overlapper.audit.srdf import read_srdf, write_excludes, write_srdf
         from overlapper.audit.table import facts, write_table
         from overlapper.simulation.bullet.model_file import NotRead
         from overlapper.tables.outputs import can_be_written
 
-        can_be_written(out, html, srdf)
+        can_be_written(out, html, srdf, exclude)
         disabled = read_srdf(against) if against else {}
         try:
             read = read_robot(robot, modelled)
@@ -147,12 +150,16 @@ def audit(
         if srdf:
             write_srdf(found, srdf)
             written.append(srdf)
+        if exclude:
+            write_excludes(found, exclude)
+            written.append(exclude)
         if html:
             write_page(found, html)
             written.append(html)
         wrong = findings(found, pairs, disabled)
     if as_json:
-        files = {name: str(path) for name, path in (("out", out), ("srdf", srdf), ("html", html)) if path}
+        places = {"out": out, "srdf": srdf, "exclude": exclude, "html": html}
+        files = {name: str(path) for name, path in places.items() if path}
         about: dict[str, Any] = {"robot": read.name, "joints": list(read.columns), "remarks": remarks(read)}
         about["not_modelled"] = not_modelled(read)
         told = {"pairs": facts(found, page), "findings": wrong}

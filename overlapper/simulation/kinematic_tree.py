@@ -38,6 +38,15 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True)
+class Mimic:
+    """A joint that stands at multiplier * q + offset where q, in rad or m, is that of the joint called `leader`."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True)
 class TreeLink:
     """A link of the body of that number, named as in the file; `parent` is its place among the links, -1 of a base.
 

@@ -25,6 +25,7 @@ SEVERAL = [
 
 
 @pytest.mark.parametrize("path", SEVERAL, ids=lambda path: path.name)
+@pytest.mark.usefixtures("by_pybullet")
 def test_shapes_are_where_pybullet_puts_them(path, client):
     robot = read_robot(path)
     sampling = Sampling(robot, 2000, seed=1)

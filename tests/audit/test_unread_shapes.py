@@ -233,6 +233,7 @@ def mjcf(path, compiler="", more='type="hinge" range="-20 20" limited="true"', g
     return path
 
 
+@pytest.mark.usefixtures("by_pybullet")
 def test_mjcf_that_pybullet_reads_as_it_is_meant_is_read(tmp_path):
     robot = read_robot(mjcf(tmp_path / "robot.xml", '<compiler angle="degree"/>'))
     assert remarks(robot) == []
@@ -240,6 +241,7 @@ def test_mjcf_that_pybullet_reads_as_it_is_meant_is_read(tmp_path):
     assert (degree.name, round(degree.upper, 6), not_modelled(robot)) == ("bend", 0.349066, {})
 
 
+@pytest.mark.usefixtures("by_pybullet")
 def test_what_mjcf_ties_by_equality_is_remarked_upon(tmp_path):
     tie = '<compiler/><equality><joint joint1="bend" joint2="other"/></equality>'
     robot = read_robot(mjcf(tmp_path / "robot.xml", tie))
@@ -272,6 +274,7 @@ def test_what_pybullet_would_change_of_mjcf_is_named(changed, reason, tmp_path):
     assert misread(root_of(mjcf(tmp_path / "robot.xml", **changed))).startswith(reason)
 
 
+@pytest.mark.usefixtures("by_pybullet")
 def test_the_refusal_of_mjcf_has_three_reasons_and_counts_the_others(tmp_path):
     path = mjcf(tmp_path / "robot.xml", more='ref="1" range="0 1"', geom="")
     said = refusal(path)
@@ -281,6 +284,7 @@ def test_the_refusal_of_mjcf_has_three_reasons_and_counts_the_others(tmp_path):
     assert said.endswith("; and 1 more") and said.count("; ") == 3
 
 
+@pytest.mark.usefixtures("by_pybullet")
 def test_shapes_and_audits_refuse_mjcf_with_the_same_words(tmp_path):
     path = mjcf(tmp_path / "robot.xml")
     with pytest.raises(NotRead) as refused:
@@ -295,6 +299,7 @@ def test_joints_of_one_body_in_different_places_are_refused(tmp_path):
     assert misread(root_of(path)) == "the joints of the body tip are in different places"
 
 
+@pytest.mark.usefixtures("by_pybullet")
 def test_a_model_without_a_body_is_refused_alone_and_in_a_folder(tmp_path):
     path = tmp_path / "empty.xml"
     path.write_text("<mujoco><worldbody/></mujoco>\n")
