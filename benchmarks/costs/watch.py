@@ -164,7 +164,7 @@ def rows_in(table: Path) -> int:
     if table.suffix == ".csv":
         with table.open(encoding="utf-8") as lines:
             return sum(not line.startswith("#") for line in lines) - 1
-    return int(read_metadata(table)["rows"].partition(",")[0])
+    return int(read_metadata(table)["rows"].partition(", sha256")[0].replace(",", ""))
 
 
 def long_logs(rows: int) -> None:

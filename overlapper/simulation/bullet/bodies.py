@@ -26,7 +26,8 @@ class Bodies(AnyBodies):
                 ...
 
     Boxes, spheres, capsules, cylinders, planes and convex meshes are modelled, compounds part by part. What cannot be
-    (soft bodies, flat hulls, height fields without a recorder) is in `skipped`, with one SkippedShapeWarning each.
+    (soft bodies, flat hulls, height fields without a recorder) is in `skipped`, with one SkippedShapeWarning each. So
+    are meshes of a file that pybullet could not read, if a recorder has heard of the file: nothing else tells of them.
 
     Concave meshes are decomposed into convex parts, which count as so many shapes of their link and are listed in
     `decomposed`. `concave_threshold`, from 0.01 to 1, is the concavity that may be left (see
