@@ -8,9 +8,11 @@
 namespace overlapper {
 namespace {
 
+/// `b` is a half-space. If `a` is one, too, its plane is parallel, and all points of it are as near.
 Distance distance_to_half_space(const Placed& a, const Placed& b) {
   const Plane plane = b.pose * *only_plane(b.shape);
-  const Vec3 lowest = a.support(-plane.normal);
+  const Plane* parallel = only_plane(a.shape);
+  const Vec3 lowest = parallel ? a.pose * (parallel->offset * parallel->normal) : a.support(-plane.normal);
   const double height = signed_distance(plane, lowest);
   return {height, height, plane.normal, lowest, lowest - height * plane.normal};
 }

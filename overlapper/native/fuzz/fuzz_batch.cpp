@@ -80,6 +80,12 @@ std::optional<Overlaps> ask(Batch& batch, const Question& q) try {
   return {};
 }
 
+bool may_be_refused(const std::vector<Shape>& shapes, const Question& q, IndexPair pair) {
+  std::vector<Placed> bodies;
+  for (int body : pair) bodies.push_back(make_placed(shapes[body], {}, {}));
+  return overlapper::may_be_refused(bodies, q.method == Method::kPaper) || pair[0] == pair[1];
+}
+
 /// The question for one pair, asked of a batch of its own.
 std::optional<Overlaps> ask_alone(const std::vector<Shape>& shapes, const Question& q, IndexPair pair) {
   Question alone{{}, {}, std::vector<IndexPair>{{0, 1}}, true, q.tolerance, q.method, 1};
@@ -134,6 +140,7 @@ std::optional<Overlaps> expected_of(const std::vector<Shape>& shapes, const Ques
   for (const IndexPair& pair : pairs_of(shapes, question)) {
     if (!known.contains(pair)) {
       const std::optional<Overlaps> alone = ask_alone(shapes, question, pair);
+      require(alone || may_be_refused(shapes, question, pair), "only what may be refused is refused");
       if (!alone) return {};
       require_equal_to_overlap(*alone);
       known.emplace(pair, *alone);

@@ -184,9 +184,13 @@ void run(Decoder& decoder) {
   const double tolerance = decoder.tolerance();
   const std::vector<Placed> bodies = decoder.bodies();
   if (std::getenv("OVERLAPPER_FUZZ_PRINT")) print(bodies, tolerance, method == Method::kPaper ? "paper" : "auto");
-  const Overlap overlap(bodies, tolerance, method);
-  check(overlap);
-  if (method == Method::kAuto) check_order(overlap);
+  try {
+    const Overlap overlap(bodies, tolerance, method);
+    check(overlap);
+    if (method == Method::kAuto) check_order(overlap);
+  } catch (const std::invalid_argument& refusal) {
+    require(may_be_refused(bodies, method == Method::kPaper), refusal.what());
+  }
 }
 
 }  // namespace

@@ -6,10 +6,9 @@
 
 #include "distance/gjk.h"
 #include "distance/wide_gap.h"
-#include "geometry/expanding_hull.h"
-#include "geometry/predicates.h"
 #include "geometry/rounding.h"
 #include "methods/clipping/clip.h"
+#include "methods/half_spaces_alone.h"
 #include "methods/round/round.h"
 #include "methods/tracing/trace.h"
 #include "shapes/canonical_order.h"
@@ -112,24 +111,6 @@ double wide_rounding(double reach) { return 0x1p-96 * reach; }
 
 namespace {
 
-/// True if one body is bounded, or the half-spaces bound a set: the origin is strictly inside the hull of their
-/// normals.
-bool bounds_space(std::span<const Placed> bodies) {
-  ExpandingHull normals;
-  for (const Placed& body : bodies) {
-    const Plane* plane = only_plane(body.shape);
-    if (!plane) return true;
-    normals.points.push_back(body.pose.rotation * plane->normal);
-  }
-  if (!normals.build()) return false;
-  for (const ExpandingHull::Facet& facet : normals.facets) {
-    if (facet.removed()) continue;
-    const auto [a, b, c] = facet.vertex;
-    if (orientation(normals.points[a], normals.points[b], normals.points[c], {}) >= 0) return false;
-  }
-  return true;
-}
-
 void append_planes(const Placed& body, std::vector<Plane>& planes) {
   append_planes(body.shape, planes);
   for (Plane& plane : planes) plane = body.pose * plane;
@@ -193,6 +174,30 @@ Settled settled_in_wide_arithmetic(const Arrangement& at, double reach, std::vec
   if (settled.ball->upper < -margin) settled.status = Status::kSeparated;
   if (settled.ball->lower > margin) settled.status = Status::kOverlapping;
   return settled;
+}
+
+/// Up to so many half-spaces, any four of all are tried; of more, any four that the search has looked at.
+constexpr size_t kMostTried = 16;
+
+/// Settles the status of half-spaces alone exactly. The search looks only near their planes, and rounding tilts these.
+/// Throws std::invalid_argument if half-spaces have a common set that is unbounded, or where the search did not look.
+void settle_half_spaces(std::span<const Placed> bodies, std::span<const OwnedPlane> cuts, Search& search) {
+  if (search.status != Status::kOverlapping) {
+    std::vector<bool> tried(bodies.size(), bodies.size() <= kMostTried);
+    for (const OwnedPlane& cut : cuts)
+      if (cut.owner >= 0) tried[cut.owner] = true;
+    std::vector<Placed> some;
+    for (size_t i = 0; i < bodies.size(); ++i)
+      if (tried[i]) some.push_back(bodies[i]);
+    if (have_no_common_point(some)) {
+      if (search.status != Status::kSeparated) search.status = Status::kSeparated, search.way = Way::kWideSeparation;
+      return;
+    }
+  }
+  if (!bound_a_set(bodies))
+    throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
+  if (search.status == Status::kSeparated)
+    throw std::invalid_argument("shapes must meet near their planes: half-spaces alone meet too far away");
 }
 
 /// True if the bodies certainly overlap because the distance of their cores is less than the sum of their radii. A
@@ -275,8 +280,8 @@ Search search(const Arrangement& at) {
       inside.ball.rounding = wide_rounding(search.reach);
     }
   }
-  if (search.status != Status::kSeparated && !bounds_space(bodies))
-    throw std::invalid_argument("shapes must have a bounded common set: half-spaces alone leave it open");
+  if (std::ranges::none_of(bodies, [](const Placed& body) { return bounded(body.shape); }))
+    settle_half_spaces(bodies, inside.ball.cuts, search);
   search.inside = std::move(inside);
   return search;
 }

@@ -250,6 +250,19 @@ Region region_of(const Part& part) {
   return region;
 }
 
+/// The status of bodies one of which is thinner than the rounding of its corners. The article has no polytope for that
+/// body, so a gap between two bodies is all that can be told.
+Status status_without_polytopes(std::span<const Placed> bodies) {
+  for (const Placed& a : bodies)
+    for (const Placed& b : bodies) {
+      if (&a == &b || !bounded(a.shape)) continue;
+      const double apart = norm(a.pose.translation - b.pose.translation);
+      const double size = reach(a, reach(b, apart + reach(a.shape) + reach(b.shape)));
+      if (distance(a, b).gap > doubt(size)) return Status::kSeparated;
+    }
+  return Status::kTouching;
+}
+
 }  // namespace
 
 PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double tolerance) {
@@ -262,6 +275,7 @@ PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double toleran
       parts.push_back(placed_part(box, {{}, box.data->origin}, i));
     } else {
       const Hull hull = inscribed(body.shape, tolerance);
+      if (!hull.data) return {status_without_polytopes(bodies), std::nullopt};
       parts.push_back(placed_part(hull, body.pose, i));
     }
     planes += static_cast<int>(parts.back().owner.size());

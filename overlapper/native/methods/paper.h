@@ -29,7 +29,8 @@ struct PaperResult {
 /// Where the text is silent or cannot be followed: the minimal step is kMinimalStep of the smaller polytope; smooth
 /// shapes are tessellated to `tolerance` from inside, and a half-space is replaced by a box large enough for the other
 /// bodies; the hulls decide by exact signs. Nothing recovers what the method loses: when none of the 26 shifts lands
-/// inside, or the vertices found lie in one plane, the answer is `touching` with no volume.
+/// inside, or the vertices found lie in one plane, the answer is `touching` with no volume. So it is if a body is
+/// thinner than the rounding of its corners, unless two of the bodies are apart.
 PaperResult intersect_as_in_paper(std::span<const Placed> bodies, double tolerance);
 
 }  // namespace overlapper

@@ -81,7 +81,7 @@ Contact contact_of(const Arrangement& at, Status status, bool as_in_paper, bool 
     contact.normal = p.normal;
   } else {
     Distance d = distance(a, b);
-    if (in_doubt(d.gap, a, b) && (bounded(a.shape) || bounded(b.shape))) d = wide_distance(at);
+    if (in_doubt(d.gap, a, b)) d = wide_distance(at);
     contact.normal = d.normal;
     // If the bodies touch, which method "paper" may report as separated, the line between the witness points may be
     // only rounding. The way out is not.

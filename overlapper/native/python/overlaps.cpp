@@ -3,6 +3,7 @@
 
 #include "distance/gjk.h"
 #include "distance/penetration.h"
+#include "methods/half_spaces_alone.h"
 #include "overlap/overlap.h"
 #include "python/arrays.h"
 #include "shapes/canonical_order.h"
@@ -488,6 +489,8 @@ deciding by exact signs inside its hulls. Where no shift lands inside, it says '
       [](nb::handle a, nb::handle b) {
         const auto pair = relative_pair(a, b);
         const auto& [p, q] = pair;
+        if (!bounded(p.shape) && !bounded(q.shape))
+          return have_no_common_point(pair) ? contact_in_doubt(a, b).distance : 0.0;
         const Distance d = computed_of(pair, [&] { return distance(pair[0], pair[1]); });
         if (!in_doubt(d.gap, p, q)) return d.distance;
         if (!in_doubt(norm2(d.normal) > 0 ? -d.distance : d.overlap, p, q)) return 0.0;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "shapes/hull.h"
+#include "shapes/inscribed.h"
 #include "shapes/limits.h"
 #include "shapes/mesh.h"
 #include "shapes/solid.h"
@@ -171,6 +171,6 @@ WidePlane Box::wide_tightest(const WideVector& p, const WideTriangles&) const {
   return {DoubleDouble{sign(component(nearest))} * wide_axis(nearest), {half_extents[nearest]}};
 }
 
-Hull Box::inscribed(double) const { return make_hull(corners_along_axes(half_extents)); }
+Hull Box::inscribed(double) const { return hull_within(corners_along_axes(half_extents)); }
 
 }  // namespace overlapper

@@ -108,6 +108,8 @@ void Capsule::give_pieces(Cutter& cutter) const {
   }
 }
 
-Hull Capsule::inscribed(double tolerance) const { return make_hull(points_of_capsule(radius, length / 2, tolerance)); }
+Hull Capsule::inscribed(double tolerance) const {
+  return hull_within(points_of_capsule(radius, length / 2, tolerance));
+}
 
 }  // namespace overlapper

@@ -110,7 +110,8 @@ template <class S>
 concept ConvexShape = ConvexOracle<S> && Named<S> && Measurable<S> && Cored<S> && Widened<S> && Classified<S> &&
                       (SmoothShape<S> || FlatShape<S>) && (!S::kBounded || requires(const S& s) {
                         // The hull of points of the shape that lacks at most that fraction of its volume, for method
-                        // "paper". Throws std::invalid_argument if that method does not take the shape.
+                        // "paper". It has no data if the shape is thinner than the rounding of its points. Throws
+                        // std::invalid_argument if that method does not take the shape.
                         { s.inscribed(1e-3) } -> std::same_as<Hull>;
                       }) && (S::kBounded || requires(const S& s) {
                         { s.plane } -> std::convertible_to<Plane>;  // the plane that defines an unbounded shape

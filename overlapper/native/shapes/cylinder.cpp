@@ -73,7 +73,7 @@ Hull Cylinder::inscribed(double tolerance) const {
   std::vector<Vec3> points;
   append_circle(radius, -length / 2, n, points);
   append_circle(radius, length / 2, n, points);
-  return make_hull(points);
+  return hull_within(points);
 }
 
 }  // namespace overlapper

@@ -181,7 +181,7 @@ void Ellipsoid::give_pieces(Cutter& cutter) const { cutter.whole_ball(ball() ? h
 Hull Ellipsoid::inscribed(double tolerance) const {
   std::vector<Vec3> points = points_of_capsule(1, 0, tolerance);
   for (Vec3& p : points) p = overlapper::scaled(half_axes, p);
-  return make_hull(points);
+  return hull_within(points);
 }
 
 }  // namespace overlapper

@@ -58,6 +58,11 @@ std::optional<WidePlane> HalfSpace::unit_facet(int) const {
   return WidePlane{unit(wide(given_normal)), DoubleDouble{as_given ? plane.offset : given_offset} / length};
 }
 
+WideVector HalfSpace::wide_core_support(const WideVector&) const {
+  const WidePlane exactly = *unit_facet(0);
+  return exactly.offset * exactly.normal;
+}
+
 WidePlane HalfSpace::wide_tightest(const WideVector&, const WideTriangles&) const {
   const WideVector given = wide(given_normal);
   return {unit(given), DoubleDouble{given_offset} / norm(given)};

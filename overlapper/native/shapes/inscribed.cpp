@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "shapes/hull_graph.h"
 #include "shapes/limits.h"
 
 namespace overlapper {
@@ -39,6 +40,12 @@ std::vector<Vec3> points_of_capsule(double radius, double half_length, double to
     if (z >= 0) append_circle(r, z + half_length, around, points);
   }
   return points;
+}
+
+Hull hull_within(std::span<const Vec3> points) {
+  const std::shared_ptr<HullData> data = hull_of(points);
+  if (data) data->graph = graph_of(*data);
+  return Hull(data);
 }
 
 }  // namespace overlapper

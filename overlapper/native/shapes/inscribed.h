@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "shapes/hull.h"
@@ -16,5 +17,8 @@ void append_circle(double radius, double z, int n, std::vector<Vec3>& points);
 int corners_of_circle(double tolerance, const char* shape);
 /// Points of a capsule along z; of a ball if the half length is 0.
 std::vector<Vec3> points_of_capsule(double radius, double half_length, double tolerance);
+
+/// The hull of points of a solid; without data if the solid is thinner than the rounding of the points.
+Hull hull_within(std::span<const Vec3> points);
 
 }  // namespace overlapper

@@ -138,8 +138,8 @@ inline bool has_graph(const Shape& shape) {
   return ask_flat(shape, [](const auto& s) { return s.has_graph(); });
 }
 
-/// The hull of points of a bounded shape that lacks at most that fraction of its volume. Throws std::invalid_argument
-/// for shapes that method "paper" does not take.
+/// The hull of points of a bounded shape that lacks at most that fraction of its volume; without data if the shape is
+/// thinner than the rounding of the points. Throws std::invalid_argument for shapes that method "paper" does not take.
 Hull inscribed(const Shape& shape, double tolerance);
 
 /// Upper bound of how far a shape reaches from its own origin; for a half-space, of the distance of its plane.

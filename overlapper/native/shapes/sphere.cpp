@@ -34,6 +34,6 @@ WidePlane Sphere::wide_tightest(const WideVector& point, const WideTriangles&) c
 
 void Sphere::give_pieces(Cutter& cutter) const { cutter.whole_ball(radius); }
 
-Hull Sphere::inscribed(double tolerance) const { return make_hull(points_of_capsule(radius, 0, tolerance)); }
+Hull Sphere::inscribed(double tolerance) const { return hull_within(points_of_capsule(radius, 0, tolerance)); }
 
 }  // namespace overlapper

@@ -109,7 +109,7 @@ struct Cone : Bounded,
   Hull inscribed(double tolerance) const {
     std::vector<Vec3> points{apex()};
     append_circle(radius, -length / 2, corners_of_circle(tolerance, "cone"), points);
-    return make_hull(points);
+    return hull_within(points);
   }
 
   double radius = 0, length = 0;
