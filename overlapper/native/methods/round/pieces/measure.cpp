@@ -79,10 +79,10 @@ std::optional<RoundMeasures> measures_of(const Totals& totals, const BothPieces&
   result.volume = totals.volume;
   result.volume_error = off(totals);
   if (!(result.volume_error <= kMostError * result.volume)) return std::nullopt;
-  result.volume_error += (both.a.flatness + both.b.flatness) * totals.area;
+  result.volume_error += (both.a.misplaced() + both.b.misplaced()) * totals.area;
   result.area = totals.area, result.first_area = totals.first_area;
   result.area_error = totals.area_error + missing_area(totals.unbalanced, totals.border);
-  result.rounding = rounding_of_surfaces(sum_of(totals.squares) / totals.volume);
+  result.rounding = rounding_of_surfaces(sum_of(totals.squares) / totals.volume) + both.a.rounding + both.b.rounding;
   result.centroid = inside + totals.first / totals.volume;
   result.inertia = totals.inertia_about_centroid();
   // If a body is inside the other, the sum is zero but for rounding.

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "geometry/cancellation.h"
+#include "geometry/rounding.h"
 #include "methods/round/slicing/slice.h"
 
 namespace overlapper::pieces {
@@ -32,6 +33,8 @@ class PlacingCutter final : public Cutter {
         result_(result) {
     if (const HullData* hull = polytope_of(body.shape)) origin_ = origin_ + rotation_ * wide(hull->origin);
     plain_rotation_ = rounded(rotation_), plain_origin_ = rounded(origin_);
+    const double size = overlapper::reach(body, norm(plain_origin_) + norm(inside_) + reach(body.shape));
+    result_.rounding = std::max(result_.rounding, wide_placing(size, !unturned(body.orientation)));
     margin_ = 1e-12 * (norm(body.pose.translation) + norm(other.pose.translation) + reach(body.shape));
   }
 

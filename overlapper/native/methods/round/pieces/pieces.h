@@ -24,8 +24,10 @@ struct Pieces {
   std::vector<Round> rounds;
   std::vector<Wall> walls;
   double flatness = 0;  ///< m: largest distance of a facet's plane from its corners
+  double rounding = 0;  ///< m: movement of surfaces by the rounding of double-doubles
 
-  void clear() { pieces.clear(), rounds.clear(), walls.clear(), flatness = 0; }
+  void clear() { pieces.clear(), rounds.clear(), walls.clear(), flatness = rounding = 0; }
+  double misplaced() const { return flatness + rounding; }
 };
 
 /// Upper bound of the distance of a body's points from a point.

@@ -119,7 +119,8 @@ std::optional<RoundMeasures> measure_stretched(const SlicedPair& pair) {
   result.first_area = swapped ? totals.area - totals.first_area : totals.first_area;
   result.area_error =
       totals.area_error + stretch.open() * totals.area + missing_area(stretch.normal(totals.unbalanced), totals.area);
-  result.volume_error = stretch.volume * (best.error + 4 * DBL_EPSILON * volume) + of_flat.flatness * totals.area;
+  result.volume_error = stretch.volume * (best.error + 4 * DBL_EPSILON * volume) +
+                        (of_flat.misplaced() + of_ellipsoid.rounding) * totals.area;
   const Vec3 origin = rounded(pair.inside) + turn * scaled(h, best.moved);
   result.centroid = origin + turn * scaled(h, totals.first / volume);
   result.inertia = turn * whole.inertia_about_centroid() * transposed(turn);
