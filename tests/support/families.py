@@ -825,6 +825,33 @@ def flush_round(rng):
     return Case(way, 0.0, bodies if rng.random() < 0.5 else bodies[::-1], float(volume))
 
 
+def caps_on_edges(rng):
+    """A flat cap of a cylinder on an edge of a box that is parallel to it but for a tilt, `parameter` deep."""
+    q, depth = quaternion(rng), power(rng, -11, -3)
+    tilt = float(rng.choice([0, 0, 1e-16, 1e-13, 1e-10])) * rng.normal(size=4)
+    angle, r, h, half = rng.uniform(0.1, 0.6), rng.uniform(0.2, 0.4), rng.uniform(0.3, 1), rng.uniform(0.5, 1)
+    edge = half * (np.sin(2 * angle) + np.cos(2 * angle))
+    box = Placed(
+        Box([half, half, half]), (0, 0, 0), turned_by(q, np.array([np.sin(angle), 0, 0, np.cos(angle)])) + tilt
+    )
+    beside = half * (np.cos(2 * angle) - np.sin(2 * angle)) + rng.uniform(-0.5, 0.5) * r
+    at = rotation(q) @ [rng.uniform(-0.1, 0.1), beside, edge + h / 2 - depth]
+    return Case("parallel", depth, (Placed(Cylinder(r, h), at, q), box))
+
+
+def thin_plates(rng):
+    """A ball or an ellipsoid, and a box or a hull through it that is `parameter` times as thick as wide."""
+    thin = power(rng, -8, -3)
+    flat = rng.permutation([thin, 1.0, 1.0]) * rng.uniform(0.4, 1, 3)
+    plate = Box(flat) if rng.random() < 0.5 else Hull(rng.normal(size=(8, 3)) * flat)
+    axes = rng.uniform(0.5, 1, 3)
+    body = Sphere(axes[0]) if rng.random() < 0.3 else Ellipsoid(axes)
+    where = rng.normal(size=3) * 0.2
+    return Case(
+        type(body).__name__, thin, (Placed(body, where, quaternion(rng)), Placed(plate, (0, 0, 0), quaternion(rng)))
+    )
+
+
 def special_poses(rng):
     """Two bodies, one of them round, of few lengths, turned by few angles, so that centres, ends, rims, seams, edges or
     corners of the one lie on those of the other, or do but for `parameter` of a metre."""
@@ -941,8 +968,8 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
         stacked_plates, scaled, tiny_in_huge, far_away, combined, round_hulls, fine_round_hulls,
         finest_round_hulls, prisms, pole_slivers, cut_at_edges, dual_pairs, published, sequences, compounds,
         many_bodies, crowds, empty_triples, slender_groups, half_spaces, half_spaces_alone, lenses, posed_round,
-        round_contacts, rounded_hulls, rounded_meshes, folded_hulls, tilted_round, flush_round, special_poses,
-        ellipsoids, posed_ellipsoids, *([more_kinds] if MORE_SHAPES else []),
+        round_contacts, rounded_hulls, rounded_meshes, folded_hulls, tilted_round, flush_round, caps_on_edges,
+        thin_plates, special_poses, ellipsoids, posed_ellipsoids, *([more_kinds] if MORE_SHAPES else []),
     )
 }  # fmt: skip
 

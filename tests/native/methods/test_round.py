@@ -14,7 +14,7 @@ from round_truth import dot, number, truth, vector
 from rules import a_turn_keeps_the_measures_of_round_bodies
 from strategies import product, quaternion, rotation
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Placed, RoundedHull, Sphere, overlap
 
 EXACT = 1e-12
 DEPTHS = [10.0**-k for k in range(1, 11)]
@@ -593,6 +593,34 @@ def test_a_formula_that_is_not_sure_is_not_believed_where_slices_give_up():
     found = overlap(*make("special_poses", 3000455).placed)
     lower, upper = found.certificate().verify()
     assert found.volume - found.volume_error <= lower and upper <= found.volume + found.volume_error
+
+
+# About a point at an end of such a long wedge, its other end had lost nine digits.
+@pytest.mark.parametrize("depth", DEPTHS[2:])
+def test_a_flat_cap_on_an_edge_that_is_parallel_to_it_shares_a_wedge(depth):
+    r, turn = 0.3, [np.sin(np.pi / 8), 0, 0, np.cos(np.pi / 8)]
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        q, beside = quaternion(rng), rng.uniform(-0.2, 0.2)
+        at = rotation(q) @ [0.1, beside, 0.5**0.5 + 0.4 - depth]
+        found = overlap(Placed(Cylinder(r, 0.8), at, q), Placed(Box([0.5, 0.5, 0.5]), (0, 0, 0), product(q, turn)))
+        assert found.way in ("slicing", "closed form")
+        assert found.volume_error <= 1e-11 * found.volume
+        lower, upper = found.certificate().verify()
+        assert found.volume - found.volume_error <= upper and lower <= found.volume + found.volume_error
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_an_ellipsoid_and_a_plate_that_is_thin_by_a_hundred_million_share_what_is_proved(seed):
+    rng = np.random.default_rng(seed)
+    thin = rng.permutation([1e-8, 1.0, 1.0]) * rng.uniform(0.4, 1, 3)
+    plate = Box(thin) if seed % 2 else Hull(rng.normal(size=(8, 3)) * thin)
+    body = Placed(Ellipsoid(rng.uniform(0.5, 1, 3)), rng.normal(size=3) * 0.1, quaternion(rng))
+    found = overlap(body, Placed(plate, (0, 0, 0), quaternion(rng)))
+    assert found.way == "slicing"
+    assert found.volume_error <= 1e-11 * found.volume
+    lower, upper = found.certificate().verify()
+    assert found.volume - found.volume_error <= upper and lower <= found.volume + found.volume_error
 
 
 @pytest.mark.parametrize("margin", [1.0, 0.05, 1e-3])

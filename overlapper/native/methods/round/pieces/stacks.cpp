@@ -114,6 +114,29 @@ bool sound(const Stack& stack, const Integrals& s, double extent) {
   return norm(s.first) <= far * volume && std::abs(s.squares.x + s.squares.y + s.squares.z) <= far * far * volume;
 }
 
+/// The error of a volume that slices have summed, by rounding and by the rules.
+double error_of(const slicing::Sum& sum) {
+  const Integrals& s = sum.integrals;
+  return sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
+}
+
+/// Adds a piece by slices about its centroid, if these leave less open or uncertain. The point inside may be at an end
+/// of a long piece, where a surface is near that is far from the rest: slices suit that end, and the rest has fewer
+/// digits.
+bool add_about_centroid(const PieceContext& at, const Stack& stack, const BestSum& sum, Sums& sums) {
+  const Integrals& s = sum.best.integrals;
+  const double off = sum.open + error_of(sum.best);
+  if (at.closed(sum) && off <= kMostOpen * (at.share_of(sums.totals.volume) + s.volume)) return false;
+  const Vec3 offset = in_world(stack, s.first / s.volume);
+  if (at.piece.near || !(norm(offset) <= at.piece.extent)) return false;
+  Sums with = sums;
+  if (!add_near(at.piece, offset, at.setting, with)) return false;
+  const Totals &before = sums.totals, &after = with.totals;
+  if (!(after.volume > before.volume && after.open + after.error - before.open - before.error < off)) return false;
+  sums = with;
+  return true;
+}
+
 void add_sum(const Stack& stack, const slicing::Sum& sum, Vec3 offset, const quadric::Stretch* stretch, Sums& sums) {
   const Integrals& s = sum.integrals;
   Totals& totals = sums.totals;
@@ -124,7 +147,7 @@ void add_sum(const Stack& stack, const slicing::Sum& sum, Vec3 offset, const qua
                         .along({abs(stack.l), abs(stack.m), abs(stack.t)})
                         .seen_from(abs(offset));
   totals.volume += s.correction;
-  totals.error += sum.error + 8 * DBL_EPSILON * s.blur + 32 * DBL_EPSILON * s.volume;
+  totals.error += error_of(sum);
   totals.area += s.area, totals.first_area += s.first_area, totals.area_error += sum.area_error;
   totals.border += s.border;
   const Vec3 pull = turned(s.pull[0]);
@@ -184,6 +207,7 @@ bool add_slices(const SlicedPiece& piece, const PieceSetting& setting, Sums& sum
       if (const auto step = nearer_point(*stack, piece, sum.best.integrals))
         if (add_near(piece, *step, setting, sums)) return true;
     refine(*stack, at, sum);
+    if (add_about_centroid(at, *stack, sum, sums)) return true;
   }
   if (!try_other_axes(at, *stack, sum) && !told) return false;
   // Slices that are not sure at all may be those of another piece.

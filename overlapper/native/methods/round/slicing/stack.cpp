@@ -14,6 +14,9 @@ constexpr double kParallel = 1e-11;
 constexpr double kRushing = 1e-3;
 /// A ridge whose direction has a smaller component across the slices counts as parallel to them.
 constexpr double kSteep = 0.05;
+/// Where the way out of the walls is that much shorter than out of the round, slices are strips along a wall. In axes
+/// along the wall, the width of the strips has all digits.
+constexpr double kThin = 1e-3;
 /// Tangents of the angles by which slices are turned, until some suit.
 constexpr std::array<double, kAxes> kTurns{0, 0.3, -0.3, 0.7, -0.7};
 
@@ -85,7 +88,16 @@ Axes turned(const WideVector& l, const WideVector& m0, double tangent_of_angle, 
   const WideVector m = cosine * (m0 - tangent * n0), n = cosine * (n0 + tangent * m0);
   const std::array<WayOut, 2> ways = nearest(rounds, walls);
   const WideVector ridge = cross(ways[0].normal, ways[1].normal);
-  return sheared(l, m, n, std::abs(rounded(dot(ridge, n))) > kSteep ? ridge : n0);
+  const bool thin = ways[0].slack < kThin * ways[1].slack;
+  return sheared(l, m, n, !thin && std::abs(rounded(dot(ridge, n))) > kSteep ? ridge : n0);
+}
+
+/// The same slices, with m across the strips that a wall makes of them.
+Axes along_strips(const Axes& axes, const WideVector& normal) {
+  const WideVector flat = across(normal, axes.n);
+  if (!(norm2(rounded(flat)) > kSteep * kSteep)) return axes;
+  const WideVector m = unit(flat);
+  return sheared(cross(m, axes.n), m, axes.n, axes.t);
 }
 
 /// Chooses slices parallel to the way out, and to the axis of a cylinder.
@@ -112,12 +124,20 @@ Axes choose(std::span<const Round> rounds, std::span<const Wall> walls, double t
     }
   }
   if (one) {
-    WideVector out = way_out(*one).normal;
+    const WayOut nearest_way = nearest(rounds, walls)[0], of_side = way_out(*one);
+    WideVector out = of_side.normal;
+    const bool thin = nearest_way.slack < kThin * of_side.slack;
+    if (thin && norm2(rounded(across(nearest_way.normal, one->axis))) > kSteep * kSteep) out = nearest_way.normal;
     if (!(norm2(rounded(out)) > 0)) out = along_an_edge(one->axis, walls);
-    return turned(one->axis, unit(across(out, one->axis)), tangent_of_angle, rounds, walls);
+    const Axes axes = turned(one->axis, unit(across(out, one->axis)), tangent_of_angle, rounds, walls);
+    return thin ? along_strips(axes, nearest_way.normal) : axes;
   }
-  WideVector out = nearest(rounds, walls)[0].normal;
-  if (!rounds.empty() && norm2(rounded(way_out(rounds[0]).normal)) > 0) out = way_out(rounds[0]).normal;
+  const WayOut nearest_way = nearest(rounds, walls)[0];
+  WideVector out = nearest_way.normal;
+  if (!rounds.empty()) {
+    const WayOut of_ball = way_out(rounds[0]);
+    if (norm2(rounded(of_ball.normal)) > 0 && !(nearest_way.slack < kThin * of_ball.slack)) out = of_ball.normal;
+  }
   if (!(norm2(rounded(out)) > 0)) out = wide(Vec3{0, 0, 1});
   out = unit(out);
   const WideVector n = along_an_edge(out, walls);
