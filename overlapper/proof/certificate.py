@@ -40,8 +40,8 @@ Floats = NDArray[np.float64]
 # that differ only by rounding: the first cannot tell their corners apart.
 BITS = (64, 256)
 
-# Bits to which the volume of a pair with a round body is proved.
-NARROW = 48
+# Bits to which a volume with a round body is proved, and bits of the bounds.
+NARROW, DIGITS = 49, 52
 
 
 def certificate(overlap: Overlap) -> Certificate:
@@ -56,21 +56,10 @@ def certificate(overlap: Overlap) -> Certificate:
             return _separated(overlap, bodies)
         case "touching":
             return _touching(overlap, bodies)
-        case _ if len(bodies) == 2 and _in_one_frame(bodies):
-            return _bracketed(overlap)
+        case _ if all(body.facts.has_blocks for body in bodies) and not _are_flat(bodies):
+            return _bracketed(overlap) or between_planes(overlap)
         case _:
-            for number, body in enumerate(bodies):
-                if not body.facts.has_exits:
-                    others = bodies[1 - number].facts.name if len(bodies) == 2 else "two bodies or more"
-                    raise CertificateError(f"{body.facts.name} that overlaps with {others} has no certificate")
-            return _overlapping(overlap, bodies)
-
-
-def _in_one_frame(bodies: list[RationalBody]) -> bool:
-    """Whether one is round, and whether in the same coordinates all round ones are made of balls and cylinders."""
-    round_ones = [body.facts for body in bodies if body.facts.planes is None]
-    alone = len(round_ones) == 1
-    return bool(round_ones) and all(each.has_blocks and (alone or each.half_axes is None) for each in round_ones)
+            return between_planes(overlap)
 
 
 # ----------------------------------------------------------------------------------------------- separated and touching
@@ -130,21 +119,33 @@ def _nearest(body: RationalBody, shape: Shape, point: Exact) -> Exact:
 # ---------------------------------------------------------------------------------------------------------- overlapping
 
 
-def _bracketed(overlap: Overlap) -> Bracketed:
-    """Bounds that stay narrow when they are rounded to a few digits."""
-    a, b = overlap.shapes
+def _bracketed(overlap: Overlap) -> Bracketed | None:
+    """Bounds that stay narrow when they are rounded to a few digits; None if no volume is proved to be shared."""
+    found: list[Bounds] = []
 
     def is_narrow(bounds: Bounds) -> bool:
-        return bounds[1] - bounds[0] <= bounds[0] / (1 << NARROW + 1)
+        found.append(bounds)
+        return bounds[1] - bounds[0] <= bounds[0] / (1 << NARROW)
 
-    lower, upper = volume_bounds(a, b, is_narrow)
+    try:
+        lower, upper = volume_bounds(overlap.shapes, is_narrow)
+    except CertificateError:
+        if not found or not found[-1][0]:
+            return None
+        lower, upper = found[-1]
     if not lower:
         raise CertificateError("the bodies share no volume")
-    unit = Fraction(2) ** (lower.numerator.bit_length() - lower.denominator.bit_length() - NARROW - 4)
+    unit = Fraction(2) ** (lower.numerator.bit_length() - lower.denominator.bit_length() - DIGITS)
     return Bracketed(overlap.shapes, math.floor(lower / unit) * unit, math.ceil(upper / unit) * unit)
 
 
-def _overlapping(overlap: Overlap, bodies: list[RationalBody]) -> Overlapping:
+def between_planes(overlap: Overlap) -> Overlapping:
+    """A proof of bounds of the volume by planes alone: exact for polyhedra, and wide for round bodies."""
+    bodies = [RationalBody(shape) for shape in overlap.shapes]
+    for number, body in enumerate(bodies):
+        if not body.facts.has_exits:
+            others = bodies[1 - number].facts.name if len(bodies) == 2 else "two bodies or more"
+            raise CertificateError(f"{body.facts.name} that overlaps with {others} has no certificate")
     planes = [
         supporting(bodies, bodies[owner].facing(halfspace[:3]), int(owner))
         for halfspace, owner in zip(overlap.halfspaces, overlap.owner)

@@ -8,7 +8,7 @@ m³, as fractions. All coordinates are in m in the world.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -277,7 +277,7 @@ class Overlapping(Short):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bracketed(Short):
-    """The volume that two `shapes` share, round ones among them, is not below `lower` and not above `upper`, in m³.
+    """The volume that `shapes` share, round ones among them, is not below `lower` and not above `upper`, in m³.
 
     The check computes the volume anew from the numbers of the shapes, in ball arithmetic with as many bits as it takes
     to tell (see `overlapper.proof.volume`). It needs python-flint, whose number of bits all threads share: one check at
@@ -291,7 +291,6 @@ class Bracketed(Short):
     def verify(self) -> Bounds:
         """Bounds of the volume, m³, that follow from the shapes alone; CertificateError names what does not hold."""
         require_bodies(self.shapes)
-        require(len(self.shapes) == 2, "shapes must be two bodies")
         require_number(self.lower)
         require_number(self.upper)
         lower, upper = Fraction(self.lower), Fraction(self.upper)
@@ -301,19 +300,18 @@ class Bracketed(Short):
             within = lower <= proved[0] and proved[1] <= upper
             return within or proved[1] < lower or upper < proved[0]
 
-        a, b = self.shapes
-        proved = volume_bounds(a, b, is_decided)
+        proved = volume_bounds(self.shapes, is_decided)
         require(lower <= proved[0] and proved[1] <= upper, "the common volume must lie between lower and upper")
         return lower, upper
 
 
-def volume_bounds(a: Placed, b: Placed, is_narrow: Callable[[Bounds], bool]) -> Bounds:
-    """Bounds of the volume that two bodies share, so narrow that `is_narrow` accepts them."""
+def volume_bounds(shapes: Sequence[Placed], is_narrow: Callable[[Bounds], bool]) -> Bounds:
+    """Bounds of the volume that bodies share, so narrow that `is_narrow` accepts them."""
     try:
         from overlapper.proof.volume import proved_bounds
     except ImportError as error:
         raise ImportError(f"a certificate of round bodies needs {hint('python-flint')}") from error
-    return proved_bounds(a, b, is_narrow)
+    return proved_bounds(shapes, is_narrow)
 
 
 Certificate = Separated | Touching | Overlapping | Bracketed

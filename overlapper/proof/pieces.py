@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from overlapper.proof.rational_body import RationalBody
 from overlapper.proof.refusal import CertificateError
-from overlapper.proof.vectors import Vector, dot, plus, rational, vector
+from overlapper.proof.vectors import Vector, dot, plus, rational, scaled, vector
 from overlapper.shapes.facts import Block
 
 Floats = NDArray[np.float64]
@@ -48,7 +48,15 @@ class Tube:
     square: fmpq  # of the radius
 
 
-Quadric = Ball | Tube
+@dataclass(frozen=True)
+class Egg:
+    """An ellipsoid: { x : |rows · (x - centre)| <= 1 }."""
+
+    centre: Vector
+    rows: tuple[Vector, Vector, Vector]
+
+
+Quadric = Ball | Tube | Egg
 
 
 @dataclass(frozen=True)
@@ -67,36 +75,48 @@ class Piece:
 
 
 class Frame:
-    """The map from the axes of a body to those of `home`. If home has half axes, they are the units there."""
+    """The map from the axes of a body, and from its half axes as units, if it has some, to the axes of `home`."""
 
     def __init__(self, body: RationalBody, home: RationalBody) -> None:
         turn = home.axes.T @ body.axes
         self._rows = [vector(row) for row in turn]
         self._shift = vector(home.axes.T @ (body.position - home.position))
-        self._units = None if home.facts.half_axes is None else vector(home.facts.half_axes)
+        self.units = vector([1, 1, 1] if body.facts.half_axes is None else body.facts.half_axes)
+        x, y, z = self.units
+        self.is_stretched = not x == y == z
 
     def direction(self, v: Vector) -> Vector:
         return dot(self._rows[0], v), dot(self._rows[1], v), dot(self._rows[2], v)
 
     def point(self, v: Vector) -> Vector:
-        x, y, z = plus(self.direction(v), self._shift)
-        return (x / self._units[0], y / self._units[1], z / self._units[2]) if self._units else (x, y, z)
+        x, y, z = (a * unit for a, unit in zip(v, self.units))
+        return plus(self.direction((x, y, z)), self._shift)
 
     def plane(self, normal: Vector, offset: fmpq) -> Plane:
-        x, y, z = turned = self.direction(normal)
-        placed = offset + dot(turned, self._shift)
-        return Plane((x * self._units[0], y * self._units[1], z * self._units[2]) if self._units else turned, placed)
+        x, y, z = (a / unit for a, unit in zip(normal, self.units))
+        turned = self.direction((x, y, z))
+        return Plane(turned, offset + dot(turned, self._shift))
 
     def piece(self, block: Block) -> Piece:
         quadric: Quadric | None = None
         if block.centre is not None:
-            centre, square = self.point(vector(block.centre)), rational(block.radius) ** 2
-            quadric = Ball(centre, square)
+            centre, radius = self.point(vector(block.centre)), rational(block.radius)
             if block.axis is not None:
-                quadric = Tube(centre, self.direction(vector(block.axis)), square)
+                quadric = Tube(centre, self.direction(vector(block.axis)), radius**2)
+            elif self.is_stretched:
+                quadric = Egg(centre, self._stretched(radius))
+            else:
+                quadric = Ball(centre, (radius * self.units[0]) ** 2)
         planes = tuple(self.plane(vector(normal), rational(offset)) for normal, offset in block.planes)
         spine = None if block.spine is None else doubles(self.point(vector(point)) for point in block.spine)
-        return Piece(quadric, planes, spine, block.radius, rational(block.lost))
+        reach = block.radius * max(int(unit.p) / int(unit.q) for unit in self.units)
+        return Piece(quadric, planes, spine, reach, rational(block.lost))
+
+    def _stretched(self, radius: fmpq) -> tuple[Vector, Vector, Vector]:
+        one, zero = fmpq(1), fmpq(0)
+        x, y, z = ((one, zero, zero), (zero, one, zero), (zero, zero, one))
+        rows = [scaled(self.direction(way), 1 / (radius * unit)) for way, unit in zip((x, y, z), self.units)]
+        return rows[0], rows[1], rows[2]
 
 
 def doubles(points: Iterable[Vector]) -> Floats:
@@ -104,10 +124,9 @@ def doubles(points: Iterable[Vector]) -> Floats:
 
 
 def pieces(body: RationalBody, home: RationalBody) -> list[Piece]:
-    """The pieces of a body in the axes of `home`. If home has half axes, the other body must be flat."""
+    """The pieces of a body in the axes of `home`."""
     if not body.facts.has_blocks:
         raise CertificateError(f"no volume is proved of {body.facts.name}, which is not made of balls and cylinders")
-    assert home.facts.half_axes is None or body is home or body.facts.planes
     frame = Frame(body, home)
     try:
         return [frame.piece(block) for block in body.facts.blocks()]

@@ -1,33 +1,38 @@
-"""Bounds of the volume that two bodies share, as narrow as asked for: each piece of one with each piece of the other.
+"""Bounds of the volume that bodies share, as narrow as asked for: each piece of one with each piece of the others.
 
 Decisions are made without rounding, or by balls that do not hold zero. Where a ball holds zero, more bits are taken.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
+from itertools import combinations
 
 import numpy as np
 from flint import arb, ctx, fmpq
 
 from overlapper import Placed
 from overlapper.proof import one_quadric
+from overlapper.proof.arc_slices import ByArcs
 from overlapper.proof.ball_and_tube import BallAndTube
 from overlapper.proof.corners import Polytope, below
-from overlapper.proof.pieces import DOUBT, Ball, Floats, Piece, Plane, Quadric, Tube, pieces
+from overlapper.proof.pieces import DOUBT, Ball, Egg, Floats, Piece, Plane, Quadric, Tube, pieces
 from overlapper.proof.rational_body import RationalBody
 from overlapper.proof.refusal import Bounds, CertificateError
+from overlapper.proof.round_frame import constraint, determinant, is_alike, scale_of, within
 from overlapper.proof.signs import Undecided
 from overlapper.proof.slices import Slices
 from overlapper.proof.two_tubes import TwoTubes
-from overlapper.proof.vectors import cross, dot, fraction, minus, plus, scaled
+from overlapper.proof.vectors import ORIGIN, dot, fraction, minus, plus, scaled
 
 # Bits of a first try, and of a last one, after which doubt is taken for a fault of the input.
 FIRST, LAST = 128, 1 << 11
+# The last try where slices bounded by arcs are needed. More bits take a second and more for each of them.
+LAST_BY_ARCS = 192
 # A summand is computed again while all doubts together exceed one part in ENOUGH of the volume.
 ENOUGH = 1 << 60
 # Bits at which an undecided sign is taken for a sign that no bits decide.
@@ -35,28 +40,25 @@ TIED = 512
 
 
 class Common:
-    """The common part of two placed shapes, as a sum of volumes."""
+    """The common part of placed shapes, as a sum of volumes."""
 
-    def __init__(self, a: Placed, b: Placed) -> None:
-        bodies = RationalBody(a), RationalBody(b)
-        stretched = [body for body in bodies if body.facts.half_axes is not None]
-        if stretched and not any(body.facts.planes for body in bodies):
-            raise CertificateError(f"of {stretched[0].facts.name} and another round body no volume is proved")
+    def __init__(self, *shapes: Placed) -> None:
+        bodies = [RationalBody(shape) for shape in shapes]
         bounded = [body for body in bodies if body.facts.bounded]
         if not bounded:
             raise CertificateError("one of the bodies must be bounded")
-        home = (stretched or bounded)[0]
-        # The volume of a unit cube in the axes of home.
-        self._unit = Fraction(1) if home.facts.half_axes is None else math.prod(home.facts.half_axes)
         self._summands: list[Summand] = []
         self.lost = fmpq(0)
-        first, second = (_Pieces(pieces(body, home)) for body in bodies)
-        for i, j in first.near(second):
-            one, other = first.pieces[i], second.pieces[j]
-            self._summands += summands(one, other)
-            self.lost += one.lost + other.lost
+        for together in _near([_Pieces(pieces(body, bounded[0])) for body in bodies]):
+            self._summands += summands(together)
+            self.lost += sum((piece.lost for piece in together), fmpq(0))
         self._enough = arb(0)
         self._known: list[arb | None] = [None] * len(self._summands)
+
+    @property
+    def last(self) -> int:
+        """The most bits that are worth a try."""
+        return LAST_BY_ARCS if any(isinstance(each, ByArcs) for each in self._summands) else LAST
 
     def bounds(self, bits: int) -> Bounds | None:
         """Bounds by numbers of so many bits; None if these are too few for one of the summands.
@@ -77,7 +79,7 @@ class Common:
             total = sum(volumes, arb(0))
             self._enough = total.lower().nonnegative_part() / (ENOUGH * len(volumes) + 1)
             lower, upper = dyadic(total.lower()), dyadic(total.upper()) + fraction(self.lost)
-        return max(lower, Fraction(0)) * self._unit, upper * self._unit
+        return max(lower, Fraction(0)), upper
 
 
 Summand = Callable[[int], arb]
@@ -161,17 +163,90 @@ def in_doubles(plane: Plane) -> list[float]:
     return [int(x.p) / int(x.q) for x in ratios]
 
 
-def summands(one: Piece, other: Piece) -> list[Summand]:
-    """The common part of two pieces, as volumes that wait to be computed."""
-    around = np.array([f(p, q) for f, p, q in zip((np.maximum, np.minimum), box(one), box(other))])
-    planes = (*one.planes, *other.planes)
-    quadrics = [piece.quadric for piece in (one, other) if piece.quadric is not None]
-    if len(quadrics) == 2:
+def _near(bodies: list[_Pieces]) -> Iterator[list[Piece]]:
+    """One piece of each body, where no two are apart as far as doubles can tell."""
+    first, *others = bodies
+    near = [{tuple(pair) for pair in one.near(other)} for one, other in combinations(bodies, 2)]
+    number = {pair: k for k, pair in enumerate(combinations(range(len(bodies)), 2))}
+    chosen: list[tuple[int, ...]] = [(k,) for k in range(len(first.pieces))]
+    for j, other in enumerate(others, start=1):
+        chosen = [
+            (*those, k)
+            for those in chosen
+            for k in range(len(other.pieces))
+            if all((piece, k) in near[number[i, j]] for i, piece in enumerate(those))
+        ]
+    for those in chosen:
+        yield [body.pieces[k] for body, k in zip(bodies, those)]
+
+
+def summands(together: list[Piece]) -> list[Summand]:
+    """The common part of pieces, as volumes that wait to be computed."""
+    boxes = [box(piece) for piece in together]
+    around = np.array([np.max([each[0] for each in boxes], axis=0), np.min([each[1] for each in boxes], axis=0)])
+    if (around[0] >= around[1]).any():
+        return []
+    planes = tuple(plane for piece in together for plane in piece.planes)
+    return _of_all([piece.quadric for piece in together if piece.quadric is not None], planes, around)
+
+
+def _of_all(quadrics: list[Quadric], planes: tuple[Plane, ...], around: Floats) -> list[Summand]:
+    """Quadrics of the same form differ by a linear function, so that on one side of a plane one of them bounds."""
+    classes: list[list[Quadric]] = []
+    for quadric in quadrics:
+        alike = next((those for those in classes if is_alike(those[0], quadric)), None)
+        if alike is None:
+            classes.append([quadric])
+        else:
+            alike.append(quadric)
+    found: list[Summand] = []
+    for cells in itertools.product(*(list(_cells(those)) for those in classes)):
+        bounding = [quadric for quadric, _ in cells]
+        found += _of_different(bounding, (*planes, *(plane for _, more in cells for plane in more)), around)
+    return found
+
+
+def _cells(alike: list[Quadric]) -> Iterator[tuple[Quadric, tuple[Plane, ...]]]:
+    """Each of some quadrics of the same form, and planes of the part of space in which it is the one that bounds."""
+    functions = [constraint(quadric) for quadric in alike]
+    for k, one in enumerate(functions):
+        cell: list[Plane] = []
+        for j, other in enumerate(functions):
+            share = scale_of(other.form, one.form)
+            normal = scaled(minus(scaled(other.linear, share), one.linear), 2)
+            offset = one.constant - share * other.constant
+            if any(normal):
+                cell.append(Plane(normal, offset))
+            elif offset < 0 or (offset == 0 and j < k):
+                break
+        else:
+            yield alike[k], tuple(cell)
+
+
+def _of_different(quadrics: list[Quadric], planes: tuple[Plane, ...], around: Floats) -> list[Summand]:
+    if not quadrics:
+        return _of_one(None, planes, around)
+    if len(quadrics) == 1:
+        return _of_one(quadrics[0], planes, around)
+    if len(quadrics) == 2 and not any(isinstance(quadric, Egg) for quadric in quadrics):
         return _of_two(quadrics[0], quadrics[1], planes, around)
-    return _of_one(quadrics[0] if quadrics else None, planes, around)
+    polytope = below(planes, around)
+    if polytope is None:
+        return []
+    given = {id(plane) for plane in planes}
+    kept = [facet.plane for facet in polytope.facets if id(facet.plane) in given]
+    return [ByArcs([constraint(each) for each in (*quadrics, *kept)], around)]
 
 
 def _of_one(quadric: Quadric | None, planes: tuple[Plane, ...], around: Floats) -> list[Summand]:
+    if isinstance(quadric, Egg):
+        egg = quadric
+        local = tuple(within(plane, egg) for plane in planes)
+        det = abs(determinant(egg.rows))
+        return [
+            lambda bits, summand=summand: summand(bits) / det  # type: ignore[misc]
+            for summand in _of_one(Ball(ORIGIN, fmpq(1)), local, np.array([[-1.125] * 3, [1.125] * 3]))
+        ]
     polytope = _below(quadric, planes, around)
     if polytope is None:
         return []
@@ -201,11 +276,6 @@ def _below(quadric: Quadric | None, planes: tuple[Plane, ...], around: Floats) -
 
 
 def _of_two(one: Quadric, other: Quadric, planes: tuple[Plane, ...], around: Floats) -> list[Summand]:
-    alike = isinstance(one, Ball) and isinstance(other, Ball)
-    if isinstance(one, Tube) and isinstance(other, Tube):
-        alike = not any(cross(one.axis, other.axis))
-    if alike:
-        return _split(one, other, planes, around)
     if isinstance(one, Tube) and isinstance(other, Tube):
         return _sliced(lambda tube, polytope: TwoTubes(one, tube, polytope), other, below(planes, around))
     ball, tube = (one, other) if isinstance(one, Ball) else (other, one)
@@ -228,27 +298,11 @@ def is_within(between: fmpq, small: fmpq, large: fmpq) -> bool:
     return small <= large and excess <= 0 and excess * excess >= 4 * between * small
 
 
-def _split(one: Quadric, other: Quadric, planes: tuple[Plane, ...], around: Floats) -> list[Summand]:
-    """Two balls or two parallel tubes. Their surfaces meet in a plane, and on each side of it one of them bounds."""
-    if isinstance(one, Ball) and isinstance(other, Ball):
-        centre, arm = one.centre, minus(other.centre, one.centre)
-    else:
-        assert isinstance(one, Tube) and isinstance(other, Tube)
-        centre, arm = one.point, minus(other.point, one.point)
-        arm = plus(arm, one.axis, -dot(arm, one.axis) / dot(one.axis, one.axis))
-    if not any(arm):
-        return _of_one(one if one.square <= other.square else other, planes, around)
-    # |x - c|² - r² is less for the other beyond the plane, so that there the first is the one that bounds.
-    level = dot(arm, centre) + (dot(arm, arm) + one.square - other.square) / 2
-    found = _of_one(other, (*planes, Plane(arm, level)), around)
-    return found + _of_one(one, (*planes, Plane(scaled(arm, -1), -level)), around)
-
-
-def proved_bounds(a: Placed, b: Placed, is_narrow: Callable[[Bounds], bool]) -> Bounds:
+def proved_bounds(shapes: Sequence[Placed], is_narrow: Callable[[Bounds], bool]) -> Bounds:
     """Bounds of the volume that are narrow enough."""
-    common = Common(a, b)
+    common = Common(*shapes)
     bits = FIRST
-    while bits <= LAST:
+    while bits <= common.last:
         bounds = common.bounds(bits)
         if bounds and is_narrow(bounds):
             return bounds

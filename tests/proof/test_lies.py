@@ -140,7 +140,7 @@ LIES = {
         "pull": lambda c: [*numbers_in(c.pull), 0 * c.pull, -c.pull, 2 * c.pull],
     },
     Bracketed: {
-        "shapes": lambda c: [*false_bodies(c), (*c.shapes, c.shapes[0])],
+        "shapes": lambda c: [*false_bodies(c), (*c.shapes, Placed(CUBE, (0.75, 0, 0)))],
         "lower": lambda c: [*NUMBERS, Fraction(0), -c.lower, c.upper, c.upper + Fraction(1, 10**20), 2 * c.upper],
         "upper": lambda c: [*NUMBERS, Fraction(0), -c.upper, c.lower, c.lower - Fraction(1, 10**20), c.lower / 2],
     },

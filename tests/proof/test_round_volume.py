@@ -42,7 +42,7 @@ TURNS = {
 
 
 def bounds(a, b):
-    return proved_bounds(a, b, lambda found: found[1] - found[0] <= found[0] * NARROW)
+    return proved_bounds((a, b), lambda found: found[1] - found[0] <= found[0] * NARROW)
 
 
 def holds(found, truth):
@@ -257,7 +257,7 @@ def test_a_lie_in_the_last_digit_is_found():
     lower, upper = bounds(a, b)
     step = lower / 10**12
     assert Bracketed((a, b), lower - step, upper + step).verify() == (lower - step, upper + step)
-    both = proved_bounds(a, b, lambda found: found[1] - found[0] <= found[0] / 10**60)
+    both = proved_bounds((a, b), lambda found: found[1] - found[0] <= found[0] / 10**60)
     assert lower <= both[0] <= both[1] <= upper
     assert Bracketed((a, b), *both).verify() == both
     for low, high in ((upper, upper + step), (lower - step, lower), (lower - 2 * step, lower - step)):
@@ -275,7 +275,7 @@ def test_a_side_of_slices_may_go_through_the_pole_of_a_ball():
 def test_bodies_that_only_touch_are_not_proved_to_share_anything():
     a, b = Placed(Sphere(1.0)), Placed(Sphere(1.0), (2.0, 0, 0))
     with pytest.raises(CertificateError, match=r"^the common volume could not be bounded: the bodies may only touch$"):
-        proved_bounds(a, b, lambda found: found[0] > 0)
+        proved_bounds((a, b), lambda found: found[0] > 0)
 
 
 def test_without_its_library_a_certificate_says_what_to_install(monkeypatch):

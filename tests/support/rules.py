@@ -362,16 +362,12 @@ def volume_off(case: Case, found: Overlap) -> Fraction:
 
 
 def the_certificate_is_proved(case: Case, found: Overlap) -> str:
-    """Within what is stated; of three round bodies, and of a round one that touches, which it encloses by other planes,
-    beside that and as narrow: where bodies touch, as what their distance may be off by all over their surface."""
-    kinds = [type(body.shape) for body in found.shapes]
-    if found and RoundedHull in kinds and (len(kinds) > 2 or Ellipsoid in kinds):
-        return ""  # they have none
+    """Within what is stated; of a round body that touches, which it encloses by other planes, beside that and as narrow
+    as what their distance may be off by all over their surface."""
     lower, upper = certificate(found).verify()
     volume, error = Fraction(found.volume), Fraction(found.volume_error)
     within = volume - error <= lower <= upper <= volume + error
-    of_planes = len(kinds) > 2 or (Ellipsoid in kinds and found.way != "slicing") or found.status == "touching"
-    other_planes = case.round and of_planes
+    other_planes = case.round and found.status == "touching"
     beside = other_planes and lower <= volume + error and volume - error <= upper
     apart = found.errors.distance if found.status == "touching" else None
     film = Fraction(apart) * Fraction(found.errors.area) if apart is not None else 0

@@ -1,0 +1,224 @@
+"""Outlines of the slices of a convex body between quadrics and planes, found in doubles.
+
+An outline is the cyclic order of the constraints around a slice, and the corners between neighbours. It changes only at
+events, where a corner reaches a third surface, or two corners meet because the slice is tangent to an edge. All that is
+found here is a guess, which `overlapper.proof.arcs` proves or refuses.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from overlapper.proof.round_frame import Barrier, Constraint
+
+Floats = NDArray[np.float64]
+
+# Directions in which a slice is seen from inside, and slices that are compared at first.
+DIRECTIONS, SLICES = 720, 25
+TURNS = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
+# Times that the directions next to each change are looked at again, and how many between two.
+CLOSER, FINER = 2, 16
+# The share of its distance by which a surface may miss the outline to be asked where it meets it.
+NEAR = 0.25
+# Steps that halve the place of an event before Newton's method.
+HALVINGS = 12
+# The weight of the barrier at the ends of a body, which are then known to about this share of its length.
+END = 1e-12
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Corner k, at `corners[k]` = (p, q), is between `chain[k]` and `chain[k + 1]`, counter-clockwise."""
+
+    chain: tuple[int, ...]
+    corners: Floats
+
+    def pairs(self) -> list[tuple[int, int]]:
+        if len(self.chain) == 1:
+            return []
+        return list(zip(self.chain, self.chain[1:] + self.chain[:1]))
+
+
+class Outlines:
+    """The slices y₀ = t of constraints that hold at the origin."""
+
+    def __init__(self, constraints: list[Constraint]) -> None:
+        self.barrier = Barrier(constraints)
+        size = -self.barrier.constant
+        self.forms = self.barrier.forms / size[:, None, None]
+        self.linear = self.barrier.linear / size[:, None]
+        ends = []
+        for side in (1.0, -1.0):
+            y = np.zeros(3)
+            for weight in (1.0, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, END):
+                y, _ = self.barrier.centre(y, np.array([side / weight, 0.0, 0.0]))
+            ends.append(y)
+        self.low, self.high = ends
+
+    def inner(self, t: float) -> Floats:
+        """A point inside of the slice."""
+        end = self.high if t > 0 else self.low
+        point: Floats = end[1:] * (t / end[0])
+        return point
+
+    def at(self, t: float) -> Outline | None:
+        """The outline of a slice, without its smallest sides."""
+        p = self.inner(t)
+        values, half = self._values(np.array([t, *p]))
+        if not (values < 0).all():
+            return None
+        turns, step = TURNS, TURNS[1]
+        nearest, reach = self._nearest(half, values, turns)
+        changes = np.flatnonzero(nearest != np.roll(nearest, -1))
+        if len(changes) == 0:
+            return Outline((int(nearest[0]),), np.zeros((0, 2)))
+        for _ in range(CLOSER):
+            step /= FINER
+            turns = (turns[changes][:, None] + step * np.arange(FINER + 1)).ravel()
+            nearest, reach = self._nearest(half, values, turns)
+            changes = np.flatnonzero(nearest[:-1] != nearest[1:])
+        chain = tuple(int(k) for k in nearest[changes])
+        following = [int(k) for k in nearest[changes + 1]]
+        if following != [*chain[1:], chain[0]]:
+            return None
+        far = (reach[changes] + reach[changes + 1]) / 2
+        guesses = p + np.array([np.cos(turns[changes]), np.sin(turns[changes])]).T * far[:, None]
+        corners = [self.corner(i, j, t, guess) for i, j, guess in zip(chain, following, guesses)]
+        return Outline(chain, np.array(corners))
+
+    def _values(self, y: Floats) -> tuple[Floats, Floats]:
+        half = self.forms @ y + self.linear
+        return (half + self.linear) @ y - 1, half
+
+    def _reach(self, half: Floats, values: Floats, turns: Floats) -> Floats:
+        """How far away each constraint is (k, n) in each direction."""
+        rays = np.array([np.cos(turns), np.sin(turns)])
+        along = half[:, 1:] @ rays
+        bend = np.einsum("kij,in,jn->kn", self.forms[:, 1:, 1:], rays, rays)
+        under = along + np.sqrt(np.maximum(along**2 - bend * values[:, None], 0.0))
+        with np.errstate(divide="ignore"):
+            return np.where(under > 0, -values[:, None] / under, np.inf)
+
+    def _nearest(self, half: Floats, values: Floats, turns: Floats) -> tuple[NDArray[np.intp], Floats]:
+        """The constraint that is met first in each direction, and how far away."""
+        reach = self._reach(half, values, turns)
+        nearest = reach.argmin(axis=0)
+        return nearest, reach[nearest, np.arange(len(turns))]
+
+    def _near_misses(self, t: float) -> Iterator[float | None]:
+        """Where slices are tangent to edges, sought where one surface is next to another, but does not meet it."""
+        p = self.inner(t)
+        values, half = self._values(np.array([t, *p]))
+        reach = self._reach(half, values, TURNS[::4])
+        nearest = reach.argmin(axis=0)
+        least = reach[nearest, np.arange(len(nearest))]
+        for k, row in enumerate(reach):
+            gap = np.where(nearest == k, np.inf, row / least - 1)
+            for at in np.flatnonzero((gap < NEAR) & (gap <= np.roll(gap, 1)) & (gap <= np.roll(gap, -1))):
+                ray = np.array([np.cos(TURNS[4 * at]), np.sin(TURNS[4 * at])])
+                yield self._newton(np.array([t, *(p + least[at] * ray)]), [int(nearest[at]), k], True)
+
+    def corner(self, i: int, j: int, t: float, guess: Floats) -> Floats:
+        """Where two surfaces meet in a slice, by Newton's method."""
+        y = np.array([t, *guess])
+        both = [i, j]
+        for _ in range(8):
+            image = self.forms[both] @ y + self.linear[both]
+            value = (image + self.linear[both]) @ y - 1
+            (a, b), (c, d) = 2 * image[:, 1:]
+            det = a * d - b * c
+            if det == 0.0:
+                break
+            step = np.array([value[0] * d - value[1] * b, value[1] * a - value[0] * c]) / det
+            if not np.abs(step).max() < 10.0:
+                break
+            y[1:] -= step
+            if np.abs(step).max() < 1e-14:
+                break
+        return y[1:]
+
+    def events(self) -> list[float]:
+        """Where the outline changes, in order, with both ends."""
+        low, high = float(self.low[0]), float(self.high[0])
+        turn = (np.arange(SLICES) + 0.5) / SLICES * np.pi
+        places = (low + high) / 2 - (high - low) / 2 * np.cos(turn)
+        seen = [(float(t), self.at(float(t))) for t in places]
+        found = [low, high]
+        work = list(itertools.pairwise(seen))
+        while work and len(found) < 64:
+            (t, left), (u, right) = work.pop()
+            if left is None or right is None or cyclic(left) == cyclic(right) or u - t < 1e-9 * (high - low):
+                continue
+            before, after = (t, left), (u, right)
+            for _ in range(HALVINGS):
+                middle = (before[0] + after[0]) / 2
+                outline = self.at(middle)
+                if outline is None:
+                    break
+                if cyclic(outline) == cyclic(left):
+                    before = middle, outline
+                else:
+                    after = middle, outline
+            found += [event for event in self._between(before, after) if low < event < high]
+            work.append((after, (u, right)))
+        for t in places:
+            found += [event for event in self._near_misses(float(t)) if event is not None and low < event < high]
+        found.sort()
+        return [event for k, event in enumerate(found) if k == 0 or event - found[k - 1] > 1e-9 * (high - low)]
+
+    def _between(self, before: tuple[float, Outline | None], after: tuple[float, Outline | None]) -> list[float]:
+        """The events between outlines that differ, by Newton's method; the middle if that finds none."""
+        (t, left), (u, right) = before, after
+        assert left is not None and right is not None
+        sides = [Counter(tuple(sorted(pair)) for pair in outline.pairs()) for outline in (left, right)]
+        found = []
+        for outline, gone in ((left, sides[0] - sides[1]), (right, sides[1] - sides[0])):
+            level = t if outline is left else u
+            for pair, count in gone.items():
+                places = [c for p, c in zip(outline.pairs(), outline.corners) if tuple(sorted(p)) == pair]
+                if count > 1:
+                    start = np.array([level, *np.mean(places, axis=0)])
+                    found.append(self._newton(start, list(pair), True))
+                    continue
+                others = {k for other in (sides[0] - sides[1]) + (sides[1] - sides[0]) for k in other} - set(pair)
+                starts = [np.array([level, *place]) for place in places]
+                found += [self._newton(start, [*pair, k], False) for start in starts for k in others]
+        margin = 0.5 * (u - t) + 1e-3 * abs(float(self.high[0] - self.low[0]))
+        near = sorted({event for event in found if event is not None and t - margin < event < u + margin})
+        return [event for k, event in enumerate(near) if k == 0 or event - near[k - 1] > 1e-12] or [(t + u) / 2]
+
+    def _newton(self, y: Floats, curves: list[int], tangent: bool) -> float | None:
+        """t where three surfaces meet, or where a slice is tangent to the edge of two."""
+        forms, linear = self.forms[curves], self.linear[curves]
+        for _ in range(30):
+            image = forms @ y + linear
+            value = (image + linear) @ y - 1
+            rows = 2 * image
+            if tangent:
+                (a, b), (c, d) = image[:, 1:]
+                value = np.append(value, a * d - b * c)
+                bend = image[0, 1] * forms[1, 2] + image[1, 2] * forms[0, 1]
+                rows = np.vstack([rows, bend - image[0, 2] * forms[1, 1] - image[1, 1] * forms[0, 2]])
+            try:
+                step = np.linalg.solve(rows, value)
+            except np.linalg.LinAlgError:
+                return None
+            if not np.abs(step).max() < 1e3:
+                return None
+            y = y - step
+            if np.abs(step).max() < 1e-14:
+                break
+        values = (self.forms @ y + 2 * self.linear) @ y - 1
+        return float(y[0]) if np.abs(step).max() < 1e-6 and values.max() < 1e-6 else None
+
+
+def cyclic(outline: Outline) -> tuple[int, ...]:
+    """The chain from its least turn on."""
+    chain = outline.chain
+    return min(chain[k:] + chain[:k] for k in range(len(chain)))
