@@ -1,6 +1,7 @@
 """Measures from closed forms are right to rounding at any tolerance."""
 
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from functools import partial
 from typing import Any
 
@@ -291,6 +292,19 @@ def test_shallow_contacts_at_sides_keep_every_digit(depth):
             for answer in (overlap(solid, end), overlap(end, solid)):
                 assert abs(exactly(answer.volume) - truth) <= min(answer.volume_error, 1e-13 * truth)
                 assert answer.volume_error <= 1e-12 * truth
+
+
+@pytest.mark.parametrize("beside", [0, 1e-3, -1e-3, 1e-9, -1e-9])
+@pytest.mark.parametrize("solid", [Capsule(0.3, 0.8), Cylinder(0.3, 0.8)])
+def test_sections_of_a_ball_and_a_long_body_are_proved_where_they_touch_from_inside(solid, beside):
+    """The section of one is within that of the other but for `beside`, at the end of the axis and far from it."""
+    for radius, distance in ((0.5 + beside, 0.2), (0.2, 0.1 + beside), (0.35, 0.3 + beside), (0.3 + beside, 0.05)):
+        for level in (0.1, 0.4 + beside):
+            found = overlap(solid, Placed(Sphere(radius), (distance * 0.6, distance * 0.8, level)))
+            lower, upper = found.certificate().verify()
+            middle = (lower + upper) / 2
+            assert found.way == "slicing"
+            assert abs(middle - Fraction(found.volume)) <= found.volume_error <= 1e-12 * found.volume
 
 
 @pytest.mark.parametrize("solid", [Sphere(0.75), Capsule(0.75, 6), Cylinder(0.75, 6)])

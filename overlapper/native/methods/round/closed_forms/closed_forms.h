@@ -15,8 +15,11 @@ using ClosedForm = std::optional<MeasuresAndInertia> (*)(const RoundPair&);
 /// The lens of two balls, of a ball and the end of a capsule, or of the ends of two capsules.
 std::optional<MeasuresAndInertia> lens(const RoundPair& pair);
 
-/// A shallow contact at the side of a cylinder or capsule, far from its ends: of a ball, of the end of a capsule, or of
-/// the side of another cylinder or capsule.
+/// A cylinder or a capsule and a ball, or the end of a capsule that shares nothing else with it, by sections across the
+/// axis.
+std::optional<MeasuresAndInertia> ball_at_axis(const RoundPair& pair);
+
+/// A shallow contact at the sides of two cylinders or capsules, far from their ends.
 std::optional<MeasuresAndInertia> sides(const RoundPair& pair);
 
 /// A ball, a capsule or a cylinder where at most one plane of the flat body cuts off anything that the others leave.

@@ -94,6 +94,7 @@ struct Image {
   Vec3 force, moment;    ///< of the faces, in the ellipsoid's axes, about the image of the point
   double flat_area = 0;  ///< m², of the faces in the world
   int faces = 0;
+  double area = 0;  ///< of the part of the ball
 };
 
 /// `error`: of the volume of the part of the ball. Planes may be off by `rounding` in the world.
@@ -104,7 +105,8 @@ Measures measures_of(const Image& image, double error, const RoundPair& pair, co
     return body.pose.translation + body.pose.rotation * scaled(stretch.half_axes, of_ball);
   };
   Measures q = measures_in_closed_form();
-  q.area_known = false;
+  // An upper bound, until it is measured.
+  q.area_known = false, q.area = max_component(stretch.cofactors) * image.area;
   q.facets_touched = image.faces;
   q.volume = stretch.volume * image.volume;
   q.volume_error = stretch.volume * error + rounding * image.flat_area + kImage * q.volume;
@@ -128,7 +130,7 @@ void add_faces(const SeenFlat& seen, const quadric::BallPart& part, const quadri
     image.moment += cross(scaled(stretch.half_axes, section.first), normal);
     image.flat_area += section.area * norm(normal);
   }
-  image.faces = part.faces;
+  image.faces = part.faces, image.area = part.area;
 }
 
 Mat3 inertia_of(const Moments& moments, const RoundPair& pair, const quadric::Stretch& stretch) {
@@ -169,6 +171,7 @@ std::optional<MeasuresAndInertia> cut_once(const SeenFlat& seen, const RoundPair
   if (!(height > 0)) return std::nullopt;
   const RevolvedPart part = cap(1, height, normal);
   Image image{offset.head * normal, part.volume, part.moment - part.volume * offset.head * normal, {}, {}};
+  image.area = part.flat_area + part.curved_area;
   if (height < 2) {
     image.faces = 1;
     image.force = part.flat_area * stretch.normal(normal);
