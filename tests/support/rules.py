@@ -180,12 +180,12 @@ def volume_of_hulls_is_right_to_twelve_digits(case: Case, found: Overlap) -> str
 
 
 def volume_of_round_pairs_is_known_to_eleven_digits(case: Case, found: Overlap) -> str:
-    """Bodies are exempt if tangent planes enclose their common part, as that of two ellipsoids. Special and nearly
-    parallel poses have eight digits, as the volume between nearly equal surfaces, or near the plane of a slice, may
-    stay open. In special poses, planes enclose the parts that slices give up."""
+    """Bodies are exempt if tangent planes enclose their common part, as that of an ellipsoid and a capsule. Special and
+    nearly parallel poses have eight digits, as the volume between nearly equal surfaces, or near the plane of a slice,
+    may stay open. In special poses, planes enclose the parts that slices give up."""
     kinds = [type(body.shape) for body in found.shapes]
     others = {*kinds} - {*FLAT, *ROUND}
-    enclosed = bool(others) and not (others == {Ellipsoid} and {*FLAT} & {*kinds})
+    enclosed = bool(others) and not (others == {Ellipsoid} and {*kinds} <= {*FLAT, Sphere, Ellipsoid})
     given_up = case.family == "special_poses" and "dual" in found.way
     if not (case.round and found and len(kinds) == 2) or enclosed or given_up:
         return ""

@@ -92,7 +92,7 @@ struct Measures {
   int facets_touched = 0;       ///< planes of the bodies that took part
   double volume = 0, area = 0;  ///< m³, m²
   double volume_error = 0;      ///< m³: the true volume is within volume ± volume_error
-  bool area_known = true;       ///< false for an ellipsoid, whose surface is measured only when it is asked for
+  bool area_known = true;       ///< false if the area and its error were not asked for
   double area_error = 0;        ///< m²: where it is more than what the error of the volume makes of the area
   double rounding = 0;          ///< m: of slices, how far it may have moved surfaces
   Vec3 centroid;

@@ -31,6 +31,7 @@ Traits traits(const S& shape) {
     own.rounded = shape.polytope() != nullptr;
     own.stretched = shape.stretched() != nullptr;
     own.other = !own.round && !own.rounded && !own.stretched;
+    own.ellipsoids = own.stretched || (own.round && shape.revolution()->round_ends && shape.revolution()->half_length == 0);
   } else {
     own.clippable = shape.edges_known() && shape.facet_count() <= static_cast<int>(kMostFacetsClipped);
   }
@@ -43,7 +44,7 @@ Traits traits(const Shape& shape) {
 Traits operator+(const Traits& a, const Traits& b) {
   return {a.bodies + b.bodies, a.bounded || b.bounded, a.clippable && b.clippable, false,
           a.round || b.round,  a.rounded || b.rounded, a.stretched || b.stretched, a.flat || b.flat,
-          a.other || b.other};
+          a.other || b.other,  a.ellipsoids + b.ellipsoids};
 }
 
 /// Unrolled line by line, so that the compiler sees each condition: a search through pointers slows down two separated
@@ -351,11 +352,11 @@ WideVector point_inside(const OverlappingBodies& overlapping) {
 
 }  // namespace
 
-std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping) {
+std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping, bool with_area) {
   if (!choose(traits(overlapping.bodies)).tries(Way::kSlicing)) return std::nullopt;
   const Arrangement& at = overlapping.at;
   const WideVector inside = point_inside(overlapping);
-  const auto round = measure_by_slices({at.relative[0], at.relative[1], at.reference, inside});
+  const auto round = measure_by_slices({at.relative[0], at.relative[1], at.reference, inside, 0, with_area});
   if (!round) return std::nullopt;
   MeasuresAndInertia answer;
   Measures& m = answer.measures;
@@ -363,7 +364,7 @@ std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping) {
   m.way = Way::kSlicing;
   m.facets_touched = round->facets_touched;
   m.volume = round->volume, m.volume_error = round->volume_error, m.area = round->area;
-  m.area_error = round->area_error, m.rounding = round->rounding;
+  m.area_error = round->area_error, m.area_known = round->area_known, m.rounding = round->rounding;
   m.centroid = at.reference + round->centroid;
   for (int i = 0; i < 2; ++i) {
     const double side = i == 0 ? 1 : -1;
@@ -396,7 +397,7 @@ std::optional<Patch> sliced_patch(const OverlappingBodies& overlapping, const Me
   const WideVector inside = point_inside(overlapping);
   const bool swapped = at.order[0] == 1;
   PatchSums sums(measures.centroid - at.reference - rounded(inside), measures.pulls[1].force);
-  if (!measure_by_slices({at.relative[0], at.relative[1], at.reference, inside, 0, swapped ? 0 : 1, &sums}))
+  if (!measure_by_slices({at.relative[0], at.relative[1], at.reference, inside, 0, false, swapped ? 0 : 1, &sums}))
     return std::nullopt;
   Patch patch = sums.patch();
   patch.centre += rounded(inside) + at.reference;

@@ -27,6 +27,7 @@ struct Traits {
   bool stretched;         ///< at least one ellipsoid with different axes
   bool flat;              ///< at least one box, hull or half-space
   bool other;             ///< at least one smooth body of another kind
+  int ellipsoids;         ///< number of balls and ellipsoids
 };
 Traits traits(const Placed& a, const Placed& b);
 Traits traits(std::span<const Placed> bodies);
@@ -44,7 +45,7 @@ struct Choice {
 
 /// The choice of ways. The first line that fits counts, for single calls, batches and groups alike. Limits for facets
 /// and errors are in geometry/thresholds.h.
-inline constexpr std::array<Choice, 7> kChoices{{
+inline constexpr std::array<Choice, 8> kChoices{{
     {"two boxes or hulls of many facets",
      [](const Traits& t) { return t.many_facet_pairs && t.clippable; },
      {Way::kTracing, Way::kClipping, Way::kWideClipping, Way::kDual}},
@@ -60,6 +61,9 @@ inline constexpr std::array<Choice, 7> kChoices{{
     {"an ellipsoid, and a box, a hull or a half-space",
      [](const Traits& t) { return t.bodies == 2 && t.stretched && t.flat; },
      {Way::kClosedForm, Way::kSlicing, Way::kDual}},
+    {"an ellipsoid, and a ball or an ellipsoid",
+     [](const Traits& t) { return t.bodies == 2 && t.stretched && t.ellipsoids == 2; },
+     {Way::kSlicing, Way::kDual}},
     {"two, one of them a rounded hull, and no ellipsoid",
      [](const Traits& t) { return t.bodies == 2 && t.rounded && !t.stretched && !t.other; },
      {Way::kSlicing, Way::kDual}},
@@ -127,16 +131,16 @@ struct OverlappingBodies {
   bool traced;  ///< true if measure_at_once() used tracing
   std::function<const Search&()> search;
   std::function<const Inside&()> inside;
-  std::function<const Region&()> region;  ///< owners are numbers of `bodies`
-  std::function<const std::optional<MeasuresAndInertia>&()> sliced;
+  std::function<const Region&()> region;                             ///< owners are numbers of `bodies`
+  std::function<const std::optional<MeasuresAndInertia>&()> sliced;  ///< areas may be left out
 };
 /// The most accurate region of bodies that overlap: for polyhedra, with planes placed in double-double. Owners are the
 /// numbers of the bodies as given.
 Region finest_region(const OverlappingBodies& overlapping);
 
 /// Measures by slices of the round shapes themselves, for any tolerance. No value for bodies with another way, or if
-/// slicing gives up.
-std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping);
+/// slicing gives up. Areas may be left out unless they are wanted.
+std::optional<MeasuresAndInertia> sliced(const OverlappingBodies& overlapping, bool with_area);
 
 /// The change of the measures by slices while the surface of one body moves between its error bounds, from inside to
 /// outside. The bounds include rounding and the movement that alone would explain the error of the volume.

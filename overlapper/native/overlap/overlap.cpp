@@ -84,7 +84,12 @@ const Region& Overlap::region() const {
 }
 
 const std::optional<MeasuresAndInertia>& Overlap::sliced() const {
-  return lazy().sliced.get([this] { return overlapper::sliced(overlapping_bodies()); });
+  return lazy().sliced.get([this] { return overlapper::sliced(overlapping_bodies(), false); });
+}
+
+const std::optional<MeasuresAndInertia>& Overlap::sliced_with_area() const {
+  if (!sliced() || sliced()->measures.area_known) return sliced();
+  return lazy().sliced_with_area.get([this] { return overlapper::sliced(overlapping_bodies(), true); });
 }
 
 const MeasuresAndInertia& Overlap::in_full() const {
@@ -203,9 +208,10 @@ Stated Overlap::stated() const {
 Errors Overlap::errors_of_measures() const {
   if (!(volume_error() < volume())) return errors_of_anything(volume_error(), bodies());
   const bool integrated = way() == Way::kClosedForm || way() == Way::kSlicing;
+  const auto& slices = integrated ? sliced_with_area() : std::optional<MeasuresAndInertia>();
   const auto spread =
-      integrated && sliced() ? overlapper::spread(overlapping_bodies(), sliced()->measures, measures()) : std::nullopt;
-  Errors errors = spread ? errors_of_slices(*sliced(), *spread, stated(), drawn(), bodies())
+      slices ? overlapper::spread(overlapping_bodies(), slices->measures, measures()) : std::nullopt;
+  Errors errors = spread ? errors_of_slices(*slices, *spread, stated(), drawn(), bodies())
                          : errors_beside(measured_with_errors(finest_region(), bodies()), stated());
   errors.volume = volume_error();
   errors.vertices = error_of_vertices(drawn(), boundary(), bodies());
@@ -229,7 +235,7 @@ bool Overlap::converged() const { return status_ != Status::kOverlapping || volu
 double Overlap::area() const {
   if (status_ != Status::kOverlapping) return 0;
   if (measures().area_known) return measures().area;
-  return sliced() ? sliced()->measures.area : measure(region(), bodies()).measures.area;
+  return sliced_with_area() ? sliced_with_area()->measures.area : measure(region(), bodies()).measures.area;
 }
 
 Vec3 Overlap::centroid() const { return measures().centroid; }

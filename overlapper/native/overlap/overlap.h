@@ -84,7 +84,7 @@ class Overlap {
     Once<Search> search;
     Once<Inside> inside;
     Once<Region> region;
-    Once<std::optional<MeasuresAndInertia>> sliced;
+    Once<std::optional<MeasuresAndInertia>> sliced, sliced_with_area;
     Once<MeasuresAndInertia> in_full;
     Once<Boundary> boundary;
     Once<Patch> patch;
@@ -101,6 +101,7 @@ class Overlap {
   const Search& search() const;
   const Inside& inside() const;
   const std::optional<MeasuresAndInertia>& sliced() const;
+  const std::optional<MeasuresAndInertia>& sliced_with_area() const;
   const MeasuresAndInertia& in_full() const;
   Region region_of_overlap() const;
   Patch patch_of_overlap() const;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "methods/round/closed_forms/closed_forms.h"
+#include "methods/round/lenses/lenses.h"
 #include "methods/round/pieces/measure.h"
 
 namespace overlapper {
@@ -28,7 +29,7 @@ struct RoundChoice {
 
 /// How pairs with a round body are measured by Way::kClosedForm and Way::kSlicing. The first line that fits counts.
 /// Forms after the last one are null.
-inline constexpr std::array<RoundChoice, 11> kRoundChoices{{
+inline constexpr std::array<RoundChoice, 12> kRoundChoices{{
     {"two balls", [](const RoundTraits& t) { return t.balls == 2; }, {closed_forms::lens}, pieces::measure_pieces},
     {"two, each a ball or a capsule",
      [](const RoundTraits& t) { return t.balls + t.capsules == 2; },
@@ -62,6 +63,10 @@ inline constexpr std::array<RoundChoice, 11> kRoundChoices{{
      [](const RoundTraits& t) { return t.stretched == 1 && t.flat == 1; },
      {closed_forms::ellipsoid_in_flat},
      pieces::measure_stretched},
+    {"an ellipsoid, and a ball or an ellipsoid",
+     [](const RoundTraits& t) { return t.stretched > 0 && t.stretched + t.balls == 2; },
+     {},
+     lenses::measure_lenses},
     {"a rounded hull, and no ellipsoid",
      [](const RoundTraits& t) { return t.rounded_hulls > 0 && t.stretched == 0; },
      {},

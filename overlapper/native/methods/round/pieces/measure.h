@@ -15,6 +15,7 @@ struct RoundMeasures {
   double volume = 0, volume_error = 0, area = 0;
   double first_area = 0;     ///< m²: area of the first body's part of the surface
   double area_error = 0;     ///< error of the area by quadrature
+  bool area_known = true;    ///< false if areas were left out
   double rounding = 0;       ///< m: bound of the movement of surfaces by rounding
   Vec3 centroid;             ///< about the reference
   Mat3 inertia;              ///< about the centroid, unit density
@@ -29,6 +30,7 @@ struct SlicedPair {
   Vec3 reference;
   WideVector inside;           ///< a point of the common set about the reference, as deep inside as known
   double outwards = 0;         ///< m: how far the surface of one body is moved out
+  bool with_area = true;       ///< areas are wanted; they may be left out otherwise
   int owner = 0;               ///< the body whose surface the patch sums
   PatchSums* patch = nullptr;  ///< added to, if not null; relative to `inside`
 };

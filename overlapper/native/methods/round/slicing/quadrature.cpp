@@ -10,52 +10,11 @@
 
 #include "geometry/wide.h"
 #include "methods/round/slicing/nodes.h"
+#include "methods/round/slicing/rules.h"
 
 namespace overlapper::slicing {
 namespace {
 
-/// A node x < 0 of a rule of Gauss and Legendre with n nodes, and θ = π/2 (1 + x). The node at -x has the same numbers,
-/// but those for odd coefficients are negated. Computed with mpmath.
-struct Node {
-  double share;               ///< sin²(θ/2): the fraction of the interval below the node
-  double weight;              ///< of the slice, for an interval of length 1
-  double sine;                ///< sin θ
-  double last, last_but_one;  ///< its terms in the coefficients n − 1 and n − 2 of the Legendre series
-  double even, odd;           ///< its terms in the coefficients n / 2 and n / 2 − 1; n is a multiple of four
-};
-// clang-format off
-constexpr std::array<Node, 4> kNodes8{{
-    {0.0009723930747465951, 0.004956013807543283, 0.06233610595649298, -0.11769245644771356, 0.2098921910670323, 0.29030541733775395, -0.2740188228304149},
-    {0.025287307850590565, 0.054841235667607575, 0.3139927382106792, 0.3778969370845921, -0.5591073831433646, -0.24289619147803757, -0.053756356443960325},
-    {0.13255503062228385, 0.16709469807274444, 0.6781863887723175, -0.6317745531190048, 0.6166048635025358, -0.46158532259653046, 0.4671207500358303},
-    {0.3579160380490356, 0.27310805245210357, 0.9587745256447251, 0.7849065579218132, -0.26738967142620357, 0.41417609673681405, 0.32968848669588297},
-}};
-constexpr std::array<Node, 8> kNodes16{{
-    {6.929546966908637e-05, 0.00035503112097767017, 0.016648203243229548, -0.03278130486396174, 0.06270545045312347, 0.15058800145020093, -0.14740575972423792},
-    {0.00189372306883215, 0.004251385094079633, 0.08695140899998625, 0.1122209124505884, -0.20493540387013992, -0.10847571647570407, 0.025281105530178673},
-    {0.011095931029013096, 0.015657646148953673, 0.20950237558187715, -0.21159853063188444, 0.3541214949557947, -0.27282166214653136, 0.292586524485687},
-    {0.03645255560584376, 0.03668930032305557, 0.37482671620708485, 0.31691961779722083, -0.46284478766452636, 0.1895693337450734, 0.05269404819587083},
-    {0.08739956378658222, 0.06636434224332013, 0.5648393755272285, -0.41664037702596135, 0.49770223675171826, 0.3211314759255782, -0.35201317927912984},
-    {0.17051405730045766, 0.09992938781207442, 0.7521675705941965, 0.5008933497159644, -0.4435406121078921, -0.2559042813894806, -0.16501933751603287},
-    {0.28597146820556574, 0.12961280457896754, 0.9037517083312625, -0.5617461448292791, 0.305833437439604, -0.32830696857627284, 0.3414173736623772},
-    {0.4256540670547978, 0.14714010267857136, 0.988883577079744, 0.5936159289428018, -0.10904181595768207, 0.30421981746713633, 0.2717959571544673},
-}};
-constexpr std::array<Node, 12> kNodes24{{
-    {1.4287943182011783e-05, 7.327571601569155e-05, 0.00755982513995963, -0.015074422043108972, 0.029351489020715417, 0.10150925819667533, -0.10025190784166031},
-    {0.0003938971595899967, 0.0008893007537826567, 0.039685866734527224, 0.05225186613570152, -0.09964836396246231, -0.06873805069573369, 0.030606001998891554},
-    {0.002348378028467179, 0.0033664783772112974, 0.09680626320858773, -0.10078656328461252, 0.18501939296171394, -0.18957472949225282, 0.20182229812545555},
-    {0.007937163319033949, 0.008265449094038245, 0.1774729811264907, 0.15608887413910497, -0.2707035684056185, 0.1174497162931925, -0.003804099433388402},
-    {0.019852721999046002, 0.016071442592121454, 0.27898811034361015, -0.21465007688006033, 0.34437421825650083, 0.23506230633227274, -0.2611955292245529},
-    {0.041083958148993106, 0.02687224824024659, 0.39696884780448394, 0.273384265122517, -0.395879298679761, -0.15959948041355967, -0.047927981514031666},
-    {0.07446413498096881, 0.040255283030036906, 0.5250494360819936, -0.32949021039193754, 0.41779665729859544, -0.2597555657954904, 0.2919797934483577},
-    {0.12214222419855339, 0.055264739761756845, 0.6548999962326575, 0.3804443849065234, -0.4059832229947917, 0.1966314065314693, 0.11122580634829161},
-    {0.18505901057631888, 0.07045979452940064, 0.7766908604607956, -0.4240372347791966, 0.3598916075978801, 0.26900217397948084, -0.29589202305082996},
-    {0.26254230538810935, 0.08409560050528943, 0.8800314614139794, 0.4584224693630116, -0.282566041006413, -0.22762295528842091, -0.1758949494670128},
-    {0.35214015559282785, 0.09441219942671737, 0.9552747592434061, -0.48216589541230115, 0.18029543451965438, -0.26547582192752966, 0.2749481630697655},
-    {0.44977468483151917, 0.09997418797338287, 0.9949420439728673, 0.4942866471300963, -0.06194830460601351, 0.2511117422798965, 0.23299835560593826},
-}};
-// clang-format on
-using Rule = std::span<const Node>;
 constexpr std::array<Rule, 3> kRules{kNodes8, kNodes16, kNodes24};
 static_assert(2 * kNodes24.size() == kMostNodes);
 static_assert(std::ranges::all_of(kRules, [](Rule rule) { return rule.size() % 2 == 0; }));
@@ -75,41 +34,6 @@ constexpr int kMostHalvings = 48;
 constexpr int kMostRules = 600;
 /// Rules after which the area of a stretched ball, whose element may change as sharply as at an edge, has its error.
 constexpr int kMostRulesForStretch = 240;
-
-/// Coefficients in the middle and at the end of a Legendre series, summed over the nodes.
-struct Series {
-  double last = 0, last_but_one = 0, even = 0, odd = 0;
-  void add(const Node& node, double low, double high) {
-    last += node.last * (low - high);
-    last_but_one += node.last_but_one * (low + high);
-    even += node.even * (low + high);
-    odd += node.odd * (low - high);
-  }
-  double tail() const { return std::max(std::abs(last), std::abs(last_but_one)); }
-  /// The size of the last terms relative to those in the middle, at most 1.
-  double ratio() const {
-    const double middle = std::max(std::abs(even), std::abs(odd)), end = tail();
-    return end < middle ? end / middle : 1;
-  }
-  /// A rule of n nodes integrates the first 2 n terms. From the middle to the n-th term, terms fall by the ratio. To
-  /// the last one, they fall twice more by that ratio, or faster if the integrand has no singularity nearby.
-  double error() const { return 30 * tail() * ratio() * ratio(); }
-  /// The error if the element of the area is sharp near an end of the interval. Terms begin at about `whole`. They fall
-  /// fast at first, and then as slowly as those of a root. They are taken to fall once more by the ratio, not twice. If
-  /// they fell less to the end than to the middle, that fall is less by the square of the same factor.
-  double stretched_error(double whole) const {
-    const double middle = std::max(std::abs(even), std::abs(odd)), second = ratio();
-    const double slowing = middle > 0 ? std::max(1.0, second * whole / middle) : 1;
-    return 30 * tail() * std::min(1.0, second * slowing * slowing);
-  }
-  /// How many times half the nodes are needed until the error is so small, if terms keep falling at this rate.
-  double halves_until(double small) const {
-    const double now = error();
-    if (now <= small) return 0;
-    const double each = -2 * std::log(ratio());
-    return each > 0 ? std::log(now / small) / each : std::numeric_limits<double>::infinity();
-  }
-};
 
 /// The answer of a rule for the slices between two values of t.
 struct RulePart {

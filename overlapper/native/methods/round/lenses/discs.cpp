@@ -1,0 +1,223 @@
+#include "methods/round/lenses/discs.h"
+
+#include <algorithm>
+#include <cfloat>
+#include <utility>
+
+namespace overlapper::lenses {
+namespace {
+
+WideVector scaled_by(const WideVector& a, const WideVector& b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+WideVector inverse(const WideVector& v) {
+  const DoubleDouble one{1};
+  return {one / v.x, one / v.y, one / v.z};
+}
+DoubleDouble twice(DoubleDouble a) { return {2 * a.head, 2 * a.tail}; }
+
+Mat3 rounded(const WideMatrix& m) { return {rounded(m.row0), rounded(m.row1), rounded(m.row2)}; }
+
+/// The matrix K, from the first body's ball to the second's.
+WideMatrix between_balls(const StretchedBall& first, const StretchedBall& second, const WideVector& inverse_second) {
+  const WideMatrix &a = first.rotation, &b = second.rotation;
+  const auto row = [&](int axis) {
+    const auto of_b = [&](const WideVector& v) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; };
+    const DoubleDouble scale = of_b(inverse_second);
+    if (first.ball || second.ball) {
+      // The axes of the ball are those of the ellipsoid.
+      const DoubleDouble own = scale * of_b(first.half_axes);
+      return WideVector{axis == 0 ? own : DoubleDouble{}, axis == 1 ? own : DoubleDouble{},
+                        axis == 2 ? own : DoubleDouble{}};
+    }
+    const WideVector turned =
+        scaled(a.row0, of_b(b.row0)) + scaled(a.row1, of_b(b.row1)) + scaled(a.row2, of_b(b.row2));
+    return scaled(scaled_by(turned, first.half_axes), scale);
+  };
+  return {row(0), row(1), row(2)};
+}
+
+struct Principal {
+  std::array<double, 3> value;  ///< in ascending order
+  std::array<Vec3, 3> axis;
+};
+
+/// The principal values and axes of KᵀK, by Jacobi's rotations of the columns of K.
+Principal principal(const Mat3& k) {
+  std::array<Vec3, 3> column{Vec3{k.row0.x, k.row1.x, k.row2.x}, Vec3{k.row0.y, k.row1.y, k.row2.y},
+                             Vec3{k.row0.z, k.row1.z, k.row2.z}};
+  std::array<Vec3, 3> axis{Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+  constexpr int kMostSweeps = 12;
+  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
+    bool turned = false;
+    for (const auto& [p, q] : {std::pair{0, 1}, {0, 2}, {1, 2}}) {
+      const double both = overlapper::dot(column[p], column[q]), of_p = norm2(column[p]), of_q = norm2(column[q]);
+      if (!(std::abs(both) > 0x1p-52 * std::sqrt(of_p * of_q))) continue;
+      turned = true;
+      const double half = (of_q - of_p) / (2 * both);
+      const double tangent = std::copysign(1 / (std::abs(half) + std::sqrt(half * half + 1)), half);
+      const double cosine = 1 / std::sqrt(tangent * tangent + 1), sine = tangent * cosine;
+      for (auto* vectors : {&column, &axis}) {
+        const Vec3 before = (*vectors)[p];
+        (*vectors)[p] = cosine * before - sine * (*vectors)[q];
+        (*vectors)[q] = sine * before + cosine * (*vectors)[q];
+      }
+    }
+    if (!turned) break;
+  }
+  std::array<int, 3> order{0, 1, 2};
+  const std::array<double, 3> value{norm2(column[0]), norm2(column[1]), norm2(column[2])};
+  std::ranges::sort(order, {}, [&](int i) { return value[i]; });
+  return {{value[order[0]], value[order[1]], value[order[2]]}, {axis[order[0]], axis[order[1]], axis[order[2]]}};
+}
+
+/// The direction across the slices. There are two; it is the one that is more across the contact.
+Vec3 across_slices(const Principal& of, Vec3 contact) {
+  const auto& [low, middle, high] = of.value;
+  const double whole = high - low;
+  if (!(whole > 4 * DBL_EPSILON * high)) return norm2(contact) > 0 ? any_orthogonal(unit(contact)) : of.axis[0];
+  const double sine = std::sqrt((high - middle) / whole), cosine = std::sqrt((middle - low) / whole);
+  const Vec3 a = cosine * of.axis[0] + sine * of.axis[2], b = cosine * of.axis[0] - sine * of.axis[2];
+  return unit(std::abs(overlapper::dot(a, contact)) <= std::abs(overlapper::dot(b, contact)) ? a : b);
+}
+
+/// Axes of a slice, and what K makes of them.
+struct Axes {
+  Vec3 n, x, y;
+  WideVector along_n, along_x, along_y;  ///< K n, K x, K y
+  DoubleDouble xx, yy, xy;               ///< (K x) · (K x), ...
+
+  Axes(Vec3 normal, const WideMatrix& k) : n(normal), x(any_orthogonal(normal)), y(cross(normal, x)) {
+    along_n = k * wide(n), along_x = k * wide(x), along_y = k * wide(y);
+    xx = overlapper::dot(along_x, along_x), yy = overlapper::dot(along_y, along_y);
+    xy = overlapper::dot(along_x, along_y);
+  }
+  double oval() const {
+    const double mean = (xx.head + yy.head) / 2;
+    return std::max(std::abs((xx - yy).head) / 2, std::abs(xy.head)) / mean;
+  }
+};
+
+/// Axes whose slices are discs as nearly as doubles can tell. Newton's method tilts them until the form of the second
+/// body is the same in all directions of the plane.
+Axes settled_axes(Vec3 normal, const WideMatrix& k) {
+  Axes axes(normal, k);
+  constexpr int kMostSteps = 3;
+  for (int step = 0; step < kMostSteps && axes.oval() > 2 * DBL_EPSILON; ++step) {
+    const double x = overlapper::dot(axes.along_x, axes.along_n).head,
+                 y = overlapper::dot(axes.along_y, axes.along_n).head;
+    const double size = x * x + y * y, half = (axes.xx - axes.yy).head / 2, both = axes.xy.head;
+    if (!(size > 0)) break;
+    const double tilt_x = (half * x + both * y) / size, tilt_y = (both * x - half * y) / size;
+    if (!(tilt_x * tilt_x + tilt_y * tilt_y < 0x1p-20)) break;
+    const Axes next(unit(axes.n + tilt_x * axes.x + tilt_y * axes.y), k);
+    if (!(next.oval() < axes.oval())) break;
+    axes = next;
+  }
+  return axes;
+}
+
+/// The t where a radius vanishes on either side of the inner point. `square` is positive at zero and concave.
+std::array<double, 2> ends_of(const Quadratic& square) {
+  const double half = square[1] / 2, bend = -square[2], root = std::sqrt(half * half + bend * square[0]);
+  if (half > 0) return {-square[0] / (half + root), (half + root) / bend};
+  return {(half - root) / bend, square[0] / (root - half)};
+}
+
+}  // namespace
+
+std::array<double, 4> Discs::ends() const {
+  const auto a = ends_of(first_square), b = ends_of(second_square);
+  return {a[0], a[1], b[0], b[1]};
+}
+
+std::array<double, 2> Discs::range() const {
+  const auto [a_low, a_high, b_low, b_high] = ends();
+  return {std::max(a_low, b_low), std::min(a_high, b_high)};
+}
+
+/// With the middle value above the geometric mean of the others, the largest is nearer to it than the smallest is, and
+/// rounding, which is relative to the largest, matters less.
+bool better_first(const StretchedBall& first, const StretchedBall& second) {
+  const Vec3 a = rounded(first.half_axes), b = rounded(second.half_axes);
+  if (first.ball || second.ball) {
+    std::array<double, 3> values{a.x / b.x, a.y / b.y, a.z / b.z};
+    std::ranges::sort(values);
+    return values[1] * values[1] >= values[0] * values[2];
+  }
+  const Mat3 p = transposed(rounded(first.rotation)), q = transposed(rounded(second.rotation));
+  double of_second = 0, of_first = 0;
+  int i = 0;
+  for (const Vec3 along_a : {p.row0, p.row1, p.row2}) {
+    int j = 0;
+    for (const Vec3 along_b : {q.row0, q.row1, q.row2}) {
+      const double cosine = overlapper::dot(along_a, along_b), ratio = cosine * a[i] / b[j],
+                   back = cosine * b[j] / a[i];
+      of_second += ratio * ratio, of_first += back * back;
+      ++j;
+    }
+    ++i;
+  }
+  const double scale = std::cbrt(a.x / b.x * (a.y / b.y) * (a.z / b.z));
+  return of_first * scale * scale >= of_second / (scale * scale);
+}
+
+std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& second) {
+  const WideVector inverse_first = inverse(first.half_axes), inverse_second = inverse(second.half_axes);
+  // A ball has any axes; those of the other body make K diagonal.
+  const WideMatrix &rotation = first.ball ? second.rotation : first.rotation,
+                   &rotation_of_second = second.ball ? first.rotation : second.rotation;
+  const WideVector c = scaled_by(inverse_first, apply_transposed(rotation, first.centre));
+  const WideVector k_centre = scaled_by(inverse_second, apply_transposed(rotation_of_second, second.centre));
+  const DoubleDouble one{1}, slack_first = one - overlapper::dot(c, c),
+                             slack_second = one - overlapper::dot(k_centre, k_centre);
+  if (!(slack_first.head > 0 && slack_second.head > 0)) return std::nullopt;
+  const WideMatrix k = between_balls(first, second, inverse_second);
+  const Mat3 plain = rounded(k);
+  const Vec3 contact = rounded(c);
+  const Axes axes = settled_axes(across_slices(principal(plain), contact), k);
+
+  Discs result;
+  result.normal = axes.n, result.x = axes.x, result.y = axes.y, result.first_rotation = rotation;
+  result.oval = axes.oval();
+  result.second_ball = plain, result.second_middle = rounded(k_centre);
+  const DoubleDouble value = (axes.xx + axes.yy) / DoubleDouble{2}, round = one / value;
+  const DoubleDouble c_n = overlapper::dot(c, wide(axes.n)), c_x = overlapper::dot(c, wide(axes.x)),
+                     c_y = overlapper::dot(c, wide(axes.y));
+  // About -c_n in the plane where the first body's surface is across c. A small slack keeps the foot from running off.
+  const double steep = c_x.head * c_x.head + c_y.head * c_y.head + slack_first.head;
+  const Flat lean{-c_n.head * c_x.head / steep, -c_n.head * c_y.head / steep};
+  result.lean = lean, result.first_level = c_n.head;
+  const DoubleDouble lean_x{lean.x}, lean_y{lean.y};
+  const WideVector along = axes.along_n + (lean_x * axes.along_x + lean_y * axes.along_y);
+  const auto of_second = [&](const WideVector& v) { return round * overlapper::dot(k_centre, v); };
+  const DoubleDouble g_n = of_second(axes.along_n), g_x = of_second(axes.along_x), g_y = of_second(axes.along_y);
+  const DoubleDouble m_x = round * overlapper::dot(along, axes.along_x),
+                     m_y = round * overlapper::dot(along, axes.along_y);
+  using Slack = std::array<DoubleDouble, 3>;
+  const Slack of_first{slack_first, twice(c_n + lean_x * c_x + lean_y * c_y),
+                       -(one + lean_x * lean_x + lean_y * lean_y)};
+  const Slack of_other{round * slack_second, twice(g_n + lean_x * g_x + lean_y * g_y),
+                       -(round * overlapper::dot(along, along))};
+  // The centres: of the first (c_x, c_y) − t lean, of the second (g_x, g_y) − t (m_x, m_y).
+  const DoubleDouble e_x = g_x - c_x, e_y = g_y - c_y;
+  result.apart = {{e_x.head, e_y.head}, {(lean_x - m_x).head, (lean_y - m_y).head}};
+  const Flat start{c_x.head, c_y.head};
+  const double apart2 = dot(result.apart.start, result.apart.start);
+  const double share = apart2 > 0 ? std::clamp(-dot(start, result.apart.start) / apart2, 0.0, 1.0) : 0;
+  const DoubleDouble part{share}, rest = one - part;
+  result.share = share;
+  result.centre = {{(c_x + part * e_x).head, (c_y + part * e_y).head},
+                   {-(rest * lean_x + part * m_x).head, -(rest * lean_y + part * m_y).head}};
+  for (int i = 0; i < 3; ++i) {
+    result.slack[i] = (rest * of_first[i] + part * of_other[i]).head;
+    result.difference[i] = (of_first[i] - of_other[i]).head;
+  }
+  result.first_square = {(slack_first + c_x * c_x + c_y * c_y).head, 2 * c_n.head, -1};
+  const DoubleDouble p_x = round * overlapper::dot(axes.along_n, axes.along_x),
+                     p_y = round * overlapper::dot(axes.along_n, axes.along_y);
+  result.second_square = {(of_other[0] + g_x * g_x + g_y * g_y).head, 2 * (g_n - g_x * p_x - g_y * p_y).head,
+                          (p_x * p_x + p_y * p_y - round * overlapper::dot(axes.along_n, axes.along_n)).head};
+  result.second_rise = std::sqrt(-result.second_square[2] * value.head);
+  return result;
+}
+
+}  // namespace overlapper::lenses

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "geometry/wide_pose.h"
+#include "methods/round/quadric/stretch.h"
+#include "shapes/shape.h"
+
+namespace overlapper::lenses {
+
+/// A polynomial of t by its coefficients, of 1, t and t².
+using Quadratic = std::array<double, 3>;
+inline double at(const Quadratic& p, double t) { return p[0] + t * (p[1] + t * p[2]); }
+/// The size of its terms.
+inline double size_at(const Quadratic& p, double t) {
+  return std::abs(p[0]) + std::abs(t) * (std::abs(p[1]) + std::abs(t * p[2]));
+}
+
+/// A vector in the plane of a slice.
+struct Flat {
+  double x = 0, y = 0;
+};
+inline Flat operator+(Flat a, Flat b) { return {a.x + b.x, a.y + b.y}; }
+inline Flat operator-(Flat a, Flat b) { return {a.x - b.x, a.y - b.y}; }
+inline Flat operator*(double s, Flat a) { return {s * a.x, s * a.y}; }
+inline double dot(Flat a, Flat b) { return a.x * b.x + a.y * b.y; }
+inline double cross(Flat a, Flat b) { return a.x * b.y - a.y * b.x; }
+
+/// A vector that is linear in t.
+struct Line {
+  Flat start, slope;
+  Flat at(double t) const { return start + t * slope; }
+};
+/// The size of its terms.
+inline double size_at(const Line& line, double t) {
+  return std::abs(line.start.x) + std::abs(line.start.y) +
+         std::abs(t) * (std::abs(line.slope.x) + std::abs(line.slope.y));
+}
+inline Quadratic dot(const Line& a, const Line& b) {
+  return {dot(a.start, b.start), dot(a.start, b.slope) + dot(a.slope, b.start), dot(a.slope, b.slope)};
+}
+inline Quadratic cross(const Line& a, const Line& b) {
+  return {cross(a.start, b.start), cross(a.start, b.slope) + cross(a.slope, b.start), cross(a.slope, b.slope)};
+}
+
+/// A ball or an ellipsoid: a stretched and turned unit ball about a centre.
+struct StretchedBall {
+  WideVector half_axes, centre;  ///< the centre is about the inner point
+  WideMatrix rotation;
+  bool ball;
+};
+
+/// Two ellipsoids in parallel slices in which both are discs.
+///
+/// Coordinates are those of the first ellipsoid, along its axes, in units of its half axes: there it is a unit ball.
+/// They count from the inner point. The other is { y : |K y − k| <= 1 }. For the principal values l0 <= l1 <= l2 of
+/// KᵀK along u0, u1, u2, its section by every plane orthogonal to √(l1 − l0) u0 ± √(l2 − l1) u2 is a disc: that plane
+/// contains u1, and the plane's other direction has the same value.
+///
+/// In a slice, places count from a foot that moves with t along a tangent of the contact. Then everything that
+/// describes a shallow contact is small, found in double-double, and rounded once: the slacks of both discs at the
+/// foot, which are radius² − |centre|². The line through the crossings of both circles is where the slacks are equal.
+struct Discs {
+  Vec3 normal, x, y;  ///< unit, and orthogonal to each other: across the slices, and the axes of the plane
+  Flat lean;          ///< of the foot per t
+  Line centre;        ///< of the weighted mean of both discs: `share` of the way from the first to the second
+  Line apart;         ///< from the first disc to the second
+  double share;
+  Quadratic slack;                        ///< of that weighted mean
+  Quadratic difference;                   ///< slack of the first less that of the second
+  Quadratic first_square, second_square;  ///< of the radii
+  double first_level;                     ///< t of the first body's centre
+  double oval;                            ///< how far the sections of the second are off discs, relative
+  double second_rise;                     ///< height in the second's own ball per t
+  double misplaced = 0;                   ///< slack that double-doubles misplace, in units of the last bit
+  Mat3 second_ball;                       ///< K
+  Vec3 second_middle;                     ///< k
+  WideMatrix first_rotation;
+
+  Line first_centre() const { return {centre.start - share * apart.start, centre.slope - share * apart.slope}; }
+  Line second_centre() const {
+    return {centre.start + (1 - share) * apart.start, centre.slope + (1 - share) * apart.slope};
+  }
+  /// The common values of t: both discs exist.
+  std::array<double, 2> range() const;
+  /// The values of t at which either disc ends.
+  std::array<double, 4> ends() const;
+};
+
+/// No value if the inner point is not inside both.
+std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& second);
+
+/// Whether sections have rounder discs, relative to rounding, if `first` is made a ball.
+bool better_first(const StretchedBall& first, const StretchedBall& second);
+
+}  // namespace overlapper::lenses

@@ -1,0 +1,107 @@
+#include "methods/round/lenses/integrate.h"
+
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <tuple>
+
+#include "methods/round/slicing/rules.h"
+
+namespace overlapper::lenses {
+namespace {
+
+using slicing::Rule;
+using slicing::Series;
+
+/// A relative error of a rule that does.
+constexpr double kVolumeError = 2e-15, kAreaError = 1e-11;
+constexpr int kMostHalvings = 40;
+constexpr int kMostRules = 400;
+
+struct Part {
+  double low, high;
+  Sums sums;
+  Series volume, area;
+};
+
+class Integrating {
+ public:
+  Integrating(const Discs& discs, const Wanted& wanted) : discs_(discs), wanted_(wanted) {}
+
+  Integral run() {
+    const Changes at = changes(discs_);
+    std::array<Part, std::tuple_size_v<decltype(Changes::t)>> parts;
+    int count = 0;
+    for (int i = 0; i + 1 < at.count; ++i) {
+      if (!(at.t[i] < at.t[i + 1])) continue;
+      const double middle = at.t[i] / 2 + at.t[i + 1] / 2;
+      if (section(discs_, middle).outline == Outline::kNothing) continue;
+      parts[count++] = apply(at.t[i], at.t[i + 1], slicing::kNodes24);
+    }
+    for (int i = 0; i < count; ++i)
+      volume_ += parts[i].sums.moments.volume, area_ += parts[i].sums.first_area + parts[i].sums.second_area;
+    for (int i = 0; i < count; ++i) add(parts[i], true, 0);
+    return result_;
+  }
+
+ private:
+  Part apply(double low, double high, Rule rule) {
+    Part part{low, high, {}, {}, {}};
+    ++rules_;
+    const double width = high - low;
+    for (const slicing::Node& node : rule) {
+      const double step = width * node.share, weight = width * node.weight, sine = width * node.sine;
+      const Sums below = slice(discs_, low + step, wanted_), above = slice(discs_, high - step, wanted_);
+      part.sums.add(weight, below), part.sums.add(weight, above);
+      part.volume.add(node, sine * below.moments.volume, sine * above.moments.volume);
+      if (wanted_.first)
+        part.area.add(node, sine * (below.first_area + below.second_area),
+                      sine * (above.first_area + above.second_area));
+    }
+    result_.nodes += 2 * static_cast<int>(rule.size());
+    return part;
+  }
+
+  /// The error of the volume. Where a square root lies near an interval, terms of the series fall fast at first, and
+  /// then as slowly as the last two do.
+  static double error_of(const Series& series) {
+    const double last = std::abs(series.last), before = std::abs(series.last_but_one);
+    const double fall = last < before ? last / before : 1;
+    return std::max(series.error(), series.tail() * std::pow(fall, 24));
+  }
+
+  bool enough(const Part& part) const {
+    const double small = std::max(kVolumeError * volume_, 4 * DBL_EPSILON * part.sums.blur);
+    if (error_of(part.volume) > small && part.volume.tail() > 16 * DBL_EPSILON * part.sums.moments.volume) return false;
+    return !wanted_.first ||
+           part.area.stretched_error(part.sums.first_area + part.sums.second_area) <= kAreaError * area_;
+  }
+
+  void add(const Part& part, bool may_be_finer, int halvings) {
+    if (!enough(part) && rules_ < kMostRules) {
+      if (may_be_finer && part.volume.ratio() < 1e-3)
+        return add(apply(part.low, part.high, slicing::kNodes32), false, halvings);
+      if (halvings < kMostHalvings) {
+        const double middle = part.low / 2 + part.high / 2;
+        add(apply(part.low, middle, slicing::kNodes24), true, halvings + 1);
+        return add(apply(middle, part.high, slicing::kNodes24), true, halvings + 1);
+      }
+    }
+    result_.sums.add(1, part.sums);
+    result_.error += error_of(part.volume);
+    const double area = part.sums.first_area + part.sums.second_area;
+    if (wanted_.first) result_.area_error += part.area.stretched_error(area);
+  }
+
+  const Discs& discs_;
+  const Wanted& wanted_;
+  double volume_ = 0, area_ = 0;
+  int rules_ = 0;
+  Integral result_;
+};
+
+}  // namespace
+
+Integral integrate(const Discs& discs, const Wanted& wanted) { return Integrating(discs, wanted).run(); }
+
+}  // namespace overlapper::lenses

@@ -1,0 +1,130 @@
+#include "methods/round/lenses/lenses.h"
+
+#include <algorithm>
+#include <cfloat>
+
+#include "geometry/rounding.h"
+#include "methods/round/lenses/integrate.h"
+#include "methods/round/pieces/totals.h"
+
+namespace overlapper::lenses {
+namespace {
+
+using pieces::RoundMeasures;
+using pieces::SlicedPair;
+
+/// The rounding of all terms of a slack, and of all sums of slices, in units of the last bit.
+constexpr double kRoundings = 16;
+
+StretchedBall stretched_ball(const Placed& body, const SlicedPair& pair) {
+  const Ellipsoid* ellipsoid = stretched(body.shape);
+  const double radius = ellipsoid ? 0 : revolution(body.shape)->radius;
+  return {wide(ellipsoid ? ellipsoid->half_axes : Vec3{radius, radius, radius}),
+          wide(body.position) - wide(pair.reference) - pair.inside,
+          ellipsoid ? wide_rotation(body.orientation) : WideMatrix{}, !ellipsoid};
+}
+
+/// m: how far double-doubles may misplace the surface of a body.
+double misplaced(const Placed& body, const SlicedPair& pair) {
+  const double size = norm(body.position - pair.reference) + norm(rounded(pair.inside)) + reach(body.shape);
+  return wide_placing(reach(body, size), !unturned(body.orientation));
+}
+
+double shortest(Vec3 v) { return std::min({v.x, v.y, v.z}); }
+
+/// A half axis that grows by `outwards`, if it is the shortest.
+void scale(StretchedBall& body, double outwards) {
+  const DoubleDouble by = DoubleDouble{1} + DoubleDouble{outwards / shortest(rounded(body.half_axes))};
+  body.half_axes = by * body.half_axes;
+}
+
+/// From the coordinates of Discs to the world about the inner point.
+struct ToWorld {
+  const Discs& discs;
+  quadric::Stretch stretch;
+  Mat3 turn;
+
+  /// A vector across the slices and in their plane, along the axes of the first body.
+  Vec3 along_axes(Vec3 v) const { return v.x * discs.normal + v.y * discs.x + v.z * discs.y; }
+  Vec3 point(Vec3 v) const { return turn * scaled(stretch.half_axes, along_axes(v)); }
+  Vec3 area_vector(Vec3 v) const { return turn * stretch.normal(along_axes(v)); }
+  Moments moments(const Moments& m) const {
+    const Moments own = m.along({discs.normal, discs.x, discs.y});
+    const Vec3 h = stretch.half_axes;
+    return {stretch.volume * own.volume, stretch.volume * scaled(h, own.first),
+            stretch.volume * scaled(scaled(h, h), own.squares),
+            stretch.volume * scaled(stretch.cofactors, own.products)};
+  }
+  /// ∫ x × n dA of ∫ y Nᵀ dA.
+  Vec3 moment(const Mat3& moved) const {
+    const Mat3 axes = transposed({discs.normal, discs.x, discs.y});
+    const Mat3 w = axes * moved * transposed(axes);
+    const Vec3 h = stretch.half_axes, c = stretch.cofactors;
+    return turn * Vec3{h.y * c.z * w.row1.z - h.z * c.y * w.row2.y, h.z * c.x * w.row2.x - h.x * c.z * w.row0.z,
+                       h.x * c.y * w.row0.y - h.y * c.x * w.row1.x};
+  }
+};
+
+/// The patch as the first body's ball sees it.
+View view_of(const PatchSums& patch, const ToWorld& to) {
+  const Vec3 h = to.stretch.half_axes;
+  const auto own = [&](Vec3 v) { return apply_transposed(to.turn, v); };
+  return {-dot(patch.origin(), patch.u()), -dot(patch.origin(), patch.v()), scaled(h, own(patch.u())),
+          scaled(h, own(patch.v())), to.stretch.normal(own(patch.normal()))};
+}
+
+}  // namespace
+
+std::optional<RoundMeasures> measure_lenses(const SlicedPair& pair) {
+  StretchedBall first = stretched_ball(pair.a, pair), second = stretched_ball(pair.b, pair);
+  const bool swapped = !better_first(first, second);
+  if (swapped) std::swap(first, second);
+  const double least = shortest(rounded(second.half_axes));
+  if (!(pair.outwards > -least)) return std::nullopt;
+  if (pair.outwards != 0) scale(second, pair.outwards);
+  std::optional<Discs> found = discs(first, second);
+  if (!found) return std::nullopt;
+  found->misplaced = 2 * (misplaced(pair.a, pair) + misplaced(pair.b, pair)) /
+                     (shortest(rounded(first.half_axes)) * kRoundings * DBL_EPSILON);
+  const ToWorld to{
+      *found,
+      quadric::Stretch(rounded(first.half_axes)),
+      {rounded(found->first_rotation.row0), rounded(found->first_rotation.row1), rounded(found->first_rotation.row2)}};
+  const quadric::Stretch of_second(rounded(second.half_axes));
+  Wanted wanted;
+  if (pair.with_area) wanted.first = &to.stretch, wanted.second = &of_second;
+  if (pair.patch) wanted.view = view_of(*pair.patch, to);
+  const Integral integral = integrate(*found, wanted);
+  const Sums& sums = integral.sums;
+  const double volume = sums.moments.volume;
+  const double of_rounding = kRoundings * DBL_EPSILON * (sums.blur + volume) + 2 * found->oval * sums.oval;
+  const double error = integral.error + of_rounding;
+  if (!(volume > 0 && error <= pieces::kMostError * volume)) return std::nullopt;
+
+  RoundMeasures result;
+  const Moments whole = to.moments(sums.moments);
+  result.volume = whole.volume, result.volume_error = to.stretch.volume * error;
+  result.centroid = rounded(pair.inside) + to.point(sums.moments.first / volume);
+  result.inertia = to.turn * whole.inertia_about_centroid() * transposed(to.turn);
+  const Vec3 squares = sums.moments.squares;
+  const double longest = max_component(to.stretch.half_axes);
+  result.inertia_error = 64 * DBL_EPSILON * to.stretch.volume * longest * longest * (squares.x + squares.y + squares.z);
+  result.rounding = least * (kRoundings * DBL_EPSILON + 2 * found->oval) * sums.terms;
+  const double side = swapped ? -1 : 1;
+  result.pull = about({side * to.area_vector(sums.force), side * to.moment(sums.moved)}, rounded(pair.inside), {});
+  result.area_known = pair.with_area;
+  if (pair.with_area) {
+    result.area = sums.first_area + sums.second_area;
+    result.first_area = swapped ? sums.second_area : sums.first_area;
+    result.area_error = integral.area_error + std::max(to.stretch.open(), of_second.open()) * result.area;
+  }
+  if (pair.patch) {
+    const double of_owner = (pair.owner == 0) != swapped ? 1 : -1;
+    const auto& p = sums.patch;
+    pair.patch->add(of_owner * p[0], of_owner * p[1], of_owner * p[2], of_owner * p[3], of_owner * p[4],
+                    of_owner * p[5]);
+  }
+  return result;
+}
+
+}  // namespace overlapper::lenses

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <optional>
+
+#include "geometry/moments.h"
+#include "methods/round/lenses/outlines.h"
+#include "methods/round/quadric/stretch.h"
+
+namespace overlapper::lenses {
+
+/// A patch in the first body's ball: u, v and the weight of an area vector are linear there.
+struct View {
+  double u0 = 0, v0 = 0;
+  Vec3 u, v, weight;
+};
+
+/// What is summed beside volume, moments and area vectors.
+struct Wanted {
+  const quadric::Stretch *first = nullptr, *second = nullptr;  ///< for areas, if they are wanted
+  std::optional<View> view;
+};
+
+/// Integrals over slices, in the coordinates of Discs. The surface is the first body's within the second.
+struct Sums {
+  Moments moments;
+  Vec3 force;              ///< ∫ N dA over the unit sphere's part
+  Mat3 moved{{}, {}, {}};  ///< ∫ y Nᵀ dA
+  double blur = 0;         ///< volume by the size of the terms of slacks, of which rounding takes a share
+  double oval = 0;         ///< the same by squares of places: sections that are no discs move the surface by these
+  double terms = 0;        ///< the largest of those terms
+  double first_area = 0, second_area = 0;  ///< m²
+  std::array<double, 6> patch{};           ///< ∫ 1, u, v, u², uv, v² of the weight
+
+  void add(double weight, const Sums& other);
+};
+
+/// The integrals of a slice per unit of t. The volume is `moments.volume`.
+Sums slice(const Discs& discs, double t, const Wanted& wanted);
+
+}  // namespace overlapper::lenses
