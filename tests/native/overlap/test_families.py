@@ -67,7 +67,10 @@ with Path(__file__).with_name("error_factors.csv").open(newline="") as lines:
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_rule_is_kept_and_no_error_bound_is_wider_than_needed(family):
-    """A bound is needed if a case reaches it to within its factor, and that of machines. The proofs are those of test_certificate.py."""
+    """A bound is needed if a case reaches it to within its factor and that of machines.
+
+    The proofs are those of test_certificate.py.
+    """
     reached: dict[str, float] = {}
     for seed in AFFORDABLE.get(family, range(SEED, SEED + 5)):
         case = make(family, seed)
