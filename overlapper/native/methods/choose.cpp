@@ -31,7 +31,8 @@ Traits traits(const S& shape) {
     own.rounded = shape.polytope() != nullptr;
     own.stretched = shape.stretched() != nullptr;
     own.other = !own.round && !own.rounded && !own.stretched;
-    own.ellipsoids = own.stretched || (own.round && shape.revolution()->round_ends && shape.revolution()->half_length == 0);
+    own.ellipsoids =
+        own.stretched || (own.round && shape.revolution()->round_ends && shape.revolution()->half_length == 0);
   } else {
     own.clippable = shape.edges_known() && shape.facet_count() <= static_cast<int>(kMostFacetsClipped);
   }
@@ -42,8 +43,8 @@ Traits traits(const Shape& shape) {
 }
 
 Traits operator+(const Traits& a, const Traits& b) {
-  return {a.bodies + b.bodies, a.bounded || b.bounded, a.clippable && b.clippable, false,
-          a.round || b.round,  a.rounded || b.rounded, a.stretched || b.stretched, a.flat || b.flat,
+  return {a.bodies + b.bodies, a.bounded || b.bounded,     a.clippable && b.clippable, false,
+          a.round || b.round,  a.rounded || b.rounded,     a.stretched || b.stretched, a.flat || b.flat,
           a.other || b.other,  a.ellipsoids + b.ellipsoids};
 }
 

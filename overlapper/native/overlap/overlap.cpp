@@ -209,8 +209,7 @@ Errors Overlap::errors_of_measures() const {
   if (!(volume_error() < volume())) return errors_of_anything(volume_error(), bodies());
   const bool integrated = way() == Way::kClosedForm || way() == Way::kSlicing;
   const auto& slices = integrated ? sliced_with_area() : std::optional<MeasuresAndInertia>();
-  const auto spread =
-      slices ? overlapper::spread(overlapping_bodies(), slices->measures, measures()) : std::nullopt;
+  const auto spread = slices ? overlapper::spread(overlapping_bodies(), slices->measures, measures()) : std::nullopt;
   Errors errors = spread ? errors_of_slices(*slices, *spread, stated(), drawn(), bodies())
                          : errors_beside(measured_with_errors(finest_region(), bodies()), stated());
   errors.volume = volume_error();
