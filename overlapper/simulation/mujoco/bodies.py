@@ -36,23 +36,13 @@ class Bodies(AnyBodies):
     Pairs are those that mj_collision looks at, by masks, welds, parents, excludes, explicit pairs and flags at the last
     update. `pairs` and `overlaps` take other choices.
 
-    Parameters
-    ----------
-    model : mujoco.MjModel
-    data : mujoco.MjData
-        Of this model, with poses: after mj_forward, mj_step or mj_kinematics.
-    names : mapping of int to str, optional
-        Names of bodies by MuJoCo's number, in place of those of the model.
-    surface : {"nominal"}
-    concave, concave_threshold : optional
-        As for pybullet's Bodies, so that one loop serves both. They change nothing: MuJoCo collides hulls.
+    `data` is of this `model`, with poses: after mj_forward, mj_step or mj_kinematics. `names` are names of bodies by
+    MuJoCo's number, in place of those of the model. `surface`, `concave` and `concave_threshold` are as for pybullet's
+    Bodies, so that one loop serves both. The first must be "nominal", and the others change nothing: MuJoCo collides
+    hulls.
 
-    Raises
-    ------
-    TypeError
-        If an argument is of another class.
-    ValueError
-        If `data` is of another model or has no poses yet, or if a name or the surface is invalid.
+    TypeError if `model` or `data` is of another class. ValueError if `data` is of another model or has no poses yet, or
+    if a name or the surface is invalid.
     """
 
     def __init__(
