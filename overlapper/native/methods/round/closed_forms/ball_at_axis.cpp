@@ -51,9 +51,13 @@ struct BallAndAxis {
   DoubleDouble distance;   ///< of the ball's centre from the axis
   DoubleDouble low, high;  ///< ends of the axis
   bool round;
+
+  bool from_axis() const { return r < s; }
+  double origin() const { return from_axis() ? 0 : distance.head; }
 };
 
-/// Integrals over what is shared. Heights count from the axis towards the ball's centre.
+/// Integrals over what is shared. Heights count from the axis or from the ball's centre, whichever
+/// belongs to the smaller body, away from the axis.
 struct SectionSums {
   double volume = 0, across = 0, along = 0;  ///< ∫ of 1, the height and z
   double area = 0;                           ///< m², of the surface
@@ -66,6 +70,9 @@ class Part {
  public:
   Part(const BallAndAxis& at, bool end, DoubleDouble level, DoubleDouble low, DoubleDouble high, SectionSums& sums)
       : at_(at), end_(end), level_(level), low_(low), high_(high), d_(at.distance.head), sums_(sums) {
+    const DoubleDouble r{at.r}, s{at.s};
+    power_ = (at.distance - r) * (at.distance + r) + s * s;
+    if (end) power_ = power_ + level * level;
     find_roots();
   }
 
@@ -82,6 +89,7 @@ class Part {
 
   /// What the section at some z needs, from how far z is from the ends of the interval.
   struct Discs {
+    DoubleDouble at;                       ///< z
     double z, of_body2, of_ball2, chord2;  ///< squares of the radii, and of the chord times the distance
   };
 
@@ -138,7 +146,8 @@ class Part {
 
   Discs discs_at(const Span& span, double x, double y) const {
     Discs discs;
-    discs.z = x < y ? span.low.head + x : span.high.head - y;
+    discs.at = x < y ? span.low + DoubleDouble{x} : span.high - DoubleDouble{y};
+    discs.z = discs.at.head;
     discs.of_ball2 = (span.ball_low + x) * (span.ball_high + y);
     discs.of_body2 = end_ ? (span.end_low + x) * (span.end_high + y) : at_.r * at_.r;
     double product = roots_ > 0 ? lead_ : -1;
@@ -180,9 +189,9 @@ class Part {
       const Discs discs = discs_at(span, x, span.width - x);
       const double area = weight * kPi * (body ? discs.of_body2 : discs.of_ball2);
       sums_.volume += area, sums_.along += area * discs.z;
+      sums_.across += area * ((body ? 0 : d_) - at_.origin());
       sums_.area += weight * 2 * kPi * (body ? at_.r : at_.s);
       if (body) return;
-      sums_.across += area * d_;
       sums_.force_along += weight * 2 * kPi * discs.z;
     });
   }
@@ -194,14 +203,16 @@ class Part {
   Lens lens_of(const Discs& discs) const {
     Lens lens;
     lens.half = std::sqrt(std::max(0.0, discs.chord2)) / (2 * d_);
-    const double apart = (discs.of_body2 - discs.of_ball2) / d_;
-    lens.to_body = (d_ + apart) / 2, lens.to_ball = (d_ - apart) / 2;
+    // The two heights are differences of what may be larger by far.
+    const DoubleDouble slope = DoubleDouble{end_ ? 2.0 : 1.0} * (end_ ? level_ : discs.at);
+    const DoubleDouble to_ball = (power_ - slope * discs.at) / (DoubleDouble{2} * at_.distance);
+    lens.to_ball = to_ball.head, lens.to_body = (at_.distance - to_ball).head;
     lens.of_body = std::atan2(lens.half, lens.to_body), lens.of_ball = std::atan2(lens.half, lens.to_ball);
     const double r2 = discs.of_body2, s2 = discs.of_ball2, r = std::sqrt(r2), s = std::sqrt(s2);
     const auto a = quadric::segment(lens.of_body, lens.half / r, lens.to_body / r);
     const auto b = quadric::segment(lens.of_ball, lens.half / s, lens.to_ball / s);
     lens.area = r2 * a.area + s2 * b.area;
-    lens.moment = lens.to_body * lens.area + r * r2 * a.first_across - s * s2 * b.first_across;
+    lens.moment = (at_.from_axis() ? lens.to_body : -lens.to_ball) * lens.area + r * r2 * a.first_across - s * s2 * b.first_across;
     return lens;
   }
   void add_flat_end(const Discs& discs, Kind kind) {
@@ -260,6 +271,7 @@ class Part {
   std::array<DoubleDouble, 4> root_{};
   int roots_ = 0;
   double lead_ = 1, beside2_ = 0;
+  DoubleDouble power_;  ///< the chord's height below the ball's centre times twice the distance, where z is 0
 };
 
 DoubleDouble least(DoubleDouble a, DoubleDouble b) { return a < b ? a : b; }
@@ -324,7 +336,8 @@ std::optional<MeasuresAndInertia> at_axis(const RoundPair& pair, int self) {
   q.volume_error = kSummation * q.volume;
   q.facets_touched = sums.flat_ends;
   q.centroid = pair.reference +
-               (centre + (sums.across / q.volume - at.distance.head) * normal + sums.along / q.volume * body.axis);
+               (centre + (sums.across / q.volume + at.origin() - at.distance.head) * normal +
+                sums.along / q.volume * body.axis);
   Vec3 on_ball = sums.force_across * normal + sums.force_along * body.axis;
   // If one body is inside the other, the sum is zero but for rounding.
   if (norm(on_ball) <= kSummation * q.area) on_ball = {};
