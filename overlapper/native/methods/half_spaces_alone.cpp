@@ -1,7 +1,6 @@
 #include "methods/half_spaces_alone.h"
 
 #include <array>
-#include <variant>
 #include <vector>
 
 #include "geometry/cancellation.h"
@@ -31,13 +30,14 @@ std::array<ExactVector, 3> exact_rotation(Quaternion q) {
 }
 
 ExactPlane exact_plane(const Placed& body) {
-  const HalfSpace& shape = std::get<HalfSpace>(body.shape);
-  const int down = -std::ilogb(max_component(abs(shape.given_normal)));
+  // As given: the doubles are the heads.
+  const WidePlane facet = *wide_facet(body.shape, 0);
+  const Vec3 given = rounded(facet.normal);
+  const int down = -std::ilogb(max_component(abs(given)));
   const auto scaled_down = [&](double value) { return Exact(std::scalbn(value, down)); };
-  const Vec3 given = shape.given_normal;
   const ExactVector own{scaled_down(given.x), scaled_down(given.y), scaled_down(given.z)};
   const ExactVector position{body.position.x, body.position.y, body.position.z};
-  ExactPlane plane{own, scaled_down(shape.given_offset), body.pose.rotation * shape.plane.normal};
+  ExactPlane plane{own, scaled_down(facet.offset.head), body.pose.rotation * only_plane(body.shape)->normal};
   if (!unturned(body.orientation)) {
     const Quaternion q = in_range(body.orientation);
     const std::array<ExactVector, 3> rotation = exact_rotation(q);
