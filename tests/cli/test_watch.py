@@ -40,7 +40,7 @@ WAYS_TO_STEP = {
     ),
     "second": "p.connect(p.DIRECT); c = p.connect(p.DIRECT); build(c)\nfor _ in range(20): p.stepSimulation(c)",
     "thread": "import threading\nthreading.Thread(target=steps, args=(20,)).start()",
-    "renewed": "c = p.connect(p.DIRECT); build(c); p.resetSimulation(c); steps(20, c)",
+    "renewed": "c = p.connect(p.DIRECT); build(c); p.resetSimulation(physicsClientId=c); steps(20, c)",
 }
 
 COMMAND = [sys.executable, "-m", "overlapper"]

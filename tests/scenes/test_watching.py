@@ -60,7 +60,7 @@ def test_a_watch_gives_the_answers_of_bodies(pile):
 def test_a_simulation_goes_on_as_if_nobody_watched(client):
     poses = []
     for watched in (False, True):
-        p.resetSimulation(client)
+        p.resetSimulation(physicsClientId=client)
         p.setGravity(0, 0, -9.8, physicsClientId=client)
         box(client, mass=0)
         for x in (0.0, 0.3, 0.7):

@@ -32,7 +32,7 @@ def client():
 
 def pressed_cube(client, depth=1e-3, tilt=0.0, parts=1):
     """A cube of 10 cm, made of some parts, stands in a plane, leaning by an angle; the bodies and what pushes them."""
-    pybullet.resetSimulation(client)
+    pybullet.resetSimulation(physicsClientId=client)
     plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
     pybullet.createMultiBody(0, plane, physicsClientId=client)
     height = 0.05 * (np.cos(tilt) + np.sin(abs(tilt))) - depth
