@@ -137,6 +137,7 @@ OF_THE_READER = {
     "robot.urdf": lambda folder: shutil.copy(model("block.urdf"), folder / "robot.urdf"),
     "audit assets": lambda folder: meshes(folder / "assets"),
     "arm.urdf": lambda folder: turntable(folder / "arm.urdf"),
+    "humanoid.xml": lambda folder: shutil.copy(model("mjcf/humanoid.xml"), folder / "humanoid.xml"),
     "panda/panda.urdf": lambda folder: shutil.copytree(model("franka_panda"), folder / "panda"),
     "clashes parts": parts,
     "gearbox.step": assembly,
