@@ -23,6 +23,7 @@ from overlapper._core import (
     penetration_depth,
 )
 from overlapper.face import lazily as _lazily
+from overlapper.functions import introspectable as _introspectable
 from overlapper.shapes import Shape
 
 if TYPE_CHECKING:
@@ -58,6 +59,12 @@ __all__ = [
     "penetration_depth",
     "random_polytope",
 ]
+
+distance = _introspectable(distance)
+iou = _introspectable(iou)
+overlap = _introspectable(overlap)
+overlaps = _introspectable(overlaps)
+penetration_depth = _introspectable(penetration_depth)
 
 # These names are imported when they are asked for. The pytest plugin is a module of this package, so an import of numpy
 # here would delay every start of pytest. Names that need more than numpy are not imported by * either.

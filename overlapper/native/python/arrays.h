@@ -192,5 +192,6 @@ void define_overlaps(nb::module_& m);
 void define_batch(nb::module_& m);
 void define_poses(nb::module_& m);
 void define_forces(nb::module_& m);
+void define_function(nb::module_& m);
 
 }  // namespace overlapper::python

@@ -38,4 +38,5 @@ NB_MODULE(_core, m) {
   overlapper::python::define_batch(m);
   overlapper::python::define_poses(m);
   overlapper::python::define_forces(m);
+  overlapper::python::define_function(m);
 }

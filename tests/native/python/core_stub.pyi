@@ -977,3 +977,6 @@ class ContactSolver:
         last known, (n, 6) force and torque on the links about their centres of mass, the patches' part of the acceleration, and
         how often the patches were gone through.
         """
+
+def function(core: Any) -> Any:
+    """Calls a function of the core. Attributes can be set."""

@@ -1,0 +1,32 @@
+"""Functions of the core as inspect, pydoc and pickle expect functions: with a signature, a docstring and a name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+from overlapper import _core
+
+if TYPE_CHECKING:
+    import inspect
+
+F = TypeVar("F")
+
+
+def introspectable(function: F) -> F:
+    """The function of the core, with the docstring and the signature of its last overload."""
+    core: Any = function
+    made: Any = _core.function(core)
+    made.__name__ = made.__qualname__ = core.__name__
+    made.__module__ = __package__
+    made.__doc__ = core.__nb_signature__[-1][1]
+    made._signature = signature
+    return cast("F", made)
+
+
+def signature(core: Any) -> inspect.Signature:
+    """That of the last overload, with types as text."""
+    import inspect  # only where it is asked for: it takes a third of what the package takes to import
+
+    found: dict[str, Any] = {}
+    exec(f"from __future__ import annotations\n{core.__nb_signature__[-1][0]}: ...", found)
+    return inspect.signature(found[core.__name__])
