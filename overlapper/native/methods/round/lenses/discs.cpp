@@ -214,8 +214,15 @@ std::optional<Discs> discs(const StretchedBall& first, const StretchedBall& seco
   result.first_square = {(slack_first + c_x * c_x + c_y * c_y).head, 2 * c_n.head, -1};
   const DoubleDouble p_x = round * overlapper::dot(axes.along_n, axes.along_x),
                      p_y = round * overlapper::dot(axes.along_n, axes.along_y);
-  result.second_square = {(of_other[0] + g_x * g_x + g_y * g_y).head, 2 * (g_n - g_x * p_x - g_y * p_y).head,
-                          (p_x * p_x + p_y * p_y - round * overlapper::dot(axes.along_n, axes.along_n)).head};
+  // A section that is not quite a disc has the area of one. The square of the radius is a difference, which may be
+  // small beside what the section's shape then changes.
+  const DoubleDouble whole = value / (axes.xx * axes.yy - axes.xy * axes.xy);
+  const auto dot_in_section = [&](DoubleDouble a_x, DoubleDouble a_y, DoubleDouble b_x, DoubleDouble b_y) {
+    return whole * (axes.yy * a_x * b_x + axes.xx * a_y * b_y - axes.xy * (a_x * b_y + a_y * b_x));
+  };
+  result.second_square = {
+      (of_other[0] + dot_in_section(g_x, g_y, g_x, g_y)).head, 2 * (g_n - dot_in_section(g_x, g_y, p_x, p_y)).head,
+      (dot_in_section(p_x, p_y, p_x, p_y) - round * overlapper::dot(axes.along_n, axes.along_n)).head};
   result.second_rise = std::sqrt(-result.second_square[2] * value.head);
   return result;
 }
