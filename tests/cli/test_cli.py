@@ -85,7 +85,11 @@ def refusal(*arguments):
 
 @pytest.mark.parametrize(
     ("option", "choices"),
-    [("--contact", "'bullet', 'mujoco', 'volumetric'"), ("--surface", "'nominal', 'margin'"), ("--method", "'auto', 'paper'")],
+    [
+        ("--contact", "'bullet', 'mujoco', 'volumetric'"),
+        ("--surface", "'nominal', 'margin'"),
+        ("--method", "'auto', 'paper'"),
+    ],
 )
 def test_an_invalid_choice_is_refused_with_the_valid_ones(option, choices):
     assert refusal("run", "franka_lift", option, "some") == (

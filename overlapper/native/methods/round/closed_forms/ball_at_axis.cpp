@@ -212,7 +212,8 @@ class Part {
     const auto a = quadric::segment(lens.of_body, lens.half / r, lens.to_body / r);
     const auto b = quadric::segment(lens.of_ball, lens.half / s, lens.to_ball / s);
     lens.area = r2 * a.area + s2 * b.area;
-    lens.moment = (at_.from_axis() ? lens.to_body : -lens.to_ball) * lens.area + r * r2 * a.first_across - s * s2 * b.first_across;
+    lens.moment = (at_.from_axis() ? lens.to_body : -lens.to_ball) * lens.area + r * r2 * a.first_across -
+                  s * s2 * b.first_across;
     return lens;
   }
   void add_flat_end(const Discs& discs, Kind kind) {
@@ -335,9 +336,8 @@ std::optional<MeasuresAndInertia> at_axis(const RoundPair& pair, int self) {
   q.volume = sums.volume, q.area = sums.area;
   q.volume_error = kSummation * q.volume;
   q.facets_touched = sums.flat_ends;
-  q.centroid = pair.reference +
-               (centre + (sums.across / q.volume + at.origin() - at.distance.head) * normal +
-                sums.along / q.volume * body.axis);
+  q.centroid = pair.reference + (centre + (sums.across / q.volume + at.origin() - at.distance.head) * normal +
+                                 sums.along / q.volume * body.axis);
   Vec3 on_ball = sums.force_across * normal + sums.force_along * body.axis;
   // If one body is inside the other, the sum is zero but for rounding.
   if (norm(on_ball) <= kSummation * q.area) on_ball = {};
