@@ -87,7 +87,7 @@ def proved_far_from(found):
 @pytest.mark.parametrize("kinds", PROVED, ids=" and ".join)
 def test_stated_errors_hold_at_far_places(kinds):
     measured = 0
-    for a, b in far_pairs(kinds, 2026, 3 if MARGINS.issuperset(kinds) else 8):
+    for a, b in far_pairs(kinds, 2026, 2 if MARGINS.issuperset(kinds) else 4):
         found = overlap(a, b, tolerance=0.1)
         if found:
             measured += 1
