@@ -233,6 +233,7 @@ std::optional<RoundMeasures> measure_culled_pieces(const SlicedPair& pair) {
   const Scratch<ManyPieces> pieces;
   enclose(pair.a, pair.b, rounded(pair.inside), pieces->around);
   if (!pieces->both.become(pair, &pieces->around)) return std::nullopt;
+  join(pieces->both.a), join(pieces->both.b);
   pieces->culling.look_at(pieces->both.a, pieces->both.b, pieces->around);
   pieces->near.clear();
   pieces->culling.near(pieces->near);

@@ -139,6 +139,46 @@ class PlacingCutter final : public Cutter {
   bool empty_ = false;
 };
 
+/// Whether two unit normals are the same.
+bool same(const WideVector& a, const WideVector& b) { return norm2(overlapper::rounded(a - b)) < 1e-30; }
+
+/// Whether a piece is part of the prism on a facet: beyond the facet of the core and below the face, with some cuts
+/// from the side.
+bool on_facet(std::span<const Wall> prism, const Wall& of_core, size_t sides) {
+  return prism.size() == 2 + sides && prism[0].owner == slicing::kCut && same(prism[0].normal, -of_core.normal) &&
+         prism[1].owner != slicing::kCut && same(prism[1].normal, of_core.normal);
+}
+
+void become(Pieces& result, std::initializer_list<Wall> first, std::initializer_list<Wall> second) {
+  result.walls.assign(first), result.walls.insert(result.walls.end(), second);
+  result.pieces = {{-1, 0, static_cast<int>(first.size())}};
+  if (second.size() > 0) result.pieces.push_back({0, static_cast<int>(first.size()), static_cast<int>(second.size())});
+}
+
+void join_facet(Pieces& pieces) {
+  const std::span<const Wall> core = pieces.of(0), prism = pieces.of(1);
+  if (!pieces.rounds.empty() || core.size() != 1 || core[0].owner != slicing::kCut || !on_facet(prism, core[0], 0))
+    return;
+  become(pieces, {Wall(prism[1])}, {});
+}
+
+void join_edge(Pieces& pieces) {
+  constexpr double kLeastTurn = 1e-3, kMostTurn = 1.98;  // of one normal to the other: the length of their difference
+  const std::span<const Wall> core = pieces.of(0), first = pieces.of(1), second = pieces.of(2), wedge = pieces.of(3);
+  if (pieces.rounds.size() != 1 || pieces.rounds[0].ball || pieces.pieces[3].round != 0) return;
+  if (core.size() != 2 || wedge.size() != 2 || !on_facet(first, core[0], 1) || !on_facet(second, core[1], 1)) return;
+  const WideVector &of_first = first[2].normal, &of_second = second[2].normal;
+  const bool in_order = same(wedge[0].normal, -of_first) && same(wedge[1].normal, -of_second);
+  if (!in_order && !(same(wedge[1].normal, -of_first) && same(wedge[0].normal, -of_second))) return;
+  const Wall one = first[1], other = second[1];
+  const double turn = norm(overlapper::rounded(one.normal - other.normal));
+  if (!(turn > kLeastTurn && turn < kMostTurn)) return;
+  const Round& round = pieces.rounds[0];
+  const WideVector normal = unit(one.normal + other.normal);
+  const DoubleDouble slack = dot(normal, round.centre) + DoubleDouble{round.radius} * dot(normal, one.normal);
+  become(pieces, {one, other, {normal, slack, slicing::kCut}}, {{-normal, -slack, slicing::kCut}});
+}
+
 }  // namespace
 
 double extent(const Placed& body, Vec3 point) {
@@ -182,6 +222,11 @@ void cut(const Placed& body, const Placed& other, const EnclosingPolytope* commo
          const WideVector& inside, Pieces& result) {
   PlacingCutter cutter(body, other, common, owner, reference, inside, result);
   ask(body.shape, [&](const auto& shape) { shape.give_pieces(cutter); });
+}
+
+void join(Pieces& pieces) {
+  if (pieces.pieces.size() == 2) join_facet(pieces);
+  if (pieces.pieces.size() == 4) join_edge(pieces);
 }
 
 bool grow(Pieces& pieces, double outwards) {

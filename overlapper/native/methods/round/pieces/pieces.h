@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "geometry/wide_pose.h"
@@ -26,6 +27,9 @@ struct Pieces {
   double flatness = 0;  ///< m: largest distance of a facet's plane from its corners
   double rounding = 0;  ///< m: movement of surfaces by the rounding of double-doubles
 
+  std::span<const Wall> of(int piece) const {
+    return std::span(walls).subspan(pieces[piece].first_wall, pieces[piece].walls);
+  }
   void clear() { pieces.clear(), rounds.clear(), walls.clear(), flatness = rounding = 0; }
   double misplaced() const { return flatness + rounding; }
 };
@@ -42,6 +46,11 @@ void enclose(const Placed& a, const Placed& b, Vec3 inside, EnclosingPolytope& r
 /// Pieces are relative to the point `inside`, in the same coordinates as the bodies.
 void cut(const Placed& body, const Placed& other, const EnclosingPolytope* common, int owner, Vec3 reference,
          const WideVector& inside, Pieces& result);
+
+/// Where the walls that are left of a rounded hull are those of one facet or of one edge, fewer pieces are the same set:
+/// what is below the facet; at an edge, what is below the plane through the lines where the cylinder meets both facets,
+/// and the segment of the cylinder beyond that plane.
+void join(Pieces& pieces);
 
 /// Moves the surface of a body out, but not the cuts through the body; false if nothing of a round shape is left.
 bool grow(Pieces& pieces, double outwards);
