@@ -2,6 +2,7 @@
 
 import sys
 from fractions import Fraction
+from itertools import combinations_with_replacement
 
 import families
 import numpy as np
@@ -15,6 +16,7 @@ from overlapper.proof.certificate import certificate
 from overlapper.proof.claims import Bracketed, CertificateError
 from overlapper.proof.rational_body import RationalBody
 from overlapper.proof.volume import Common, proved_bounds
+from overlapper.quaternion import composed
 
 NARROW = Fraction(1, 10**13)
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
@@ -200,6 +202,38 @@ def test_neither_size_nor_place_costs_digits(first, larger):
         if found:
             wrong[a, b] = disagreement(found)
     assert not any(wrong.values()), wrong
+
+
+# A turn of a cube that leaves a facet, an edge or a corner for its lowest part.
+LOWEST = {
+    "facet": (0.0, 0.0, 0.0, 1.0),
+    "edge": (np.sin(np.pi / 8), 0.0, 0.0, np.cos(np.pi / 8)),
+    "corner": (0.8, -0.8, 0.0, 1.5),
+}
+
+
+@pytest.mark.parametrize("depth", [0.2, 0.08, 1e-3, 1e-8])
+@pytest.mark.parametrize(("lower", "upper"), [*combinations_with_replacement(LOWEST, 2)])
+def test_rounded_bodies_meet_at_facets_edges_and_corners(lower, upper, depth):
+    rng = np.random.default_rng([17, *map(ord, lower + upper)])
+    shapes = CUBE, RoundedHull(CORNERS * (0.4, 0.3, 0.5), 0.05)
+    for tilt in (0.0, 1e-3, 0.1):
+        yaw = [0, 0, *rng.normal(size=2)]
+        turns = [
+            composed(tilted(rng, tilt), composed(np.array(yaw), np.array(LOWEST[name]))) for name in (lower, upper)
+        ]
+        a, b = Placed(shapes[0], (0, 0, 0), turns[0]), Placed(shapes[1], (0.02, -0.03, 1.0), turns[1])
+        for _ in range(2):
+            found = overlap(a, b)
+            way = (found.depth if found else -found.distance) - depth
+            b = Placed(b.shape, np.array(b.position) - way * np.array(found.normal), b.orientation)
+        found = overlap(a, b)
+        assert found and not disagreement(found), (a, b)
+        assert found.volume_error <= 1e-12 * found.volume, (a, b)
+
+
+def tilted(rng, angle):
+    return np.array([*rng.normal(size=3) * angle / 2, 1.0])
 
 
 def test_pieces_of_a_body_share_no_volume_and_leave_none_out():
