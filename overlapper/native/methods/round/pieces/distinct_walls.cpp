@@ -1,6 +1,8 @@
 #include "methods/round/pieces/distinct_walls.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
 namespace overlapper::pieces {
@@ -26,22 +28,27 @@ bool coincide(double apart, double tilt, const PieceSetting& setting, double& er
 /// walls, only neighbours in the order of that length are compared.
 template <class Walls, class Use>
 bool any_two(Walls&& walls, double side, const PieceSetting& setting, Use use) {
-  thread_local std::vector<std::pair<double, int>> of_thread;
-  std::vector<std::pair<double, int>>& by_length = of_thread;  // avoids repeated lookups of thread_local
   constexpr Vec3 kAcross{0.3141, 0.5926, 0.7417};
   const double equal = std::max(1e-12, 2 * setting.layer / setting.extent);  // beyond the rounding of these lengths
-  constexpr size_t kMany = 24;
-  by_length.clear();
-  for (int i = 0; i < static_cast<int>(walls.size()); ++i)
-    by_length.push_back({dot(kAcross, rounded(walls[i].normal)), i});
-  const bool many = walls.size() > kMany;
-  if (many) std::ranges::sort(by_length);
+  constexpr size_t kFew = 24;
+  const size_t size = walls.size();
+  const auto length_of = [&](size_t i) { return dot(kAcross, rounded(walls[i].normal)); };
+  if (size <= kFew) {
+    std::array<double, kFew> length;
+    for (size_t i = 0; i < size; ++i) length[i] = length_of(i);
+    for (size_t i = 0; i < size; ++i)
+      for (size_t j = 0; j < size; ++j)
+        if (std::abs(length[j] - side * length[i]) <= equal && i != j && use(walls[i], walls[j])) return true;
+    return false;
+  }
+  std::vector<std::pair<double, size_t>> by_length;
+  for (size_t i = 0; i < size; ++i) by_length.push_back({length_of(i), i});
+  std::ranges::sort(by_length);
   for (const auto& [length, i] : by_length) {
-    const double least = side * length - equal, most = side * length + equal;
-    auto other = many ? std::ranges::lower_bound(by_length, std::pair{least, -1}) : by_length.begin();
-    for (; other != by_length.end() && !(many && other->first > most); ++other)
-      if (other->first >= least && other->first <= most && other->second != i && use(walls[i], walls[other->second]))
-        return true;
+    const double most = side * length + equal;
+    auto other = std::ranges::lower_bound(by_length, std::pair{side * length - equal, size_t{0}});
+    for (; other != by_length.end() && other->first <= most; ++other)
+      if (other->second != i && use(walls[i], walls[other->second])) return true;
   }
   return false;
 }

@@ -1,6 +1,7 @@
 #include "methods/round/pieces/enclosing_polytope.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <utility>
 
@@ -24,12 +25,18 @@ void EnclosingPolytope::become(const Bounds& box) {
 }
 
 bool EnclosingPolytope::cut(const Face& face) {
-  thread_local std::pair<std::vector<double>, std::vector<int>> of_thread;
+  constexpr int kFew = 64;
+  std::array<double, kFew> few_left;
+  std::array<int, kFew> few_removed;
+  double* left = few_left.data();
+  int* removed = few_removed.data();
   const int before = static_cast<int>(corners.size());
-  of_thread.first.resize(before), of_thread.second.resize(before);
-  // Pointers, because each access to a thread_local variable looks it up.
-  double* const left = of_thread.first.data();
-  int* const removed = of_thread.second.data();
+  if (before > kFew) {
+    thread_local std::pair<std::vector<double>, std::vector<int>> of_thread;
+    auto& [many_left, many_removed] = of_thread;  // avoids repeated lookups of thread_local
+    many_left.resize(before), many_removed.resize(before);
+    left = many_left.data(), removed = many_removed.data();
+  }
   int gone = 0;
   for (int i = 0; i < before; ++i) {
     left[i] = face.slack - dot(face.normal, corners[i].at);
