@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/how.md: the steps of the article, the round frame, four other ways, and slices.
+"""Makes the pictures of docs/how.md: the steps of the article, the round frame, other ways, slices, and lenses.
 
 python docs/how.py
 """
@@ -22,7 +22,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from PIL import Image
 from scipy.spatial import ConvexHull
 
-from overlapper import Box, Capsule, Cylinder, HalfSpace, Hull, Overlap, Placed, Sphere, overlap
+from overlapper import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Overlap, Placed, Sphere, overlap
 from overlapper.viewer.look import LIGHT, OWNER_COLORS
 from overlapper.viewer.tessellation import tessellation
 
@@ -467,11 +467,137 @@ def draw_slices() -> None:
     save(figure, "how_slices.png")
 
 
+# --------------------------------------------------------------------------------------------------------------- lenses
+
+
+class Lenses:
+    """Two ellipsoids, the first about the origin and along the axes, in slices of which both are discs.
+
+    All is in units of the first one's half axes, in which that is a unit ball.
+    """
+
+    def __init__(self, first: Placed, second: Placed) -> None:
+        stretch = np.array(first.shape.half_axes)
+        turn = in_world(Placed(second.shape, (0, 0, 0), second.orientation), np.eye(3))  # rows: the second's axes
+        k = turn * stretch / np.array(second.shape.half_axes)[:, None]
+        middle = turn @ second.position / second.shape.half_axes
+        values, axes = np.linalg.eigh(k.T @ k)
+        across = np.sqrt(values[1] - values[0]) * axes[:, 0] + np.sqrt(values[2] - values[1]) * axes[:, 2]
+        self.normal = across / np.linalg.norm(across)
+        self.plane = np.array([axes[:, 1], np.cross(self.normal, axes[:, 1])])
+        self.k, self.middle, self.value = k, middle, values[1]
+
+    def discs(self, t: float) -> list[tuple[np.ndarray, float]]:
+        """The centre in the plane and the square of the radius, of both."""
+        rest = self.middle - t * self.k @ self.normal
+        centre = self.plane @ self.k.T @ rest / self.value
+        return [(np.zeros(2), 1 - t * t), (centre, (1 - rest @ rest) / self.value + centre @ centre)]
+
+    def circles(self, t: float) -> list[Ring]:
+        around = np.linspace(0, 2 * np.pi, 181)
+        ring = np.column_stack([np.cos(around), np.sin(around)])
+        return [centre + np.sqrt(max(0.0, square)) * ring for centre, square in self.discs(t)]
+
+    def lens(self, t: float) -> Ring:
+        """What both discs share, as a polygon."""
+        (_, first), (centre, second) = self.discs(t)
+        if min(first, second) <= 0:
+            return np.zeros((0, 2))
+        one, two = self.circles(t)
+        inside = [one[np.linalg.norm(one - centre, axis=1) <= np.sqrt(second)], two[(two * two).sum(axis=1) <= first]]
+        points = np.concatenate(inside)
+        return points[ConvexHull(points).vertices] if len(points) > 2 else np.zeros((0, 2))
+
+    def area(self, t: float) -> float:
+        (_, first), (centre, second) = self.discs(t)
+        r, s, d = np.sqrt(max(0.0, first)), np.sqrt(max(0.0, second)), np.linalg.norm(centre)
+        if d >= r + s or min(r, s) == 0:
+            return 0.0
+        if d <= abs(r - s):
+            return float(np.pi * min(r, s) ** 2)
+        along = [(d * d + sign * (r * r - s * s)) / (2 * d) for sign in (1, -1)]
+        return float(sum(q * q * np.arccos(h / q) - h * np.sqrt(q * q - h * h) for q, h in zip((r, s), along)))
+
+    def levels(self) -> np.ndarray:
+        """Where the circles touch each other, by halving between samples."""
+
+        def side(t: float) -> tuple[bool, bool, bool]:
+            (_, first), (centre, second) = self.discs(t)
+            r, s, d = np.sqrt(max(0.0, first)), np.sqrt(max(0.0, second)), np.linalg.norm(centre)
+            return bool(min(first, second) > 0), bool(d < r + s), bool(d > abs(r - s))
+
+        found = []
+        for low, high in pairwise(np.linspace(-1, 1, 2000)):
+            if side(low) == side(high):
+                continue
+            for _ in range(60):
+                middle = (low + high) / 2
+                low, high = (middle, high) if side(middle) == side(low) else (low, middle)
+            if self.area(low - 1e-6) > 0 or self.area(high + 1e-6) > 0:
+                found.append(high)
+        return np.array(found)
+
+    def in_space(self, t: float, ring: Ring, spread: float = 1.0) -> Ring:
+        return ring @ self.plane + spread * t * self.normal
+
+
+def draw_lenses() -> None:
+    first = Placed(Ellipsoid([0.6, 0.4, 0.3]))
+    second = Placed(Ellipsoid([0.25, 0.5, 0.35]), (0.42, -0.22, 0.2), TURN)
+    common, lenses = overlap(first, second), Lenses(first, second)
+    stretch, levels = np.array(first.shape.half_axes), lenses.levels()
+    ts = np.linspace(levels[0], levels[-1], 400)
+    areas = [lenses.area(t) for t in ts]
+    assert abs(np.trapezoid(areas, ts) * np.prod(stretch) / common.volume - 1) < 1e-4
+    shown = np.linspace(levels[0], levels[-1], 9)[1:-1]
+    blend = tuple((np.array(OWNER_COLORS[0][:3]) + np.array(OWNER_COLORS[1][:3])) / 2)
+
+    figure = plt.figure(figsize=(11, 4.4))
+    axes = stage(figure, (1, 3, 1), "Two ellipsoids", "Planes of one direction cut both in ellipses of the\n"
+                 "same shape; what the two ellipses share is drawn.")  # fmt: skip
+    seen = [ghost(axes, placed, color) for placed, color in zip((first, second), OWNER_COLORS)]
+    for t in shown[::-1]:
+        ring = stretch * lenses.in_space(t, lenses.lens(t))
+        axes.add_collection3d(Poly3DCollection([ring], facecolors=[(*blend, 0.9)], edgecolors=INK, linewidths=0.6))
+    frame(axes, np.concatenate(seen), 1.25, 0.15)
+
+    axes = figure.add_axes((0.355, 0.05, 0.3, 0.72))
+    axes.set_title("A slice", fontsize=11, fontweight="bold", color=INK, loc="left", y=1.13)
+    said = "In units of the first one's half axes, the ellipses\nare discs, and what they share is a lens."
+    axes.text(0, 1.12, said, transform=axes.transAxes, fontsize=8.5, color=INK, va="top", linespacing=1.35)
+    t = float(shown[len(shown) // 2])
+    for ring, color in zip(lenses.circles(t), OWNER_COLORS):
+        axes.fill(*ring.T, color=(*color[:3], 0.13), lw=0)
+        axes.plot(*ring.T, color=color, lw=1.4)
+    axes.fill(*lenses.lens(t).T, color=(*blend, 0.9), lw=0)
+    for (centre, _), color in zip(lenses.discs(t), OWNER_COLORS):
+        axes.plot(*centre, "o", ms=3, color=color)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+    axes = figure.add_axes((0.715, 0.13, 0.27, 0.62))
+    axes.set_title("The areas of lenses, integrated", fontsize=11, fontweight="bold", color=INK, loc="left", y=1.2)
+    said = "Between the lines no outline changes, and a rule\nof Gauss and Legendre is soon exact (dots)."
+    axes.text(0, 1.18, said, transform=axes.transAxes, fontsize=8.5, color=INK, va="top", linespacing=1.35)
+    axes.plot(ts, areas, color=INK, lw=1.6)
+    angles, _ = np.polynomial.legendre.leggauss(8)
+    for low, high in pairwise(levels):
+        at = (low + high) / 2 - (high - low) / 2 * np.cos(np.pi / 2 * (angles + 1))
+        axes.plot(at, [lenses.area(each) for each in at], "o", ms=3, color=MARK)
+    for level in levels:
+        axes.axvline(level, color=GREY, lw=0.8, ls=":")
+    axes.set(xlabel="t", ylabel="area of the lens")
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.subplots_adjust(0.0, 0.02, 1.0, 0.92, 0.0, 0)
+    save(figure, "how_lenses.png")
+
+
 def main() -> None:
     draw_steps()
     draw_frame()
     draw_ways()
     draw_slices()
+    draw_lenses()
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ MAKERS = (
     Maker("docs/regression.py", ("regression.png",), (*PAGE, "examples/ci/**/*")),
     Maker("docs/meshes.py", ("meshes.png",), PAGE),
     Maker("docs/extraction.py", ("extraction.png",), ("overlapper/viewer/tessellation.py",)),
-    Maker("docs/how.py", ("how.png", "how_frame.png", "how_slices.png", "how_ways.png")),
+    Maker("docs/how.py", ("how.png", "how_frame.png", "how_lenses.png", "how_slices.png", "how_ways.png")),
     Maker("docs/polytopes.py", ("polytopes.png",), ("overlapper/viewer/*.py",)),
     Maker("docs/results.py", ("results.png",), ("scenes/franka_grasp.py",)),
     of_results(
