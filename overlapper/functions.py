@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from overlapper import _core
+from overlapper._core import function
 
 if TYPE_CHECKING:
     import inspect
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 F = TypeVar("F")
 
 
-def introspectable(function: F) -> F:
+def introspectable(of_core: F) -> F:
     """The function of the core, with the docstring and the signature of its last overload."""
-    core: Any = function
-    made: Any = _core.function(core)
+    core: Any = of_core
+    made: Any = function(core)
     made.__name__ = made.__qualname__ = core.__name__
     made.__module__ = __package__
     made.__doc__ = core.__nb_signature__[-1][1]
@@ -25,7 +25,7 @@ def introspectable(function: F) -> F:
 
 def signature(core: Any) -> inspect.Signature:
     """That of the last overload, with types as text."""
-    import inspect  # only where it is asked for: it takes a third of what the package takes to import
+    import inspect  # only where it is asked for: it would add a quarter to the import of the package
 
     found: dict[str, Any] = {}
     exec(f"from __future__ import annotations\n{core.__nb_signature__[-1][0]}: ...", found)
