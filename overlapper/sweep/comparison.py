@@ -215,7 +215,7 @@ class Recorded:
         """Those columns of a part that are there."""
         with self._opened(path) as file:
             try:
-                return file.read(columns=[*columns])
+                return file.read(columns=[*columns], use_threads=False)  # see store.content
             except (arrow().ArrowException, OSError) as error:
                 raise self._unreadable(path, error) from error
 

@@ -70,7 +70,8 @@ def content(path: Path, columns: Sequence[str] | None = None) -> Any:
     data = _must_be_whole(path)
     try:
         file = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(data), page_checksum_verification=True)
-        return file.read(columns=columns)
+        # Without threads: one that Arrow has just started may abort a process that ends.
+        return file.read(columns=columns, use_threads=False)
     except (pyarrow.ArrowException, OSError) as error:
         raise Broken(path, f"cannot be read: {first_line(error)}") from error
 

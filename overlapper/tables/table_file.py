@@ -501,7 +501,8 @@ def read_table(path: Path) -> list[Row]:
     if path.suffix == ".parquet":
         with _opened_parquet(path) as dataset:
             _check_columns(path, dataset.schema.names)
-            rows = [_checked(row) for row in dataset.read().to_pylist()]
+            # Without threads: one that Arrow has just started may abort a process that ends.
+            rows = [_checked(row) for row in dataset.read(use_threads=False).to_pylist()]
             return _sealed(path, _texts(dataset.schema.metadata), dataset.schema.names, rows)
     if path.suffix == ".sqlite":
         with _opened_sqlite(path) as connection:
